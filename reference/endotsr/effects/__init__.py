@@ -1,6 +1,6 @@
-"""What a clip calls for: tests of effects, and a plan of the components that answer them.
+"""Tests for effects in a clip, and a plan of the components that model them.
 
-In: a `Sequence`; only its training frames are read. Out: one `Verdict` for each effect (statistic, threshold,
-false-positive rate, reason) and a `Plan` (which settings to change, why, and the expected saving). This room does not
-depend on the trainer: a plan is a change of the configuration and nothing else.
+In: a `Sequence`, of which only training frames are read. Out: one `EffectVerdict` for each effect (statistic,
+threshold, false-positive rate, reason) and a `Plan` (settings to change, reasons, expected savings). This room does not
+depend on the trainer: a plan only changes the configuration.
 """

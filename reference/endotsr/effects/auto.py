@@ -11,11 +11,11 @@ from endotsr.sequences.sequence import Sequence
 def planned_settings(
     sequence: Sequence, config: Config, explicit: frozenset[str] = frozenset()
 ) -> tuple[Config, list[str], dict[str, Any]]:
-    """The settings that the clip calls for.
+    """The settings that the clip requires.
 
-    explicit   keys that were given on the command line or in a file, which the plan leaves alone
-    returns    the settings; lines that say every change, its reason, and what was left alone; and verdicts and
-               plan, `effects` of run.json
+    explicit   keys given on the command line or in a file, which the plan does not change
+    returns    the settings; one line for each change or kept setting with the reason; and verdicts and plan for
+               `effects` in run.json
     """
     inspection = inspect_sequence(sequence)
     plan = make_plan(inspection, config, explicit)

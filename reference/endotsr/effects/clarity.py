@@ -1,10 +1,9 @@
-"""Smoke and blur: frames whose fine contrast is far below that of the others.
+"""Smoke and blur: frames with much less fine contrast than the others.
 
-The sharpness of a frame is the mean square of its Laplacian over tissue, at full size, with the part of noise removed,
-over its squared brightness, so that a change of gain leaves it as it is. A blurred frame has less of it and the same
-darkest tissue. Smoke adds light everywhere: the dark channel (the smallest channel, lowest tenth of the tissue) rises
-as well. Both are found only where they vary: a clip that is blurred from the first frame to the last has no sharp frame
-to compare with.
+The sharpness of a frame is the mean squared Laplacian over tissue at full size, less the contribution of noise, divided
+by the squared brightness. It is invariant to gain. Blur lowers the sharpness and does not change the darkest tissue.
+Smoke adds light everywhere, which also raises the dark channel (the smallest channel, tenth percentile over tissue).
+Both are found only if they vary: a clip that is blurred throughout has no sharp frame for comparison.
 """
 
 import numpy as np
@@ -15,11 +14,11 @@ from endotsr.effects.verdict import Curve, EffectVerdict
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.sequence import Sequence
 
-BLUR = np.log(2.0)  # fall of the log sharpness below the median frame
+BLUR = np.log(2.0)  # fall of the log sharpness below the local median
 SMOKE_FALL = np.log(1.5)
 SMOKE_RISE = 0.05  # of the dark channel, display units
-SCATTER = 4.0  # deviations (MAD) of the frames, which a single frame must exceed as well
-NEIGHBOURS = 4  # frames on either side: slow change, as of the view, is no blur
+SCATTER = 4.0  # a frame must also exceed this many deviations (MAD) of the frames
+NEIGHBOURS = 4  # frames on either side: slow changes, such as of the view, are not blur
 
 
 def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[EffectVerdict, EffectVerdict]:
@@ -40,7 +39,7 @@ def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Effe
 
 
 def clear_frames(clip: Clip, *verdicts: EffectVerdict) -> BoolArray:
-    """(m,) False for the training frames that a verdict of `clarity_verdicts` names."""
+    """(m,) False for the training frames listed in verdicts of `clarity_verdicts`."""
     clear = np.ones(clip.count, bool)
     for verdict in verdicts:
         clear[verdict.details["frames"]] = False
@@ -56,7 +55,7 @@ def _measures(image: np.ndarray, mask: np.ndarray, sigma: float) -> tuple[float,
     curved = 4 * grey[1:-1, 1:-1] - grey[:-2, 1:-1] - grey[2:, 1:-1] - grey[1:-1, :-2] - grey[1:-1, 2:]
     energy = float((curved[inner] ** 2).mean()) - 20.0 * sigma**2 / 3.0
     bright = float(grey[1:-1, 1:-1][inner].mean())
-    least = 0.1 * 20.0 * sigma**2 / 3.0 + 1e-8  # energy below a tenth of that of the noise is not measured
+    least = 0.1 * 20.0 * sigma**2 / 3.0 + 1e-8  # energy below a tenth of the noise energy is not measurable
     return float(np.log(max(energy, least) / max(bright, 1e-3) ** 2)), float(
         np.percentile(image.min(axis=0)[mask], 10)
     ) / 255

@@ -1,7 +1,7 @@
 """The training frames of a sequence at the working size of all tests.
 
-In: a `Sequence`. Out: arrays of its m training frames; a picture that is wider than `WIDEST` is averaged over squares
-of pixels. Held-out frames are never read. Tests of fine structure (highlights, blur) read the full size instead.
+In: a `Sequence`. Out: arrays of its m training frames; pictures wider than `WIDEST` are averaged over squares of
+pixels. Held-out frames are never read. Tests of fine structure (highlights, blur) use the full size instead.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from endotsr.splatting.camera import Camera
 
 WIDEST = 320  # columns of the working size
 TILE = 16  # side of the tiles over which pixels are averaged, working pixels
-TILE_TISSUE = 0.5  # a tile counts where at least this fraction of its pixels is tissue
+TILE_TISSUE = 0.5  # minimum fraction of tissue pixels in a tile that counts
 LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)
 
 
@@ -23,13 +23,13 @@ class Clip(NamedTuple):
     """m training frames at the working size h x w."""
 
     images: NDArray[np.float32]  # (m, 3, h, w) display units
-    masks: BoolArray  # (m, h, w) True where all pixels of the square are tissue
+    masks: BoolArray  # (m, h, w) True if all pixels of the square are tissue
     depth: NDArray[np.float32]  # (m, h, w) scene units, one sample of each square; 0 = no depth
     times: NDArray[np.float64]  # (m,) normalised, ascending
     cameras: list[Camera]  # m, at full size
     shrink: int  # side of the averaged squares, pixels of the full size
-    frames: int  # of the whole sequence, held-out frames included
-    reference: int  # the training frame that the others are compared with
+    frames: int  # of the whole sequence, including held-out frames
+    reference: int  # the training frame with which the others are compared
 
     @property
     def count(self) -> int:
@@ -43,7 +43,7 @@ class Clip(NamedTuple):
 
 
 def training_clip(sequence: Sequence) -> Clip:
-    """The training frames of a sequence, averaged to at most `WIDEST` columns; the middle one is the reference."""
+    """The training frames of a sequence, averaged to at most `WIDEST` columns. The middle one is the reference."""
     index, side = sequence.train_index, -(-sequence.width // WIDEST)
     height, width = sequence.height // side, sequence.width // side
     rows, columns = height * side, width * side
@@ -59,9 +59,9 @@ def training_clip(sequence: Sequence) -> Clip:
 
 
 def with_clear_reference(clip: Clip, clear: BoolArray) -> Clip:
-    """The clip with the clear frame nearest the middle as its reference; as it is if no frame is clear.
+    """The clip with the clear frame nearest the middle as its reference; unchanged if no frame is clear.
 
-    clear   (m,) False for training frames that blur or smoke spoils
+    clear   (m,) False for training frames with blur or smoke
     """
     frames = np.flatnonzero(clear)
     if not frames.size:
@@ -70,9 +70,9 @@ def with_clear_reference(clip: Clip, clear: BoolArray) -> Clip:
 
 
 def tile_means(values: FloatArray, weights: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Mean of `values` (..., h, w) over the True pixels of `weights` (h, w) in each tile, and the pixels counted.
+    """Mean of `values` (..., h, w) over the True pixels of `weights` (h, w) in each tile, and their number.
 
-    returns  (..., T) means, nan for a tile with less than `TILE_TISSUE` of its pixels; (T,) counts
+    returns  (..., T) means, NaN for a tile with a smaller fraction of them than `TILE_TISSUE`; (T,) counts
     """
     height, width = weights.shape
     rows, columns = height // TILE * TILE, width // TILE * TILE
@@ -88,7 +88,7 @@ def tile_means(values: FloatArray, weights: BoolArray) -> tuple[FloatArray, Floa
 
 
 def without_gaps(values: FloatArray, times: FloatArray) -> FloatArray:
-    """Values (m, ...) over time, those that are not finite interpolated between their neighbours in time."""
+    """Values (m, ...) over time, with non-finite values interpolated in time."""
     out = values.copy()
     for column in out.reshape(len(times), -1).T:
         known = np.isfinite(column)
@@ -107,7 +107,7 @@ def residual(design: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def tile_map(values: FloatArray, height: int, width: int) -> FloatArray:
-    """Values of the tiles (T,) as a picture (h, w); pixels beyond the last whole tile are nan."""
+    """Tile values (T,) as a picture (h, w); NaN beyond the last whole tile."""
     rows, columns = height // TILE, width // TILE
     picture = np.full((height, width), np.nan)
     picture[: rows * TILE, : columns * TILE] = np.kron(values.reshape(rows, columns), np.ones((TILE, TILE)))

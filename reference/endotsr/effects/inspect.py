@@ -1,7 +1,7 @@
-"""All tests of a clip, in order: noise, then blur and smoke, then motion, then the others.
+"""All tests of a clip, in order: noise, blur and smoke, motion, then the others.
 
-Every test measures in units of the noise. Frames that blur or smoke spoils are no reference and show no motion. The
-test of light depends on whether there is motion.
+Every test measures in units of the noise. Frames with blur or smoke are excluded as reference and from motion. The test
+of light depends on the result of the test of motion.
 """
 
 from typing import Any, NamedTuple
@@ -27,23 +27,23 @@ EFFECTS = (
 
 
 class Inspection(NamedTuple):
-    """Everything that was found in a clip."""
+    """All results for a clip."""
 
     clip: Clip
     noise: Noise
     verdicts: dict[str, EffectVerdict]  # by effect, in the order of `EFFECTS`
-    lines: list[Line]  # rates of the motion
-    frame_rate: float | None  # frames per second, if it is known
+    lines: list[Line]  # motion rates
+    frame_rate: float | None  # frames per second; None: unknown
 
     def per_minute(self, cycles: float) -> float | None:
-        """A rate in cycles per sequence per minute; None without a frame rate."""
+        """Cycles per minute of a rate in cycles per sequence; None without a frame rate."""
         return None if self.frame_rate is None else 60.0 * cycles * self.frame_rate / self.clip.frames
 
 
 def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Inspection:
     """Test the training frames of a sequence for every effect.
 
-    frame_rate   frames per second; default: those of the sequence. If known, rates are also given per minute
+    frame_rate   frames per second; default: from the sequence. With a frame rate, rates are also given per minute
 
     Raises: InputError for a frame rate that is not positive and finite.
     Equal sequences give equal verdicts: the simulated null has a fixed seed.

@@ -1,9 +1,9 @@
-"""Motion of the tissue: none, rigid, periodic or irregular.
+"""Tissue motion: none, rigid, periodic or irregular.
 
-The flow of a tile counts as motion when its root mean square over time exceeds `NULL_FACTOR` times what noise alone
-shows in that tile, and `LEAST_MOTION` pixels, in at least `LEAST_TILES` tiles and a fiftieth of them. A moving camera
-is accounted for first: the flow of the rigid scene that fits its poses best is removed, tiles beside excluded pixels
-are left out, and the distance by which flow to a frame and back misses counts as noise (rigid.py).
+The flow of a tile counts as motion if its root mean square over time exceeds both `LEAST_MOTION` pixels and
+`NULL_FACTOR` times the flow caused by noise in that tile, in at least `LEAST_TILES` tiles and 2 % of them. For a moving
+camera, the flow of the best-fitting rigid scene is removed first, tiles next to excluded pixels are ignored, and the
+round-trip error of the flow counts as noise (rigid.py).
 """
 
 import numpy as np
@@ -19,18 +19,18 @@ from endotsr.sequences.sequence import Sequence
 
 NULL_FACTOR = 2.0
 LEAST_MOTION = 0.05  # pixels of the full size
-RIGID_ERROR = 0.25  # fraction of the flow of the camera that errors of the poses and a moving light may leave
+RIGID_ERROR = 0.25  # fraction of the camera flow that pose errors and moving light may leave
 LEAST_TILES = 2
 TILE_FRACTION = 0.02
-EXPLAINED = 0.99  # of the squared motion, by which its half waves are counted
-AFFINE_FRACTION = 0.98  # of the squared flow: above it the picture moves as a whole
-FALSE_POSITIVES = 0.01  # of the F distribution of the tiles, all together
+EXPLAINED = 0.99  # fraction of the squared motion that the counted half waves explain
+AFFINE_FRACTION = 0.98  # of the squared flow; above it, the picture moves as a whole
+FALSE_POSITIVES = 0.01  # designed rate, for all tiles together
 
 
 def motion_verdict(
     sequence: Sequence, clip: Clip, tracks: FlowTracks, noise: Noise
 ) -> tuple[EffectVerdict, list[Line]]:
-    """Whether tissue moves, and how; with the lines of its spectrum (empty without periodic motion)."""
+    """The verdict on tissue motion, and the lines of its spectrum (empty without periodic motion)."""
     null, clear, camera = tracks.null, np.ones_like(tracks.usable), np.zeros_like(tracks.tiles)
     if not sequence.static_camera:
         rigid = fit_rigid(clip, tracks, noise)
@@ -54,7 +54,7 @@ def motion_verdict(
 
 
 def half_waves(filled: FloatArray, times: FloatArray, null: FloatArray) -> int:
-    """The least number of half waves over the clip that explain 99 % of the motion; what noise adds is taken off."""
+    """The smallest number of half waves over the clip that explains 99 % of the motion, after subtracting noise."""
     flat = filled.reshape(len(times), -1) - filled.mean(axis=0).ravel()
     noise, total = len(times) * float((null**2).sum()), float((flat**2).sum())
     for count in range(1, len(times)):
@@ -65,14 +65,14 @@ def half_waves(filled: FloatArray, times: FloatArray, null: FloatArray) -> int:
 
 
 def _root_mean_square(tiles: FloatArray) -> FloatArray:
-    """Over the frames that see a tile: (m, 2, T) to (T,), 0 for a tile that none sees."""
+    """RMS over the frames that see a tile, (m, 2, T) to (T,); 0 for a tile that no frame sees."""
     squares = (tiles**2).sum(axis=1)
     known = np.isfinite(squares)
     return np.sqrt(np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
 
 def _affine_fraction(filled: FloatArray, clip: Clip, tracks: FlowTracks) -> float:
-    """Fraction of the squared flow that an affine map of the picture explains, frame by frame."""
+    """Fraction of the squared flow explained by an affine map of each frame."""
     rows, columns = clip.images.shape[2] // TILE, clip.images.shape[3] // TILE
     place = np.indices((rows, columns)).reshape(2, -1)[:, tracks.usable]
     design = np.stack([np.ones(place.shape[1]), *place], axis=1)

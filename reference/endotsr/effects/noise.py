@@ -1,8 +1,8 @@
-"""The noise level, first of all: every other test measures in units of it.
+"""The noise level, which is the unit of every other test.
 
-Two estimates, each an upper limit: noise beside motion over time, and noise beside texture over the picture. The
-smaller one holds. Both are medians, so that moving edges and vessels count little. Compression that smooths a frame
-lowers the estimate over the picture, as it lowers the noise.
+There are two estimates, and each is an upper limit: differences over time include motion, and differences over the
+picture include texture. The smaller one is used. Both are medians, which suppresses moving edges and vessels.
+Compression that smooths a frame lowers both the noise and the estimate over the picture.
 """
 
 from typing import NamedTuple
@@ -15,16 +15,16 @@ from endotsr.sequences.sequence import Sequence
 
 NORMAL_MAD = 0.6745  # median of |x| of a standard normal
 QUANTISATION = 1.0 / 255.0 / 12.0**0.5  # standard deviation of the rounding to 8 bits, display units
-QUARTILE = 25  # percent of the tiles taken to be free of texture
+QUARTILE = 25  # percentile of the tiles, taken as free of texture
 LEAST_PIXELS = 64  # of tissue in a tile
-MOST_FRAMES = 12  # frames of the spatial estimate; a median over these is exact enough
+MOST_FRAMES = 12  # frames of the spatial estimate, enough for its median
 
 
 class Noise(NamedTuple):
-    """Standard deviation of the noise by channel, display units."""
+    """Standard deviation of the noise per channel, display units."""
 
-    full: FloatArray  # (3,) of a pixel of the sequence
-    working: FloatArray  # (3,) of a pixel of the working size
+    full: FloatArray  # (3,) per pixel at full size
+    working: FloatArray  # (3,) per pixel at working size
     source: str  # "differences over time" or "differences over the picture", whichever is smaller
 
     @property
@@ -34,7 +34,7 @@ class Noise(NamedTuple):
 
 
 def estimate_noise(sequence: Sequence, clip: Clip) -> Noise:
-    """The noise of the training frames, at full and at working size."""
+    """The noise of the training frames at full and at working size."""
     chosen = np.unique(np.linspace(0, clip.count - 1, min(MOST_FRAMES, clip.count)).round().astype(int))
     index = sequence.train_index[chosen]
     full = [spatial_noise(sequence.images[i] / 255.0, sequence.masks[i]) for i in index]
@@ -42,7 +42,7 @@ def estimate_noise(sequence: Sequence, clip: Clip) -> Noise:
     temporal = temporal_noise(clip)
     by_picture, by_size = _median(working), _median(full)
     source = "differences over time" if temporal.mean() < by_picture.mean() else "differences over the picture"
-    # averaging squares of pixels divides independent noise by their side
+    # averaging over squares divides independent noise by their side
     upper = np.minimum(by_size, temporal * clip.shrink)
     lowest = QUANTISATION / clip.shrink
     return Noise(np.maximum(upper, QUANTISATION), np.maximum(np.minimum(by_picture, temporal), lowest), source)
@@ -55,7 +55,7 @@ def _median(rows: list[FloatArray]) -> FloatArray:
 
 
 def temporal_noise(clip: Clip) -> FloatArray:
-    """MAD(x[t-1] - 2 x[t] + x[t+1]) / (0.6745 sqrt 6) over tissue, by channel (3,); inf without equal time steps."""
+    """MAD(x[t-1] - 2 x[t] + x[t+1]) / (0.6745 sqrt 6) over tissue, per channel (3,); inf without equal time steps."""
     steps = np.diff(clip.times)
     found = []
     for k in range(1, clip.count - 1):
@@ -68,10 +68,10 @@ def temporal_noise(clip: Clip) -> FloatArray:
 
 
 def spatial_noise(image: FloatArray, mask: BoolArray) -> FloatArray:
-    """MAD of the product of two second differences, (1 -2 1) down and across, over its norm 6; (3,), nan off tissue.
+    """MAD of the product of two second differences, (1 -2 1) down and across, over its norm 6; (3,), NaN off tissue.
 
-    Linear ramps and straight edges along an axis cancel (Immerkaer 1996). The median is taken in every tile, and over
-    the tiles the lower quartile: texture is left in most tiles, and seldom in all.
+    Linear ramps and axis-aligned edges cancel (Immerkaer 1996). The estimate is the lower quartile over the tiles of
+    the median in each tile: most tiles contain texture, but seldom all.
     """
     down = image[:, :-2] - 2 * image[:, 1:-1] + image[:, 2:]
     both = np.abs(down[:, :, :-2] - 2 * down[:, :, 1:-1] + down[:, :, 2:])

@@ -1,9 +1,9 @@
-"""Rates of periodic motion: lines of the spectrum of the leading modes of the flow.
+"""Rates of periodic motion: spectral lines of the leading modes of the flow.
 
 A mode is a time course shared by many tiles (singular value decomposition). A line is a rate f of at least three cycles
-in the clip for which sine and cosine of f, 2 f and 3 f explain what slow motion leaves unexplained: F test at 1 % over
-all rates, at least 60 % of the variance, and the same amplitude and phase in the three thirds of the clip. A single
-event, as a pull, fails the last condition.
+per clip whose sine and cosine at f, 2 f and 3 f explain the residual of slow motion: F test at 1 % over all rates, at
+least 60 % of the variance, and equal amplitude and phase in the three thirds of the clip. A single event, such as a
+pull, fails the last condition.
 """
 
 from typing import NamedTuple
@@ -15,32 +15,32 @@ from endotsr.effects.clip import residual, slow_courses
 from endotsr.kernels.arrays import FloatArray
 
 LEAST_CYCLES = 3.0
-SLOW = 4  # half waves over the clip that count as slow motion: 0, 1, 2, 3
+SLOW = 4  # slow motion: 0, 1, 2 or 3 half waves over the clip
 MODES = 4
-LEAST_VARIANCE = 0.01  # of a mode, left by slow motion: less is the rounding of a slow course
-STEP = 0.1  # cycles per sequence, between two tried rates
+LEAST_VARIANCE = 0.01  # fraction of a mode left by slow motion; a smaller residual is rounding
+STEP = 0.1  # between tested rates, cycles per sequence
 ALARM = 0.01  # probability of a line in noise, over all rates
 EXPLAINED = 0.6  # of the variance that slow motion leaves
-COHERENT = 0.3  # largest distance of the wave of a third from the mean of the three, in units of that mean
+COHERENT = 0.3  # largest distance of a third's wave from the mean of the three, relative to that mean
 LINES_OF_A_MODE = 2
-LEAST_AMPLITUDE = 1.0  # RMS of the line in its second strongest tile, in units of the flow of noise there
-SAME = 0.5  # a line closer than this to a multiple of a lower one is no line of its own, cycles per sequence
+LEAST_AMPLITUDE = 1.0  # RMS of the line in its second strongest tile, relative to the noise flow there
+SAME = 0.5  # cycles per sequence: a line closer to a multiple of a lower line is discarded
 
 
 class Line(NamedTuple):
-    """A rate of the motion."""
+    """A motion rate."""
 
     cycles: float  # per sequence
-    harmonics: int  # multiples of the rate, itself included, that are present
-    explained: float  # fraction of the variance of its mode, slow motion removed
-    probability: float  # of such a line in noise (F test, all rates)
+    harmonics: int  # multiples of the rate that are present, including the rate itself
+    explained: float  # fraction of the variance of its mode without slow motion
+    probability: float  # of such a line in noise (F test over all rates)
     size: float  # RMS of the line over that of its mode
 
 
 def spectral_lines(tiles: FloatArray, times: FloatArray, frames: int, null: FloatArray) -> list[Line]:
-    """Lines of the tile flow (m, 2, U), strongest first. `null` (U,) is the flow of noise, by which tiles are weighted.
+    """Lines of the tile flow (m, 2, U), strongest first. `null` (U,) is the noise flow, which weights the tiles.
 
-    frames   of the whole sequence: the highest rate tried is frames / 2.2
+    frames   of the whole sequence: the highest tested rate is frames / 2.2
     """
     m = len(times)
     flat = (tiles / np.maximum(null, 0.05)).reshape(m, -1)
@@ -59,7 +59,7 @@ def spectral_lines(tiles: FloatArray, times: FloatArray, frames: int, null: Floa
 
 
 def _lines_of(course: FloatArray, times: FloatArray, frames: int) -> list[Line]:
-    """Lines of one mode, one after the other: each joins the slow part before the next is searched."""
+    """Lines of one mode, found one at a time. Each is removed before the next is sought."""
     base, lines = slow_courses(times, SLOW), []
     for _ in range(LINES_OF_A_MODE):
         line = _strongest(course, times, frames, base)
@@ -71,7 +71,7 @@ def _lines_of(course: FloatArray, times: FloatArray, frames: int) -> list[Line]:
 
 
 def _strongest(course: FloatArray, times: FloatArray, frames: int, base: FloatArray) -> Line | None:
-    """The rate that explains most, if it passes all conditions."""
+    """The rate that explains most of the variance, if it passes all conditions."""
     left, m = residual(base, course), len(times)
     total = float(left @ left)
     highest = frames / 2.2
@@ -91,7 +91,7 @@ def _strongest(course: FloatArray, times: FloatArray, frames: int, base: FloatAr
                 best = (float(single), float(rate), harmonics)
     assert best is not None
     single, rate, harmonics = best
-    probability = min(1.0, single * 3 * highest)  # about one independent rate a cycle, three numbers of harmonics
+    probability = min(1.0, single * 3 * highest)  # about one independent rate per cycle, three harmonic counts
     rest = residual(np.concatenate([base, _waves(times, rate, harmonics)], axis=1), course)
     explained = 1.0 - float(rest @ rest) / total
     if probability > ALARM or explained < EXPLAINED or not _coherent(left, times, rate):
@@ -105,7 +105,7 @@ def _waves(times: FloatArray, rate: float, harmonics: int) -> FloatArray:
 
 
 def _coherent(left: FloatArray, times: FloatArray, rate: float) -> bool:
-    """Whether the wave has about the same amplitude and phase in each third of the clip."""
+    """Whether the wave has similar amplitude and phase in each third of the clip."""
     waves = []
     for part in np.array_split(np.arange(len(times)), 3):
         if len(part) < 5:

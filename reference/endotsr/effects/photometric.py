@@ -1,9 +1,9 @@
-"""Change of light: gain of all channels, white balance, and change in places.
+"""Photometric change: common gain, white balance, and local change of light.
 
-The frames are first moved onto the reference frame along their flow. g = log of the ratio of the mean colours of a tile
-in two frames; saturated and dark pixels do not count. The median over the tiles is the gain of a frame: an F test
-compares its variance between frames with what the scatter of the tiles allows. What is left in a tile is local change
-where smooth courses over time explain it (F test with Bonferroni's correction over the tiles).
+The frames are first warped onto the reference frame along their flow. g is the log ratio of the mean colours of a tile
+in two frames, without saturated and dark pixels. The gain of a frame is the median over the tiles. An F test compares
+its variance between frames with the scatter of the tiles. The residual of a tile is local change if smooth courses over
+time explain it (F test with Bonferroni correction over the tiles).
 """
 
 from typing import NamedTuple
@@ -17,30 +17,30 @@ from endotsr.effects.tracks import FlowTracks
 from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.kernels.arrays import BoolArray, FloatArray, IndexArray
 
-DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside are not compared
+DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside this range are not compared
 ALARM = 0.01
 LEAST_CHANGE = 1.0 / 255.0  # display units: a smaller change cannot be displayed
 COURSES = 8  # smooth courses over time, half waves 1 ... 8
-LOCAL_FRACTION = 0.02  # of the tiles that must change for a local change
+LOCAL_FRACTION = 0.02  # minimum fraction of changed tiles for local change
 LEAST_LOCAL = 1.0 / 255.0  # RMS in a tile, display units
-GRADIENT_ERROR = 0.25  # pixels: error of the alignment while something moves, as a change of light at edges
+GRADIENT_ERROR = 0.25  # px: alignment error under motion, which appears as a change of light at edges
 LEAST_TILES = 4
 
 
 class Ratios(NamedTuple):
-    """Log ratios of tile colours to those of the reference frame."""
+    """Log ratios of tile colours to the reference frame."""
 
-    values: FloatArray  # (m, 3, U) of the usable tiles, their mean over time removed
-    noise: FloatArray  # (3, U) standard deviation that noise of the pixels explains
+    values: FloatArray  # (m, 3, U) of the usable tiles, without their mean over time
+    noise: FloatArray  # (3, U) standard deviation due to pixel noise
     level: FloatArray  # (U,) luminance of the tile, display units
     tiles: IndexArray  # (U,) number of each tile in the grid
 
 
 def photometric_verdict(clip: Clip, tracks: FlowTracks, noise: Noise, moving: bool) -> EffectVerdict:
-    """Whether the light changes, and in which way."""
+    """The verdict on changes of light."""
     ratios = colour_ratios(clip, tracks, noise)
     if ratios.values.shape[2] < LEAST_TILES:
-        return _nothing("No four tiles of tissue are seen in all frames, so that light cannot be compared.")
+        return _nothing("Fewer than four tiles of tissue are visible in all frames: light cannot be compared.")
     gain = np.median(ratios.values, axis=2)
     level = float(np.median(ratios.level))
     error = _error_of_median(ratios)
@@ -89,9 +89,9 @@ def colour_ratios(clip: Clip, tracks: FlowTracks, noise: Noise) -> Ratios:
 
 
 def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> tuple[BoolArray, FloatArray]:
-    """(U,) tiles whose light changes smoothly beyond the gain of the frame; and the RMS of the change, display units.
+    """(U,) tiles whose light changes smoothly beyond the gain of the frame, and the RMS of the change, display units.
 
-    With motion, an error of alignment of a quarter pixel is allowed for at the gradients of the tile.
+    With motion, the threshold allows for an alignment error of a quarter pixel at the gradients of the tile.
     """
     left = np.einsum("mcu,c->mu", ratios.values - gain[:, :, None], LUMINANCE)
     left = left - left.mean(axis=0)
@@ -111,7 +111,7 @@ def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> 
 
 
 def _tile_gradient(clip: Clip) -> FloatArray:
-    """Mean of the absolute gradient in each tile over the square root of its rows: what a common shift changes."""
+    """Mean absolute gradient of each tile over the square root of its rows: the effect of a common shift."""
     grey = clip.luminance[clip.reference]
     down, across = np.gradient(grey)
     return np.nan_to_num(tile_means(np.hypot(down, across), clip.masks[clip.reference])[0]) / TILE**0.5
@@ -122,7 +122,7 @@ def _comparable(image: FloatArray) -> BoolArray:
 
 
 def _error_of_median(ratios: Ratios) -> FloatArray:
-    """Standard error (3,) of the median over tiles: noise alone, which is the null."""
+    """Standard error (3,) of the median over tiles under noise alone."""
     return 1.2533 * np.sqrt((ratios.noise**2).mean(axis=1) / ratios.values.shape[2])
 
 

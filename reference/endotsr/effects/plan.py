@@ -1,8 +1,8 @@
-"""From verdicts to settings: what to switch off or make smaller, why, and the saving to expect.
+"""From verdicts to settings: components to switch off or reduce, with reasons and expected savings.
 
-In: an `Inspection` and the configuration that would be used without it. Out: a `Plan`, a list of changed settings. A
-plan never switches on what the configuration leaves off, and never adds a coefficient. It leaves the time bases as they
-are: fewer of them save memory and fit worse after the same number of iterations.
+In: an `Inspection` and the configuration that would otherwise be used. Out: a `Plan`, a list of changed settings. A
+plan never switches a component on and never adds a coefficient. It does not change the time bases: fewer bases save
+memory but fit worse after the same number of iterations.
 """
 
 from typing import Any, NamedTuple
@@ -16,25 +16,25 @@ from endotsr.effects.savings import memory_fraction, time_fraction
 from endotsr.effects.views import harmonic_sizes
 from endotsr.equations.dictionary import AtomReport, frequencies, report_atoms
 
-MOST_CONDITION = 100.0  # of the dictionary over the training stamps; above it, noise is amplified too much
-SAMPLES_A_CYCLE = 2.0  # Nyquist: fewer frames cannot carry a cycle
+MOST_CONDITION = 100.0  # of the dictionary at the training times; a larger one amplifies noise too much
+SAMPLES_A_CYCLE = 2.0  # Nyquist limit: frames needed per cycle
 
 
 class Change(NamedTuple):
-    """One setting that the clip does not call for in full."""
+    """One setting that the clip does not fully require."""
 
     key: str  # "model.appearance"
     value: Any
     before: Any
     reason: str  # one sentence
-    effects: tuple[str, ...]  # the verdicts that decided
-    time: float  # expected fraction of the time of an iteration that is saved
+    effects: tuple[str, ...]  # verdicts on which the change is based
+    time: float  # fraction of the time of an iteration that is expected to be saved
     memory: float  # fraction of the memory of Gaussians and optimiser that is saved
-    given: bool = False  # the setting was given explicitly and stays as it is: nothing is saved
+    given: bool = False  # the setting was given explicitly and is kept: nothing is saved
 
 
 class Dictionary(NamedTuple):
-    """What the training stamps can carry of equations (1)-(3)."""
+    """The dictionary of equations (1)-(3) that the training times determine."""
 
     frequencies: int  # F
     frequency_max: float  # cycles per sequence
@@ -44,20 +44,20 @@ class Dictionary(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """All changes, what stays and why, and remarks on what no component answers."""
+    """All changes, the kept settings with reasons, and remarks on effects without a component."""
 
     changes: tuple[Change, ...]
-    kept: tuple[tuple[str, str], ...]  # setting and reason, for parts that are called for
+    kept: tuple[tuple[str, str], ...]  # setting and reason, for required components
     remarks: tuple[str, ...]
     dictionary: Dictionary
-    time: float  # expected fraction of the time of an iteration that all changes save together
+    time: float  # fraction of the time of an iteration that all changes together are expected to save
     memory: float
 
 
 def make_plan(inspection: Inspection, config: Config, explicit: frozenset[str] = frozenset()) -> Plan:
-    """The settings that the verdicts call for.
+    """The settings that the verdicts require.
 
-    explicit   keys that were given on the command line or in a file: these stay, and the plan says so
+    explicit   keys given on the command line or in a file; the plan keeps them and reports this
     """
     motion, light = inspection.verdicts["motion"], inspection.verdicts["photometric"]
     depth = inspection.verdicts["depth quality"]
@@ -83,10 +83,11 @@ def make_plan(inspection: Inspection, config: Config, explicit: frozenset[str] =
 
 
 def _colour_rate(plan: Plan, config: Config, explicit: frozenset[str], inspection: Inspection) -> tuple[Change, ...]:
-    """The rate of the degree-0 coefficient with which a step of Adam changes the displayed colour as much as before.
+    """The learning rate of the degree-0 coefficient that preserves the change of displayed colour per step of Adam.
 
-    Adam moves every coefficient by about its rate, whatever its gradient. Seen from one direction n, the coefficients
-    h_k move the colour together by sum_k rate_k |Y_k(n)|: without the higher degrees the colour would learn slower.
+    Adam moves every coefficient by about its rate, regardless of the gradient. Along one direction n, the coefficients
+    h_k together move the colour by sum_k rate_k |Y_k(n)|. Without the higher degrees the colour would be learned more
+    slowly.
     """
     lower = next((c for c in plan.changes if c.key == "model.harmonics_degree" and not c.given), None)
     base, rest = config.optimiser.harmonics_base, config.optimiser.harmonics_rest
@@ -101,10 +102,10 @@ def _colour_rate(plan: Plan, config: Config, explicit: frozenset[str], inspectio
 
 
 def _degree(inspection: Inspection, config: Config) -> tuple[int, str]:
-    """The degree that the views determine while the tissue rests; all degrees where it moves.
+    """The degree that the views determine if the tissue is static; all degrees if it moves.
 
-    Tissue that moves is seen from other directions and turns to and from the lamp, and the harmonics follow that with
-    its motion: clips with motion fit worse without them.
+    Moving tissue is seen from varying directions and turns relative to the lamp. The harmonics follow both: clips with
+    motion fit worse without them.
     """
     views, motion = inspection.verdicts["view change"], inspection.verdicts["motion"]
     if motion.present:
@@ -119,11 +120,12 @@ def _assembled(
     inspection: Inspection,
     dictionary: Dictionary,
 ) -> Plan:
-    """Sort the wanted settings into changes and what stays; one change after the other, so that savings add up."""
+    """Sort the wanted settings into changes and kept settings. Changes are applied one at a time, which makes their
+    savings additive."""
     changes, kept, now = [], [], config
     for key, value, reason, effects in wanted:
         before = setting(now, key)
-        value = min(before, value)  # never on, never larger
+        value = min(before, value)  # never switched on, never larger
         spectral = key in ("model.frequencies", "model.frequency_max")
         if value == before or (spectral and not (now.model.appearance or now.model.spectral_motion)):
             if value and value == before and not spectral:
@@ -141,7 +143,7 @@ def _assembled(
 
 
 def carried(inspection: Inspection, config: Config) -> Dictionary:
-    """The largest dictionary within the configured one that the training stamps determine."""
+    """The largest part of the configured dictionary that the training times determine."""
     model, times = config.model, inspection.clip.times
     configured = report_atoms(times, frequencies(model.frequencies, model.frequency_min, model.frequency_max))
     nyquist = inspection.clip.frames / SAMPLES_A_CYCLE
@@ -162,7 +164,8 @@ def carried(inspection: Inspection, config: Config) -> Dictionary:
 
 
 def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Config) -> tuple[bool, str]:
-    """Whether the Fourier translation is called for: by a rate, or by any motion if it carries tracked motion (B15)."""
+    """Whether the Fourier translation is required: by a periodic rate, or by any motion if it is initialised from
+    tracks (B15)."""
     motion = inspection.verdicts["motion"]
     if motion.present and config.initialisation.motion != "none":
         return True, f"{motion.reason[:-1]}: the Gaussians start with the motion that flow shows."
@@ -173,7 +176,7 @@ def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Con
 
 
 def _remarks(inspection: Inspection) -> tuple[str, ...]:
-    """What was found and is answered by no component."""
+    """Findings that no component models."""
     verdicts = inspection.verdicts
     said = [
         f"{verdicts[name].reason} No component models it: leave these frames out or expect errors there."
@@ -201,7 +204,7 @@ def setting(config: Config, key: str) -> Any:
 
 
 def with_setting(config: Config, key: str, value: Any) -> Config:
-    """The configuration with one setting changed, checked."""
+    """The configuration with one setting changed, validated."""
     section, name = key.split(".")
     data = msgspec.to_builtins(config)
     data[section][name] = value
@@ -209,7 +212,7 @@ def with_setting(config: Config, key: str, value: Any) -> Config:
 
 
 def apply_plan(plan: Plan, config: Config) -> tuple[Config, list[str]]:
-    """The configuration with the changes of the plan, and one line about each."""
+    """The configuration with the changes of the plan, and one line for each."""
     lines = []
     for change in plan.changes:
         value, before = _word(change.value), _word(change.before)

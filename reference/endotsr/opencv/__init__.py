@@ -1,9 +1,9 @@
-"""The only room that calls OpenCV: PNG files, Canny edges, flow, resizing; films, `stereo`, `pictures`.
+"""The only room that calls OpenCV: PNG files, Canny edges, flow, resizing; `stereo` and `pictures`.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
-(BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this room. `library`
-imports `cv2` on first use, so that commands which read no picture start without it. No golden vector may depend on this
-room, except through the Canny edges, which are an input of the smoothness loss.
+(BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) do not leave this room. `library`
+imports `cv2` on first use: commands that read no picture start without it. Golden vectors depend on this room only
+through the Canny edges, an input of the smoothness loss.
 """
 
 from pathlib import Path
@@ -21,14 +21,14 @@ CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness
 
 
 def decode_png(data: bytes, name: object) -> Array:
-    """Pixels of a PNG held in memory; `name` is used in messages only. See `read_png`."""
+    """Pixels of a PNG in memory; `name` is used in messages only. See `read_png`."""
     return decoded(pixels_only(data, name), name, "cannot be decoded as a PNG picture")
 
 
 def decoded(data: bytes, name: object, failure: str) -> Array:
-    """Pixels of a picture held in memory whose bytes were checked: (H, W) grey or (H, W, 3) RGB, in the stored type.
+    """Pixels of a picture in memory whose bytes were checked: (H, W) grey or (H, W, 3) RGB, in the stored type.
 
-    failure   words for a picture that OpenCV gives back as nothing
+    failure   message for a picture that OpenCV cannot decode
 
     Raises:  InputError naming the picture.
     """
@@ -47,7 +47,7 @@ def decoded(data: bytes, name: object, failure: str) -> Array:
 
 
 def opaque(pixels: Array, name: object) -> Array:
-    """The three colours of a picture (H, W, 3) or (H, W, 4). Raises InputError if a pixel is transparent."""
+    """The three colour channels of a picture (H, W, 3) or (H, W, 4). Raises InputError if a pixel is transparent."""
     if pixels.shape[2] == 4 and pixels.dtype.kind == "u" and pixels[:, :, 3].min() < np.iinfo(pixels.dtype).max:
         raise InputError(
             f"{name}: has transparent pixels, and what they hide is not shown; allowed: pictures without"
@@ -62,9 +62,8 @@ def read_png(path: Path) -> Array:
     returns  (H, W) grey or (H, W, 3) RGB, uint8 or uint16 as stored
 
     Raises:  InputError naming the file if it is missing, no regular file, not a PNG, truncated, damaged, too large, or
-             not opaque.
-             OpenCV decodes a truncated file into a half-grey picture without an error, so the chunks and the number
-             of compressed pixels are checked first.
+             not opaque. The chunks and the number of compressed pixels are checked first, because OpenCV decodes a
+             truncated file into a half-grey picture without an error.
     """
     return decode_png(read_bytes(path, LARGEST_FILE), path)
 
@@ -93,10 +92,10 @@ def write_encoded(path: Path, pixels: Array, ending: str, options: tuple[int, ..
 
 
 def canny_edges(depth: Array) -> NDArray[np.bool_]:
-    """Edges of a rendered depth image, for the smoothness loss (B9). They are constants: no gradient passes.
+    """Edges of a rendered depth image, for the smoothness loss (B9). They are held fixed: no gradient passes.
 
-    depth    (H, W) scene units; converted to 8 bits by saturation to [0, 255] and truncation (a depth of 300 is 255 and
-             does not wrap to 44); not-a-number counts as 0
+    depth    (H, W) scene units; clipped to [0, 255] and truncated to 8 bits (a depth of 300 becomes 255, not 44); NaN
+             counts as 0
     returns  (H, W) bool, True on an edge; Sobel 3x3, |gx| + |gy|, thresholds 20 and 200
     """
     eight_bit = np.clip(np.nan_to_num(depth, nan=0.0, posinf=255.0, neginf=0.0), 0.0, 255.0).astype(np.uint8)
@@ -104,12 +103,12 @@ def canny_edges(depth: Array) -> NDArray[np.bool_]:
 
 
 def dense_flow(source: Array, target: Array) -> NDArray[np.float32]:
-    """Dense optical flow from one picture to another, by dense inverse search (medium preset).
+    """Dense optical flow from one picture to another by dense inverse search (DIS, medium preset).
 
-    source, target  (H, W) uint8, or (3, H, W) uint8 planar RGB, reduced to grey by their mean
+    source, target  (H, W) uint8, or (3, H, W) uint8 planar RGB, converted to grey by the channel mean
     returns         (2, H, W) float32 pixels: source[y, x] is found at target[y + flow[1], x + flow[0]]
 
-    Edges:   pictures too small for the coarsest level of the method (a side under 16 pixels) give zero flow.
+    Edges:   pictures too small for the coarsest level (a side under 16 pixels) give zero flow.
     Raises:  ValueError for arrays that are not two uint8 pictures of one size.
     """
     cv2 = _cv2()
@@ -128,13 +127,13 @@ def dense_flow(source: Array, target: Array) -> NDArray[np.float32]:
 
 
 def warp_cubic(image: Array, flow: Array) -> NDArray[np.float32]:
-    """As `warp_bilinear`, by bicubic interpolation; for pictures, whose finest detail a bilinear warp would blur.
+    """As `warp_bilinear`, with bicubic interpolation, which preserves the finest detail of pictures.
 
     image    (H, W) or (C, H, W) float32
     flow     (2, H, W) pixels, x first
     returns  float32 of the same shape; values may overshoot the range of the image
 
-    OpenCV interpolates from a table of 1/32 pixel, which is finer than any flow is exact.
+    OpenCV rounds positions to 1/32 pixel, which is finer than the accuracy of any flow.
     """
     cv2 = _cv2()
     height, width = image.shape[-2:]
@@ -146,28 +145,28 @@ def warp_cubic(image: Array, flow: Array) -> NDArray[np.float32]:
 
 
 def warp_bilinear(image: Array, flow: Array) -> Array:
-    """image[..., y + flow[1], x + flow[0]] by bilinear interpolation; outside, the nearest border value.
+    """image[..., y + flow[1], x + flow[0]] by bilinear interpolation. Outside the image, the nearest border value.
 
     image    (..., H, W) float
     flow     (2, H, W) pixels, x first
     returns  (..., H, W), dtype of the image
 
-    Plain NumPy: OpenCV's own remap interpolates from a table of 1/32 pixel.
+    Plain NumPy, because OpenCV's remap rounds positions to 1/32 pixel.
     """
     height, width = image.shape[-2:]
     return sample_bilinear(image, np.arange(width)[None, :] + flow[0], np.arange(height)[:, None] + flow[1])
 
 
 def gaussian_blur(plane: Array, deviation: float) -> NDArray[np.float32]:
-    """A float32 plane (H, W) averaged by a Gaussian window of this standard deviation in px; mirrored at the border."""
+    """A float32 plane (H, W) convolved with a Gaussian of this standard deviation, px; mirrored at the border."""
     return _cv2().GaussianBlur(plane, (0, 0), deviation)
 
 
 def sample_bilinear(image: Array, x: Array, y: Array) -> Array:
-    """image[..., y, x] by bilinear interpolation; outside, the nearest border value.
+    """image[..., y, x] by bilinear interpolation. Outside the image, the nearest border value.
 
     image    (..., H, W) float
-    x, y     columns and rows of one shape S; 0 = centre of the first pixel
+    x, y     columns and rows, both of shape S; 0 = centre of the first pixel
     returns  (..., S), dtype of the image
     """
     height, width = image.shape[-2:]
@@ -181,9 +180,9 @@ def sample_bilinear(image: Array, x: Array, y: Array) -> Array:
 
 
 def area_resize(image: Array, width: int, height: int) -> Array:
-    """Shrink (H, W) or (H, W, C) to height x width: every new pixel is the mean over the old area it covers.
+    """Shrink (H, W) or (H, W, C) to height x width. Every new pixel is the mean over the old area it covers.
 
-    uint8 input is rounded to uint8; float32 and float64 stay as they are.
+    uint8 input is rounded to uint8; float32 and float64 keep their type.
     Raises:  ValueError when asked to enlarge.
     """
     if width > image.shape[1] or height > image.shape[0]:

@@ -1,4 +1,4 @@
-"""The one place that imports OpenCV: on first use, so that commands which read no picture start without it."""
+"""The only import of OpenCV, on first use: commands that read no picture start without it."""
 
 import os
 from functools import cache
@@ -6,14 +6,14 @@ from typing import Any
 
 from endotsr.untrusted.files import MOST_PIXELS
 
-SILENT = 0  # LOG_LEVEL_SILENT, which the Python module of OpenCV 4 does not name
+SILENT = 0  # LOG_LEVEL_SILENT, which the Python module of OpenCV 4 does not export
 
 
 @cache
 def cv2_library() -> Any:
-    """The module `cv2`, which decodes no picture of more than 2^26 pixels unless it was imported before."""
-    # These are read when the library is loaded.
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # AV_LOG_QUIET: what it prints names no file
+    """The module `cv2`. It decodes no picture of more than 2^26 pixels, unless it was imported earlier."""
+    # The library reads these variables when it is loaded.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # AV_LOG_QUIET: its messages name no file
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MOST_PIXELS))
     import cv2
 

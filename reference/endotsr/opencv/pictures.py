@@ -1,8 +1,7 @@
-"""Picture files of any kind that a recording may hold: PNG, JPEG, TIFF, WebP, BMP, and OpenEXR where OpenCV has it.
+"""Picture files of a recording: PNG, JPEG, TIFF, WebP, BMP, and OpenEXR if OpenCV supports it.
 
-Comes in: a path; goes out: RGB or grey pixels as stored. Every reader refuses a file that OpenCV would repair in
-silence: a JPEG that was cut off decodes to a picture whose lower part is grey. Sizes are checked before anything is
-decoded.
+In: a path. Out: RGB or grey pixels as stored. Every reader refuses files that OpenCV would silently repair: a truncated
+JPEG decodes to a picture whose lower part is grey. Sizes are checked before decoding.
 """
 
 import importlib
@@ -28,7 +27,7 @@ TIFF_ENDINGS = (".tif", ".tiff")
 EXR_ENDINGS = (".exr",)
 PICTURE_ENDINGS = (".png", *JPEG_ENDINGS, *TIFF_ENDINGS, ".webp", ".bmp")  # of colour pictures and masks
 JPEG_END = b"\xff\xd9"
-STARTS = {  # kind of a file by its ending, and the first bytes of such a file
+STARTS = {  # extension -> file type, and its first bytes
     **dict.fromkeys(JPEG_ENDINGS, ("JPEG", (b"\xff\xd8\xff",))),
     **dict.fromkeys(TIFF_ENDINGS, ("TIFF", (b"II*\0", b"MM\0*"))),
     ".webp": ("WebP", (b"RIFF",)),
@@ -36,17 +35,17 @@ STARTS = {  # kind of a file by its ending, and the first bytes of such a file
     ".exr": ("EXR", (b"v/1\x01",)),
 }
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
-GAMMA = 1 / 2.2  # as PNG states that of sRGB
+GAMMA = 1 / 2.2  # of sRGB, as stated in a PNG
 ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
 GREY = ("1", "L")  # modes of Pillow
-NOT_DECODED = ("LA", "La", "PA", "LAB")  # of these OpenCV drops the transparency, or takes them for RGB
+NOT_DECODED = ("LA", "La", "PA", "LAB")  # OpenCV drops their transparency or reads them as RGB
 
 
 def read_picture(path: Path) -> Array:
     """Pixels of a PNG, JPEG, TIFF, WebP, BMP or EXR file: (H, W) grey or (H, W, 3) RGB, in the stored type.
 
-    Raises:  InputError naming the file if it is missing, of another kind, truncated or damaged, not opaque, turned by
-             its EXIF data, if it holds several pictures, or has more than 2^26 pixels.
+    Raises:  InputError naming the file if it is missing, of another type, truncated, damaged, not opaque or rotated by
+             its EXIF data, if it contains several pictures, or if it has more than 2^26 pixels.
     """
     ending = Path(path).suffix.lower()
     if ending == ".png":
@@ -62,9 +61,9 @@ def read_picture(path: Path) -> Array:
 
 
 def other_profile(path: Path) -> bool:
-    """Whether a picture states a colour profile (ICC) or a gamma (PNG) that is not that of sRGB.
+    """Whether a picture states a colour profile (ICC) or a gamma (PNG) other than sRGB.
 
-    False for a file that cannot be read.
+    False for an unreadable file.
     """
     kind = "PNG" if path.suffix.lower() == ".png" else STARTS.get(path.suffix.lower(), ("", ()))[0]
     if kind not in PLUGINS:
@@ -75,7 +74,7 @@ def other_profile(path: Path) -> bool:
             _check_size(_webp_size(data), path)
         with _plugin(kind)(io.BytesIO(data)) as picture:
             profile, stated = picture.info.get("icc_profile") or b"", picture.info
-    except Exception:  # the reader of the pixels names what is wrong
+    except Exception:  # reading the pixels reports the fault
         return False
     if not profile and "srgb" not in stated and abs(stated.get("gamma", GAMMA) - GAMMA) > GAMMA / 10:
         return True
@@ -83,15 +82,15 @@ def other_profile(path: Path) -> bool:
 
 
 def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
-    """Pixels; of a TIFF the header alone is checked, and None returned.
+    """Pixels. For a TIFF, only the header is checked and None is returned.
 
-    Pillow returns the pixels of OpenCV, which prints complaints about a damaged JPEG itself, takes the first of several
-    pictures, and takes the unused fourth byte of a BMP for transparency. Of a TIFF it is Pillow that drops the lower
-    half of 16 bits, and whose library prints complaints.
+    Pillow returns the same pixels as OpenCV. OpenCV prints warnings about a damaged JPEG, reads the first of several
+    pictures, and reads the unused fourth byte of a BMP as transparency. For TIFF, Pillow truncates 16 bits and its
+    library prints warnings.
     """
     try:
         if kind == "WebP":
-            _check_size(_webp_size(data), path)  # its reader makes room for the picture when it is opened
+            _check_size(_webp_size(data), path)  # Pillow allocates the picture when it opens the file
         with _plugin(kind)(io.BytesIO(data)) as picture:
             _check_size(picture.size, path)
             _check_one_upright(picture, path)
@@ -105,15 +104,15 @@ def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
             return np.ascontiguousarray(opaque(np.array(picture.convert("RGBA" if alpha else "RGB")), path))
     except InputError:
         raise
-    except Exception as error:  # Pillow raises whatever its parsers of metadata meet
+    except Exception as error:  # Pillow passes on any error of its metadata parsers
         raise InputError(f"{path}: damaged {kind}: {plain_line(str(error))}") from None
 
 
 @cache
 def _plugin(kind: str) -> Any:
-    """Pillow's class for a kind of file, without the limit of `Image.open`, which prints a warning."""
+    """Pillow's class for a file type, without the limit of `Image.open`, which prints a warning."""
     name = PLUGINS[kind]
-    warnings.filterwarnings("ignore", module=r"PIL\.")  # on metadata, with no name of the file
+    warnings.filterwarnings("ignore", module=r"PIL\.")  # about metadata, without a file name
     return getattr(importlib.import_module(f"PIL.{name}Plugin"), f"{name}File")
 
 
@@ -121,8 +120,8 @@ def _check_one_upright(picture: Any, path: Path) -> None:
     turn = picture.getexif().get(ORIENTATION, 1)
     if turn not in (0, 1):
         raise InputError(
-            f"{path}: its EXIF data turn the picture (orientation {turn}), which a calibration may not know;"
-            " allowed: pictures that are stored as they are shown"
+            f"{path}: its EXIF data rotate the picture (orientation {turn}), but a calibration may not;"
+            " allowed: pictures stored in the orientation in which they are shown"
         )
     if getattr(picture, "n_frames", 1) != 1:
         raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture per file")
@@ -134,7 +133,7 @@ def _check_size(size: tuple[int, int], path: Path) -> None:
 
 
 def _webp_size(data: bytes) -> tuple[int, int]:
-    """Width and height in the header of a WebP file, of any of its three forms."""
+    """Width and height in the header of a WebP file, in any of its three forms."""
     form, start = data[12:16], data[20:30].ljust(10, b"\0")
     if form == b"VP8X":  # 24 bits each, less one
         return 1 + int.from_bytes(start[4:7], "little"), 1 + int.from_bytes(start[7:10], "little")
@@ -146,7 +145,7 @@ def _webp_size(data: bytes) -> tuple[int, int]:
 
 
 def _check_start_and_end(data: bytes, ending: str, path: Path) -> str:
-    """The kind of the file by its ending, which its first bytes confirm."""
+    """The file type by its extension, confirmed by its first bytes."""
     kind, starts = STARTS[ending]
     if not data:
         raise InputError(f"{path}: the file is empty")

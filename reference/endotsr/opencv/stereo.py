@@ -1,7 +1,7 @@
-"""Straightened and rectified pictures, and stereo matching, with OpenCV's conventions kept inside.
+"""Undistortion, rectification and stereo matching.
 
-Matrices here are OpenCV's own: pixel centres lie at integers. Translations are passed as columns, because OpenCV 5
-refuses the one-dimensional vectors that OpenCV 4 accepted.
+Matrices here follow OpenCV, with pixel centres at integers. Translations are passed as columns: OpenCV 5 refuses the
+one-dimensional vectors that OpenCV 4 accepts.
 """
 
 from typing import NamedTuple
@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from endotsr.kernels.arrays import Array, FloatArray
 from endotsr.opencv.library import cv2_library
 
-FIXED_POINT = 16.0  # OpenCV's disparities are in sixteenths of a pixel
+FIXED_POINT = 16.0  # OpenCV stores disparities in sixteenths of a pixel
 
 
 class Maps(NamedTuple):
-    """For every pixel of the new picture its place in the old one, and the new camera."""
+    """The position in the old picture of every pixel of the new one, and the new camera."""
 
     x: NDArray[np.float32]  # (H, W) pixels
     y: NDArray[np.float32]
-    matrix: FloatArray  # (3, 3) of the new camera
+    matrix: FloatArray  # (3, 3) intrinsics of the new camera
     rotation: FloatArray  # (3, 3) x_new = rotation @ x_old, camera axes
 
 
@@ -29,7 +29,7 @@ class RectifiedMaps(NamedTuple):
 
     left: Maps
     right: Maps
-    baseline: float  # in the unit of the translation; negative: the right camera stands on the left
+    baseline: float  # in the unit of the translation; negative: the right camera is on the left
 
 
 def rectification_maps(
@@ -40,7 +40,7 @@ def rectification_maps(
     width: int,
     height: int,
 ) -> RectifiedMaps:
-    """Maps that make rows of the two pictures correspond; each camera has its own distortion.
+    """Maps that align the rows of the two pictures; each camera has its own distortion.
 
     rotation, translation   x_right = rotation @ x_left + translation
     """
@@ -59,7 +59,7 @@ def rectification_maps(
 
 
 def undistortion_maps(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> Maps:
-    """Maps that straighten the picture of one camera; the new picture holds only pixels that the old one has."""
+    """Maps that undistort the picture of one camera. The new picture shows only pixels of the old one."""
     cv2 = cv2_library()
     column = np.ascontiguousarray(distortion, np.float64).reshape(-1, 1)
     new, _ = cv2.getOptimalNewCameraMatrix(matrix, column, (width, height), 0)
@@ -75,26 +75,27 @@ def _maps(
 
 
 def remapped(picture: Array, maps: Maps, nearest: bool = False) -> Array:
-    """A picture (H, W) or (H, W, 3) in the new camera: bicubic, or the nearest pixel; 0 outside the old picture."""
+    """A picture (H, W) or (H, W, 3) in the new camera, by bicubic or nearest interpolation; 0 outside the old
+    picture."""
     cv2 = cv2_library()
     method = cv2.INTER_NEAREST if nearest else cv2.INTER_CUBIC
     return cv2.remap(np.ascontiguousarray(picture), maps.x, maps.y, method, borderMode=cv2.BORDER_CONSTANT)
 
 
 class Matching(NamedTuple):
-    """Disparities of the left picture, pixels; and what is known of them."""
+    """Disparities of the left picture, pixels, and measures of their quality."""
 
-    disparity: NDArray[np.float32]  # (H, W) of the left picture, smoothed; not a number where unknown
-    raw: NDArray[np.float32]  # (H, W) as matched
+    disparity: NDArray[np.float32]  # (H, W) smoothed; NaN where unknown
+    raw: NDArray[np.float32]  # (H, W) before smoothing
     confidence: NDArray[np.float32]  # (H, W) in [0, 1]
-    disagreement: NDArray[np.float32]  # (H, W) pixels between the disparities of left and right; infinite where none
+    disagreement: NDArray[np.float32]  # (H, W) px between left and right disparity; infinite where unknown
 
 
 def match_pair(left: Array, right: Array, lowest: int, count: int, block: int = 5, smooth: bool = True) -> Matching:
-    """Semi-global matching in both directions, and edge-preserving smoothing (weighted least squares).
+    """Semi-global matching in both directions, then edge-preserving smoothing (weighted least squares) if `smooth`.
 
     left, right    (H, W, 3) RGB uint8, rectified
-    lowest, count  searched disparities lowest .. lowest + count - 1; `count` is a multiple of 16
+    lowest, count  disparities lowest .. lowest + count - 1 are searched; `count` is a multiple of 16
     """
     cv2 = cv2_library()
     greys = [np.ascontiguousarray(picture[:, :, ::-1]) for picture in (left, right)]
@@ -117,14 +118,14 @@ def match_pair(left: Array, right: Array, lowest: int, count: int, block: int = 
 
 
 def _pixels(fixed: Array, lowest: int) -> NDArray[np.float32]:
-    """Fixed-point disparities as pixels, not a number where nothing was matched (below the lowest)."""
+    """Fixed-point disparities in pixels; NaN for unmatched pixels, whose value is below the lowest."""
     found = fixed.astype(np.float32) / FIXED_POINT
     found[found < lowest] = np.nan
     return found
 
 
 def left_right_disagreement(left: Array, right: Array) -> NDArray[np.float32]:
-    """|d_left(x) - d_right(x - d_left(x))| in pixels; infinite where either is unknown or leaves the picture."""
+    """|d_left(x) - d_right(x - d_left(x))|, px; infinite where either is unknown or outside the picture."""
     height, width = left.shape
     columns = np.arange(width)[None, :] - np.where(np.isfinite(left), left, 0)
     there = np.rint(columns).astype(np.intp)

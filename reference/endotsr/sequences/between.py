@@ -9,7 +9,7 @@ and I_1(x). Each pair is blended in time, and the two blends are mixed with weig
 difference within the pair: where the flow is wrong, its two pictures disagree. A pixel counts as tissue where one of
 the frames is tissue at its moved place, and is made of the frames that are.
 
-Comes in: a sequence and the indices of two training frames; goes out: a `Frame`. No held-out picture is read.
+In: a sequence and the indices of two training frames. Out: a `Frame`. No held-out picture is read.
 """
 
 from typing import NamedTuple

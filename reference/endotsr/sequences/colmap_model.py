@@ -1,7 +1,7 @@
 """COLMAP models, text or binary: cameras, images with their poses, and points.
 
-Comes in: a folder with cameras, images and points3D (.txt or .bin); goes out: a `ColmapModel`. COLMAP's conventions are
-this project's: world-to-camera, OpenCV axes, the centre of the first pixel at (0.5, 0.5). Quaternions are w x y z.
+In: a folder with cameras, images and points3D (.txt or .bin). Out: a `ColmapModel`. COLMAP's conventions are this
+project's: world-to-camera, OpenCV axes, the centre of the first pixel at (0.5, 0.5). Quaternions are w x y z.
 """
 
 import struct

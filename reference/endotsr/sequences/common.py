@@ -1,8 +1,8 @@
 """Reading the common format: `sequence.toml` beside `images/`, `masks/`, `depth/` and `images_right/`.
 
-Comes in: a folder and the `SequenceConfig`; goes out: a `Sequence`, or a `Recording` for `prepare` and `depth`.
-The fields of `sequence.toml` are described in `sequence_file`. The file states the units and the polarity of the masks,
-which `sequence.excluded_value = "black"` replaces.
+In: a folder and the `SequenceConfig`. Out: a `Sequence`, or a `Recording` for `prepare` and `depth`. The fields of
+`sequence.toml` are described in `sequence_file`. The file states the units and the polarity of the masks, which
+`sequence.excluded_value = "black"` replaces.
 """
 
 from collections.abc import Iterator

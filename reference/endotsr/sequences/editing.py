@@ -1,6 +1,6 @@
 """Editing a recording before it is written: frames by number or by second, a crop, and masks united.
 
-Comes in: a `Recording` and the words of a user; goes out: frame numbers, or a `Recording` that hands out less.
+In: a `Recording` and the words of a user. Out: frame numbers, or a `Recording` that hands out less.
 """
 
 from dataclasses import replace

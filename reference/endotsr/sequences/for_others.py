@@ -1,8 +1,8 @@
 """Descriptions for other programs beside `sequence.toml`: nerfstudio and readers of COLMAP use the same pictures.
 
-Comes in: a folder in the common format; goes out: `transforms.json` with `masks_kept/` (nerfstudio leaves out black),
-or `sparse/0/` with cameras, images and points3D as text. The points are some pixels of the prior depth of some frames,
-for programs that begin with points. `layouts.nerfstudio` and `layouts.colmap` read both back.
+In: a folder in the common format. Out: `transforms.json` with `masks_kept/` (nerfstudio leaves out black), or
+`sparse/0/` with cameras, images and points3D as text. The points are some pixels of the prior depth of some frames, for
+programs that begin with points. `layouts.nerfstudio` and `layouts.colmap` read both back.
 """
 
 import json

@@ -4,7 +4,7 @@ A clip that needs more than half of `sequence.memory` is kept in one file withou
 files (TMPDIR, by default /tmp). Its pages come and go with the memory that is free. The system removes it when the
 process ends, however it ends. The numbers are the same in both cases.
 
-Comes in: the limit and what the clip needs; goes out: arrays of zeros, and a note if they lie in a file.
+In: the limit and what the clip needs. Out: arrays of zeros, and a note if they lie in a file.
 """
 
 import os

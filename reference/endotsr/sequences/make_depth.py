@@ -1,7 +1,7 @@
 """`endotsr depth`: depth of every frame of a folder in the common format, from its stereo pairs or from files.
 
-Comes in: the folder; goes out: `depth/` and the section [depth] of its `sequence.toml`, and the coverage of every
-frame. The new folder takes its place when it is whole.
+In: the folder. Out: `depth/` and the section [depth] of its `sequence.toml`, and the coverage of every frame. The new
+folder takes its place when it is whole.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,7 +1,7 @@
 """`endotsr masks`: proposed masks of a clip, entered into a sequence or written into a folder of their own.
 
-Comes in: a recording; goes out: mask pictures (white = excluded), an overlay for the eye, and the mark that they are
-proposals: `proposed = true` in `sequence.toml`, or the file `proposal.json` beside the masks.
+In: a recording. Out: mask pictures (white = excluded), an overlay for the eye, and the mark that they are proposals:
+`proposed = true` in `sequence.toml`, or the file `proposal.json` beside the masks.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Prior depth from the points of a reconstruction (structure from motion): sparse, or interpolated between them.
 
-Comes in: world points and which of them a frame sees; goes out: depth (H, W), 0 = none.
+In: world points and which of them a frame sees. Out: depth (H, W), 0 = none.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """From any recording to a folder in the common format.
 
-Comes in: a `Recording` and `PrepareSettings`; goes out: a new folder with pictures, masks, depth, `sequence.toml`, and
-notes on everything that was assumed. Frames are read, straightened, resized and written one at a time. The folder
-appears when it is whole.
+In: a `Recording` and `PrepareSettings`. Out: a new folder with pictures, masks, depth, `sequence.toml`, and notes on
+everything that was assumed. Frames are read, straightened, resized and written one at a time. The folder appears when
+it is whole.
 """
 
 from collections.abc import Callable

@@ -13,7 +13,7 @@ are left to the tissue. Instruments of the colour of tissue and blood-covered on
 A scope shows tissue in a round or cut-off field of view, and what lies outside of it is dark in all frames. That border
 is found first, from all frames together, and excluded in each; it takes no part in the search.
 
-Comes in: the pictures of a clip; goes out: a `Proposal`, or the reason why there is none. A person has to look at it.
+In: the pictures of a clip. Out: a `Proposal`, or the reason why there is none. A person has to look at it.
 """
 
 from collections.abc import Iterable

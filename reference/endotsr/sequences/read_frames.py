@@ -1,7 +1,7 @@
 """All frames of a clip read into arrays, in several threads, with the facts that the checks need.
 
-Comes in: the files, what a layout knows of their size and units, and the settings; goes out: the arrays, in memory or
-in a file (see `frame_store`).
+In: the files, what a layout knows of their size and units, and the settings. Out: the arrays, in memory or in a file
+(see `frame_store`).
 """
 
 from functools import partial

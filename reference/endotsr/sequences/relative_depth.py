@@ -6,8 +6,8 @@ matches, in each frame or once for the sequence. Without any, they are assumed: 
 tissue, one line for the sequence. The scale is then free, because the depth loss compares depth divided by its maximum
 (B8), and the shift is an assumption about the shape.
 
-Comes in: a folder in the common format and files of r, one per frame; goes out: depth frame by frame, and a sentence on
-what is assumed.
+In: a folder in the common format and files of r, one per frame. Out: depth frame by frame, and a sentence on what is
+assumed.
 """
 
 from collections.abc import Callable, Iterator

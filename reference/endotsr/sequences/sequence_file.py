@@ -30,8 +30,8 @@
     axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
     matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers per frame
 
-Comes in: the file; goes out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder
-`images/` holds one picture per frame, `images_right/` the right pictures of a stereo pair.
+In: the file. Out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder `images/` holds
+one picture per frame, `images_right/` the right pictures of a stereo pair.
 """
 
 from pathlib import Path

@@ -1,7 +1,7 @@
 """Frames at a smaller size: for `sequence.scale`, and for the coarse start (specification B17).
 
 A picture is averaged over areas, a pixel is tissue where every pixel under it is, and a depth is the mean of the known
-ones under it. Comes in: the arrays of all frames, or a `Sequence`; goes out: the same, smaller.
+ones under it. In: the arrays of all frames, or a `Sequence`. Out: the same, smaller.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """Parts that several layouts use: picture files and videos as frames, masks and depth beside them, stated cameras.
 
-Comes in: paths and the statements of `SourceOptions`; goes out: functions of a `Recording`.
+In: paths and the statements of `SourceOptions`. Out: functions of a `Recording`.
 """
 
 from collections.abc import Callable, Iterator

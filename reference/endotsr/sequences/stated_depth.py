@@ -6,7 +6,7 @@ endoscope sees, the parallax of a stereo pair, and the light. Light comes from t
 brighter: in measured clips the rank correlation of brightness with depth is -0.55 to -0.84, and +0.55 to +0.84 with an
 inverse depth in its place. Simulated scenes with even light give -0.3 to 0.2.
 
-Comes in: a recording with stated depth; goes out: nothing, or an `InputError` with the evidence and the remedy.
+In: a recording with stated depth. Out: nothing, or an `InputError` with the evidence and the remedy.
 """
 
 import re

@@ -2,7 +2,7 @@
 
     z = f B / d          f, B: focal length (px) and baseline; d: disparity (px)
 
-Comes in: left and right pictures, the lens and the baseline; goes out: depth (H, W) with holes left as holes (0), and a
+In: left and right pictures, the lens and the baseline. Out: depth (H, W) with holes left as holes (0), and a
 confidence. A pixel has depth where left and right agree, the match is confident and the depth is within range.
 """
 

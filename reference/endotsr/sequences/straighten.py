@@ -1,7 +1,7 @@
 """From the pictures of a recording to those of one pinhole camera: straightened or rectified, then resized.
 
-Comes in: a `Recording` and a scale; goes out: a `Straightener`, which maps pictures, masks, depth and poses, and the
-lens that belongs to its pictures. Left and right each have the distortion of their own camera.
+In: a `Recording` and a scale. Out: a `Straightener`, which maps pictures, masks, depth and poses, and the lens that
+belongs to its pictures. Left and right each have the distortion of their own camera.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Trajectories in the TUM form: one line a pose, `stamp tx ty tz qx qy qz qw`; lines that begin with # are comments.
 
-The stamp is a time in seconds or the number of a frame. Comes in: the file, and what the numbers mean; goes out: one
+The stamp is a time in seconds or the number of a frame. In: the file, and what the numbers mean. Out: one
 world-to-camera pose a frame in millimetres (or the arbitrary unit), None where the trajectory says nothing.
 """
 

@@ -1,10 +1,9 @@
 """Reading video files: what a file holds, the time of every picture, and the pictures in order.
 
-Comes in: a path and the numbers of the wanted pictures, ascending; goes out: RGB pictures one by one. FFmpeg decodes
-them, in the package PyAV, which this module and `film_file` alone import. A video is decoded from its start: seeking by
-number is inexact for most codecs. Interlaced pictures, two moments woven into one, are deinterlaced (bwdif): the rows
-of the first field are kept and those of the second are interpolated. The rotation that a file states is reported, not
-applied.
+In: a path and the numbers of the wanted pictures, ascending. Out: RGB pictures one by one. FFmpeg decodes them, in the
+package PyAV, which this module and `film_file` alone import. A video is decoded from its start: seeking by number is
+inexact for most codecs. Interlaced pictures, two moments woven into one, are deinterlaced (bwdif): the rows of the
+first field are kept and those of the second are interpolated. The rotation that a file states is reported, not applied.
 """
 
 import itertools

@@ -1,4 +1,4 @@
-"""Sequences with known truth: a deforming tissue sheet under an endoscope. Every effect has its own switch."""
+"""Sequences with ground truth: a deforming tissue sheet under an endoscope. Every effect has its own switch."""
 
 from endotsr.simulator.settings import EFFECTS, SimulatorSettings, with_effects
 from endotsr.simulator.simulate import SequenceTruth, SimulatedSequence, simulate

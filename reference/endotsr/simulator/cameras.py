@@ -8,9 +8,9 @@ from endotsr.splatting.camera import Camera
 
 
 def make_cameras(settings: SimulatorSettings, times: FloatArray, right: bool = False) -> list[Camera]:
-    """One camera a frame: at the origin, looking along z; with motion, it swings about the middle of the tissue.
+    """One camera per frame: at the origin, looking along z. With motion, it orbits the middle of the tissue.
 
-    right    those of the second camera of a rectified pair: the same axes, the baseline to the right
+    right    the second camera of a rectified pair: the same axes, offset to the right by the baseline
     """
     focal = settings.focal * settings.width
     rest = Camera(
@@ -29,7 +29,7 @@ def make_cameras(settings: SimulatorSettings, times: FloatArray, right: bool = F
 
 
 def camera_centres(settings: SimulatorSettings, times: FloatArray) -> FloatArray:
-    """The places of the cameras, (n, 3) mm: the origin, or on the path of the camera motion."""
+    """Camera centres, (n, 3) mm: the origin, or the path of the camera motion."""
     part = settings.camera_motion
     angle = 2 * np.pi * part.cycles * np.asarray(times, float)
     path = np.stack([np.sin(angle), 0.5 * (1 - np.cos(angle)), np.zeros_like(angle)], axis=1)
@@ -45,19 +45,19 @@ def _looking_at(forward: FloatArray) -> FloatArray:
 
 
 def open_span(settings: SimulatorSettings) -> float:
-    """Normalised time for which the shutter is open; 0 while motion blur is off."""
+    """Exposure time, in normalised time; 0 without motion blur."""
     part = settings.motion_blur
     return part.shutter / settings.frames if part.on else 0.0
 
 
 def shutter_times(settings: SimulatorSettings) -> FloatArray:
-    """The averaged times: middles of equal parts of the open time, relative to the time of the frame."""
+    """The averaged times: midpoints of equal parts of the exposure, relative to the time of the frame."""
     samples = settings.motion_blur.samples
     return open_span(settings) * ((np.arange(samples) + 0.5) / samples - 0.5)
 
 
 def vignette(settings: SimulatorSettings) -> FloatArray:
-    """The factor on the light of every pixel, (H, W): 1 - amplitude (r / r_corner)^2, r from the image centre."""
+    """The light factor of every pixel, (H, W): 1 - amplitude (r / r_corner)^2, with r from the image centre."""
     x = (np.arange(settings.width) + 0.5) / settings.width - 0.5
     y = ((np.arange(settings.height) + 0.5) / settings.height - 0.5) * settings.height / settings.width
     corner = 0.25 * (1 + (settings.height / settings.width) ** 2)

@@ -1,8 +1,8 @@
-"""Views for pictures alone: solved on every fourth pixel and interpolated between.
+"""Views for rendering only, solved on every fourth pixel and interpolated.
 
-The truth of a sequence is solved at every pixel (views.py). The right camera and the motion blur need the same geometry
-only to draw: there the sheet, whose folds are 11 mm long and longer, is interpolated by cubic polynomials through the
-nodes. Left and right of an open slit the nodes are those of one side, continued beyond its edge.
+The ground truth is solved at every pixel (views.py). The right camera and motion blur need the geometry only for
+rendering. There, cubic polynomials through the nodes interpolate the sheet, whose shortest folds are 11 mm long. At an
+open slit, each side is solved separately and continued beyond its edge.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ GEOMETRY = ("material", "point", "normal", "depth")
 
 
 def see_coarsely(surface: Surface, camera: Camera, t: float) -> SurfaceView:
-    """As `views.see`, good to a hundredth of a pixel. Raises InputError as `see_rays` does."""
+    """As `views.see`, accurate to a hundredth of a pixel. Raises InputError as `see_rays` does."""
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
     x, y = np.meshgrid(ray_x, ray_y)
@@ -43,13 +43,13 @@ def see_coarsely(surface: Surface, camera: Camera, t: float) -> SurfaceView:
 def views_during(
     surface: Surface, cameras: list[Camera], view: SurfaceView, t: float, times: FloatArray
 ) -> Iterator[SurfaceView]:
-    """The view at every time of an exposure: the material seen, with the position and normal of its middle.
+    """The view at every time of an exposure: the visible material, with position and normal at mid-exposure.
 
     cameras  at the first time, at t and at the last time
     view     the view at t
-    times    relative to t, normalised time, ascending and symmetrical
+    times    relative to t, normalised time, ascending and symmetric
 
-    The material coordinates at a pixel run along the parabola in time through those at the three cameras' times.
+    The material coordinates of a pixel follow the parabola in time through the values at the three cameras' times.
     """
     slit = surface.slit
     cut = slit is not None and is_open(slit, t + times[-1])
@@ -68,7 +68,8 @@ def views_during(
 
 
 def nodes(count: int) -> FloatArray:
-    """Image coordinates of the nodes along a side of `count` pixels: two lie on each side of every pixel centre."""
+    """Image coordinates of the nodes along a side of `count` pixels, with two nodes on each side of every pixel
+    centre."""
     return 0.5 + STEP * (np.arange((count - 1) // STEP + 4) - 1)
 
 
@@ -93,7 +94,7 @@ def _spread_view(
 
 
 def _seen_at_nodes(surface: Surface, camera: Camera, t: float, side: float | None) -> SurfaceView:
-    """The view at the nodes, (rows, columns), of one side of an open slit or of the whole sheet."""
+    """The view at the nodes, (rows, columns), of the sheet or of one side of an open slit."""
     x, y = np.meshgrid((nodes(camera.width) - camera.cx) / camera.fx, (nodes(camera.height) - camera.cy) / camera.fy)
     return see_side(surface, camera, t, x, y, None if side is None else np.full_like(x, side))
 

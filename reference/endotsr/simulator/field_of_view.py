@@ -1,7 +1,7 @@
-"""Whether all that a scene is about stays in the picture: refused before anything is rendered or written.
+"""Checks that the effects of a scene stay in the picture, before anything is rendered or written.
 
-In: settings. Out: nothing, or an `InputError` that names the setting that is too large and the largest allowed value.
-Checked at every frame, on a grid of rays and on the few points that each effect is about.
+In: settings. Out: nothing, or an `InputError` that names the excessive setting and its largest allowed value. Every
+frame is checked, on a grid of rays and at the central points of each effect.
 """
 
 from collections.abc import Callable
@@ -24,20 +24,20 @@ from endotsr.simulator.views import pixel_of, see_rays
 
 GRID = (9, 8)  # rays across and down the picture
 SMALLEST = 1e-6  # a size at which an effect has no extent
-HALVINGS = 16  # of the interval that holds the largest allowed value
+HALVINGS = 16  # bisection steps for the largest allowed value
 
 Fits = Callable[[SimulatorSettings], bool]
 Points = Callable[[SimulatorSettings], FloatArray]
 
 
 def check_field_of_view(settings: SimulatorSettings) -> None:
-    """Raises InputError if an effect leaves the picture, or if the camera sees beyond the simulated tissue."""
+    """Raises InputError if an effect leaves the picture or the camera sees beyond the simulated tissue."""
     for fits, sizes in _requirements(settings):
         _require(fits, settings, sizes)
 
 
 def _requirements(settings: SimulatorSettings) -> list[tuple[Fits, list[tuple[str, str]]]]:
-    """What has to fit, and the sizes (section, key) that may be the reason why it does not."""
+    """The conditions, each with the sizes (section, key) that may violate it."""
     moving = [(name, "amplitude") for name in ("camera_motion", "pull", "pulsation", "breathing")]
     effects = [
         (partial(_points_fit, points=points), [(section, key), *moving])
@@ -52,7 +52,7 @@ def _all_fit(settings: SimulatorSettings) -> bool:
 
 
 def _require(fits: Fits, settings: SimulatorSettings, sizes: list[tuple[str, str]]) -> None:
-    """Raises InputError if the settings do not fit, for the first of the sizes (section, key) without which they do."""
+    """Raises InputError if the condition fails, naming the first size (section, key) whose removal satisfies it."""
     if fits(settings):
         return
     for section, key in sizes:
@@ -74,7 +74,7 @@ def _blood_rim(settings: SimulatorSettings) -> FloatArray:
     return settings.distance * np.array(BLOOD_CENTRE)[:, None] + rim
 
 
-# Section -> the key of its size, and the material points (2, P), mm, that it is about.
+# Section -> the key of its size, and its central material points (2, P), mm.
 ABOUT: dict[str, tuple[str, Points]] = {
     "breathing": ("amplitude", lambda settings: np.zeros((2, 1))),
     "pulsation": ("amplitude", lambda settings: settings.distance * np.array(PULSATION_CENTRE)[:, None]),
@@ -85,7 +85,7 @@ ABOUT: dict[str, tuple[str, Points]] = {
 
 
 def _points_fit(settings: SimulatorSettings, points: Points) -> bool:
-    """Whether the material points lie in the picture at every frame."""
+    """Whether the material points are in the picture in every frame."""
     surface, times = make_surface(settings), time_stamps(settings.frames)
     for camera, t in zip(make_cameras(settings, times), times):
         u, v, z = pixel_of(camera, surface_point(surface, points(settings), float(t)))
@@ -101,7 +101,7 @@ def _wrists_fit(settings: SimulatorSettings) -> bool:
 
 
 def _tissue_fits(settings: SimulatorSettings) -> bool:
-    """Whether every ray of the grid meets tissue that has a texture, at every frame."""
+    """Whether every ray of the grid meets textured tissue in every frame."""
     surface, times = make_surface(settings), time_stamps(settings.frames)
     extent = np.array(half_extent(settings))
     for camera, t in zip(make_cameras(settings, times), times):
@@ -122,7 +122,7 @@ def _changed(settings: SimulatorSettings, section: str, key: str, value: float) 
 
 
 def _refusal(settings: SimulatorSettings, section: str, key: str, fits: Fits) -> InputError:
-    """The error that names the setting, its value and, found by halving, the largest value that fits."""
+    """The error with the setting, its value, and the largest value that fits, found by bisection."""
     value = getattr(getattr(settings, section), key)
     low, high = SMALLEST, value
     for _ in range(HALVINGS):

@@ -1,12 +1,12 @@
-"""A simulated scene as a sequence folder: the EndoNeRF layout that the reader takes, with the truth beside it.
+"""A simulated scene as a sequence folder in the EndoNeRF layout, with its ground truth.
 
     images/ images_right/     left and right picture          poses_bounds.npy   LLFF rows
     depth/                    prior depth, whole millimetres, 16 bits
     masks/ gt_masks/          white = excluded: instruments and pixels without depth; instruments alone
     truth/                    see truth.py
 
-In: settings. Out: files, one frame at a time. A sequence that is read back equals `simulate` with the same settings bit
-for bit, prior depth included, if the reader's clip of the depth (`sequence.depth_percentiles`) is 0 to 100.
+In: settings. Out: files, one frame at a time. Reading the folder gives the sequence of `simulate` with the same
+settings, bit for bit and including the prior depth, if `sequence.depth_percentiles` is 0 to 100.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,7 +33,7 @@ TRACKS = (24, 19)  # tracked points, evenly spaced over the first picture, acros
 
 
 def check_scene(settings: SimulatorSettings) -> None:
-    """Raises InputError for settings that cannot become a sequence folder; nothing is rendered."""
+    """Raises InputError for settings that cannot become a sequence folder. Nothing is rendered."""
     part = settings.depth_rounding
     if not part.on or part.step != round(part.step):
         found = f"depth_rounding.step = {part.step:g}" if part.on else "depth_rounding.on = False"
@@ -70,7 +70,8 @@ def write_sequence(
 
 
 def frames_with_truth(folder: Path, scene: SimulatedScene, name: str) -> Iterator[SimulatedFrame]:
-    """The frames in order; the truth of each is written into `folder` before it is handed out, the rest at the end.
+    """The frames in order. The truth of a frame is written into `folder` before the frame is yielded, the rest at the
+    end.
 
     Raises:  InputError where the settings fold the tissue over itself.
     """
@@ -87,7 +88,7 @@ def frames_with_truth(folder: Path, scene: SimulatedScene, name: str) -> Iterato
 
 
 def tracked_points(scene: SimulatedScene) -> FloatArray:
-    """The material points of the tracks, (2, P) mm: those seen on an even grid of places of frame 0."""
+    """The material points of the tracks, (2, P) mm, seen on an even grid of image positions of frame 0."""
     camera = scene.cameras[0]
     across, down = TRACKS
     x = (np.arange(across) + 0.5) / across * camera.width
@@ -99,7 +100,7 @@ def tracked_points(scene: SimulatedScene) -> FloatArray:
 def tissue_light(scene: SimulatedScene, material: FloatArray, i: int) -> FloatArray:
     """Linear light (3, P) that material points send to the camera of frame i.
 
-    It holds the lamps, brightening and blood; highlights, shadows, instruments, smoke, lens and gain are left out.
+    It includes lamps, brightening and blood, but no highlights, shadows, instruments, smoke, vignetting or gain.
     """
     settings = scene.settings
     plain = msgspec.structs.replace(settings, highlights=msgspec.structs.replace(settings.highlights, on=False))
@@ -109,7 +110,7 @@ def tissue_light(scene: SimulatedScene, material: FloatArray, i: int) -> FloatAr
 
 
 def pose_rows(scene: SimulatedScene, far: FloatArray) -> FloatArray:
-    """Pose rows (n, 17) from which the reader makes the very cameras of the scene, to the last bit."""
+    """Pose rows (n, 17) from which the reader restores the cameras of the scene bit for bit."""
     rows = rows_from_cameras(scene.cameras, far)
     rows[:, :15].reshape(-1, 3, 5)[:, :, 3] = camera_centres(scene.settings, scene.times)
     return rows

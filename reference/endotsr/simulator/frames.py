@@ -1,8 +1,8 @@
-"""The frames of a simulated scene, one after another: pictures, mask, prior depth, and the truth behind them.
+"""The frames of a simulated scene, one at a time: pictures, mask, prior depth and ground truth.
 
-In: `SimulatorSettings`. Out: a `SimulatedScene`, and from it one `SimulatedFrame` at a time, so that a long sequence
-needs the memory of one frame. The order of the effects is that of the light: tissue, motion blur, instruments, smoke,
-lens, gain, display curve, sensor noise. An effect that is off is skipped, not multiplied by one.
+In: `SimulatorSettings`. Out: a `SimulatedScene`, which yields one `SimulatedFrame` at a time: a long sequence needs the
+memory of one frame. The effects follow the light path: tissue, motion blur, instruments, smoke, lens, gain, display
+curve, sensor noise. An effect that is off is skipped, not multiplied by one.
 """
 
 from collections.abc import Iterator
@@ -26,11 +26,11 @@ from endotsr.simulator.texture import Texture, make_texture
 from endotsr.simulator.views import SurfaceView, see
 from endotsr.splatting.camera import Camera
 
-LEFT_NOISE, DEPTH_NOISE, RIGHT_NOISE = 2, 3, 7  # streams of random numbers; 0, 1 and 4 to 6 make the scene
+LEFT_NOISE, DEPTH_NOISE, RIGHT_NOISE = 2, 3, 7  # random streams; the scene uses 0, 1 and 4 to 6
 
 
 class SimulatedScene(NamedTuple):
-    """All that a sequence is made of."""
+    """The parts of a sequence."""
 
     settings: SimulatorSettings
     times: NDArray[np.float64]  # (n,) normalised
@@ -40,7 +40,7 @@ class SimulatedScene(NamedTuple):
 
 
 class Eye(NamedTuple):
-    """One of the two cameras of a frame, and what it sees."""
+    """One of the two cameras of a frame, and its view."""
 
     view: SurfaceView
     camera: Camera
@@ -56,13 +56,13 @@ class SimulatedFrame(NamedTuple):
     prior: NDArray[np.float32]  # (H, W) prior depth, mm; 0 = none
     depth: FloatArray  # (H, W) true view-space z of the tissue, mm
     material: FloatArray  # (2, H, W) material point at the pixel centre, mm; NaN in the wound of a slit
-    covered: BoolArray  # (H, W) pixels that an instrument covers, margin not included
+    covered: BoolArray  # (H, W) pixels covered by an instrument, without margin
     excluded: BoolArray  # (H, W) the same with the margin
     highlight: FloatArray | None  # (H, W) linear light of the highlights on the tissue; None while they are off
 
 
 def make_scene(settings: SimulatorSettings) -> SimulatedScene:
-    """Surface, texture and cameras. Raises InputError for settings that contradict one another."""
+    """Surface, texture and cameras. Raises InputError for contradictory settings."""
     times = time_stamps(settings.frames)
     return SimulatedScene(
         settings, times, make_cameras(settings, times), make_surface(settings), make_texture(settings)
@@ -109,7 +109,7 @@ def _frame(scene: SimulatedScene, left: Eye, right: Eye | None, i: int) -> Simul
 def _light(
     scene: SimulatedScene, eye: Eye, lamp: Camera, tools: Drawing | None, blocker: Blocker | None, t: float
 ) -> tuple[FloatArray, FloatArray | None]:
-    """Linear light (3, H, W) at the sensor, gain included, and the highlights on the tissue. `lamp` has the lamp."""
+    """Linear light (3, H, W) at the sensor, including gain, and the highlights on the tissue. The lamp is at `lamp`."""
     settings = scene.settings
     light, highlight = tissue_light(scene, eye, lamp, blocker, t)
     if tools is not None:
@@ -125,7 +125,7 @@ def _light(
 def tissue_light(scene: SimulatedScene, eye: Eye, lamp: Camera, blocker: Blocker | None, t: float) -> TissueLight:
     """The light of the tissue; with motion blur, its mean over the exposure.
 
-    During an exposure the tissue moves; the lamps' light at a pixel is that of the middle of the exposure.
+    The tissue moves during an exposure. The lamps' light at a pixel is evaluated at mid-exposure.
     """
     settings, surface = scene.settings, scene.surface
     lamps = lit_by_all(settings, eye.view, lamp, blocker, eye.camera if eye.right else None)
@@ -154,7 +154,7 @@ def _picture(settings: SimulatorSettings, light: FloatArray, stream: int, i: int
 
 
 def _depth_prior(settings: SimulatorSettings, depth: FloatArray, tissue: BoolArray, i: int) -> NDArray[np.float32]:
-    """The prior depth of a reader: 0 on the instrument and where only one camera sees; errors if they are on."""
+    """The prior depth: 0 on the instrument and where only one camera sees the tissue; with errors if they are on."""
     prior = np.where(tissue, depth, 0.0)
     if settings.depth_errors.on:
         rng = np.random.default_rng([settings.seed, DEPTH_NOISE, i])

@@ -1,6 +1,6 @@
-"""The gain of the camera over time: exposure drift, jumps of the automatic exposure, and their Fourier content.
+"""The camera gain over time: exposure drift, jumps of the automatic exposure, and their Fourier coefficients.
 
-In: settings and times. Out: one factor per channel, in linear light, which `to_display` encodes for display.
+In: settings and times. Out: one factor per channel in linear light. `to_display` encodes linear light for display.
 """
 
 from typing import NamedTuple
@@ -23,14 +23,14 @@ class GainSpectrum(NamedTuple):
 
 
 def camera_gain(settings: SimulatorSettings, t: float) -> FloatArray | None:
-    """Gain of the three channels at time t, (3,); None while no effect changes it."""
+    """Gain of the three channels at time t, (3,); None without an effect on it."""
     if not settings.auto_exposure.on:
         return exposure_gain(settings, t) if settings.exposure.on else None
     return exposure_gain(settings, t) * auto_exposure_gain(settings, t)
 
 
 def exposure_gain(settings: SimulatorSettings, t: float) -> FloatArray:
-    """The drift of the exposure: gain of the three channels at time t, (3,); exactly 1 while the effect is off."""
+    """Exposure drift: gain of the three channels at time t, (3,); exactly 1 without the effect."""
     part = settings.exposure
     if not part.on:
         return np.ones(3)
@@ -41,14 +41,14 @@ def exposure_gain(settings: SimulatorSettings, t: float) -> FloatArray:
 
 
 def auto_exposure_gain(settings: SimulatorSettings, t: float) -> float:
-    """The gain between the two jumps around t: 1 at first, then 1 +- amplitude x (0.5 .. 1), drawn by the seed.
+    """The gain between the jumps before and after t: 1 at first, then 1 +- amplitude x (0.5 .. 1), drawn from the seed.
 
-    Step j of m lies at t = j / (m + 1).
+    Jump j of m is at t = j / (m + 1).
     """
     part = settings.auto_exposure
     rng = np.random.default_rng([settings.seed, 5])
     size = rng.uniform(LEAST_JUMP, 1.0, part.steps)
-    sign = np.where(np.arange(part.steps) % 2 == rng.integers(2), 1.0, -1.0)  # two levels in a row never agree
+    sign = np.where(np.arange(part.steps) % 2 == rng.integers(2), 1.0, -1.0)  # successive levels always differ
     done = min(int(np.floor(max(t, 0.0) * (part.steps + 1))), part.steps)
     return 1.0 if done == 0 else float(1 + part.amplitude * sign[done - 1] * size[done - 1])
 
@@ -60,13 +60,13 @@ def gain_series(settings: SimulatorSettings, times: FloatArray) -> FloatArray:
 
 
 def gain_spectrum(gain: FloatArray) -> GainSpectrum:
-    """The Fourier content of a gain series (n, 3) at t_i = i / n. Its sum returns the series to rounding."""
+    """The Fourier coefficients of a gain series (n, 3) at t_i = i / n. Their sum equals the series to rounding."""
     n = len(gain)
     transform = np.fft.rfft(gain, axis=0) / n
     twice = np.full(len(transform), 2.0)
     twice[0] = 1.0
     if n % 2 == 0:
-        twice[-1] = 1.0  # the Nyquist cosine stands for itself
+        twice[-1] = 1.0  # the Nyquist term has no conjugate
     return GainSpectrum(
         np.arange(len(transform)) + 0.0, twice[:, None] * transform.real, -twice[:, None] * transform.imag
     )

@@ -1,6 +1,6 @@
-"""Graspers between camera and tissue, drawn in the image plane: shaft, wrist and two jaws.
+"""Graspers between camera and tissue, drawn in the image plane, with shaft, wrist and two jaws.
 
-In: settings, image size, time. Out: their linear light, their coverage and the pixels that the mask excludes.
+In: settings and time. Out: linear light, coverage, and the pixels that the mask excludes.
 """
 
 from typing import NamedTuple
@@ -11,14 +11,14 @@ from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.simulator.cameras import open_span, shutter_times
 from endotsr.simulator.settings import SimulatorSettings
 
-SHAFT, WRIST, JAW = 0.042, 0.036, 0.017  # half widths, image widths
+SHAFT, WRIST, JAW = 0.042, 0.036, 0.017  # half widths, in image widths
 JAW_LENGTH = 0.105
 METAL = np.array([0.42, 0.43, 0.45])  # linear light
 SLEEVE = np.array([0.045, 0.045, 0.05])
 
 
 class Grasper(NamedTuple):
-    """The path of one instrument, image widths of a picture whose height is 0.8 of its width."""
+    """The path of one instrument, in image widths of a picture with height / width = 0.8."""
 
     entry: FloatArray  # where the shaft leaves the picture
     home: FloatArray  # the wrist, at t = 0
@@ -36,12 +36,12 @@ class Drawing(NamedTuple):
     """Instruments in one frame."""
 
     light: FloatArray  # (3, H, W) linear RGB
-    coverage: FloatArray  # (H, W)    0 .. 1, smooth over one pixel at the outline
+    coverage: FloatArray  # (H, W)    0 .. 1, anti-aliased over one pixel
     excluded: BoolArray  # (H, W) instrument and margin
 
 
 class PlacedGrasper(NamedTuple):
-    """One instrument at one moment, image widths."""
+    """One instrument at one time, in image widths."""
 
     points: FloatArray  # (2, 4) entry, wrist and the two tips
     segments: list[tuple[FloatArray, FloatArray, float, FloatArray]]  # start, end, half width, colour
@@ -54,9 +54,9 @@ def graspers(settings: SimulatorSettings) -> tuple[Grasper, ...]:
 
 
 def draw(settings: SimulatorSettings, t: float, shift: float = 0.0) -> Drawing | None:
-    """All instruments at time t, over one another and blurred by their motion; None without one.
+    """All instruments at time t, composited and motion-blurred; None without any.
 
-    shift    to the right, image widths: the view of another camera
+    shift    to the right, in image widths, for the view of another camera
     """
     together: Drawing | None = None
     for grasper in graspers(settings):
@@ -66,7 +66,7 @@ def draw(settings: SimulatorSettings, t: float, shift: float = 0.0) -> Drawing |
 
 
 def wrist_at(settings: SimulatorSettings, grasper: Grasper, t: float) -> FloatArray:
-    """The wrist of an instrument at time t, image widths, x first."""
+    """The wrist of an instrument at time t, in image widths, x first."""
     part = settings.instrument
     angle = 2 * np.pi * part.cycles * t + grasper.phase
     turned = np.array([np.cos(angle) - np.cos(grasper.phase), 0.6 * (np.sin(angle) - np.sin(grasper.phase))])
@@ -74,13 +74,13 @@ def wrist_at(settings: SimulatorSettings, grasper: Grasper, t: float) -> FloatAr
 
 
 def _aspect(settings: SimulatorSettings) -> FloatArray:
-    """From a picture whose height is 0.8 of its width to this one."""
+    """The scaling from a picture with height / width = 0.8 to this one."""
     scale = np.array([1.0, settings.height / settings.width])
     return np.array([1.0, scale[1] / 0.8])
 
 
 def _blurred(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
-    """One instrument, as the mean over the exposure. Only the part of the picture around it is computed."""
+    """One instrument, averaged over the exposure. Only its bounding box is computed."""
     times = [t] if open_span(settings) == 0.0 else [float(t + u) for u in shutter_times(settings)]
     poses = [_pose(settings, grasper, one, shift) for one in times]
     box = _box(settings, np.concatenate([pose.points for pose in poses], axis=1))
@@ -106,12 +106,12 @@ def _over(front: Drawing, behind: Drawing) -> Drawing:
 
 
 def _unmixed(light: FloatArray, coverage: FloatArray) -> FloatArray:
-    """Of a partly covered pixel, the light of the instrument alone; the coverage blends it with the tissue."""
+    """The light of the instrument alone, divided by the coverage, which later blends it with the tissue."""
     return np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
 
 
 def _pose(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> PlacedGrasper:
-    """The parts of an instrument at one moment."""
+    """The parts of an instrument at one time."""
     angle = 2 * np.pi * settings.instrument.cycles * t + grasper.phase
     wrist = wrist_at(settings, grasper, t) + [shift, 0.0]
     entry = grasper.entry * _aspect(settings) + [shift, 0.0]
@@ -129,7 +129,7 @@ def _pose(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float)
 
 
 def _draw_one(settings: SimulatorSettings, pose: PlacedGrasper, box: tuple[slice, slice]) -> Drawing:
-    """One instrument at one moment, inside a box of the picture."""
+    """One instrument at one time, inside a box of the picture."""
     pixel = 1.0 / settings.width
     x, y = np.meshgrid(
         ((np.arange(settings.width) + 0.5) / settings.width)[box[1]],
@@ -138,7 +138,7 @@ def _draw_one(settings: SimulatorSettings, pose: PlacedGrasper, box: tuple[slice
     light, coverage = np.zeros((3, *x.shape)), np.zeros(x.shape)
     outline = np.full_like(coverage, np.inf)
     for start, end, half_width, colour in pose.segments:
-        near = _within(box, _box(settings, np.stack([start, end], axis=1)))  # further away, a segment changes nothing
+        near = _within(box, _box(settings, np.stack([start, end], axis=1)))  # a segment has no effect farther away
         distance, side = _segment(x[near], y[near], start, end)
         cover = np.clip(0.5 - (distance - half_width) / pixel, 0.0, 1.0)
         on = cover > 0
@@ -151,14 +151,14 @@ def _draw_one(settings: SimulatorSettings, pose: PlacedGrasper, box: tuple[slice
 
 
 def _within(box: tuple[slice, slice], inner: tuple[slice, slice]) -> tuple[slice, slice]:
-    """The part of a box of the picture that another one has in common with it, counted from its corner."""
+    """The intersection of two boxes of the picture, relative to the corner of the first."""
     starts = [max(one.start - whole.start, 0) for whole, one in zip(box, inner)]
     stops = [max(min(one.stop, whole.stop) - whole.start, 0) for whole, one in zip(box, inner)]
     return slice(starts[0], stops[0]), slice(starts[1], stops[1])
 
 
 def _box(settings: SimulatorSettings, points: FloatArray) -> tuple[slice, slice]:
-    """Rows and columns of the picture around points (2, P), image widths, with room for instrument and margin."""
+    """Rows and columns of the picture around points (2, P), in image widths, padded for instrument and margin."""
     border = SHAFT + settings.instrument.margin + 3 / settings.width
     low = np.floor((points.min(axis=1) - border) * settings.width).astype(int)
     high = np.ceil((points.max(axis=1) + border) * settings.width).astype(int)

@@ -1,6 +1,6 @@
-"""The lamps: their places, the light that the tissue receives from each, their mirror reflections and their shadows.
+"""The lamps: positions, light received by the tissue, specular highlights and shadows.
 
-In: a view of the sheet. Out: `Lit` for each lamp, and from it the linear light of the highlights.
+In: a view of the sheet. Out: `Lit` for each lamp, and the linear light of its highlights.
 """
 
 from typing import NamedTuple
@@ -12,25 +12,25 @@ from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.views import SurfaceView, rotate, to_camera
 from endotsr.splatting.camera import Camera, camera_centre
 
-GAIN = 0.95  # linear light of a reflectance of 1, perpendicular to the view, at the scene's distance
-WRAP = 0.15  # light scattered inside the tissue softens the shading
-BEAM = 3.0  # exponent of the lamp's fall-off towards the edge of its cone
+GAIN = 0.95  # linear light of reflectance 1 at normal incidence and the scene's distance
+WRAP = 0.15  # subsurface scattering softens the shading
+BEAM = 3.0  # exponent of the fall-off away from the lamp's axis
 INSTRUMENT_DEPTH = 0.7  # view-space z of the instruments, distances of the scene
 
 
 class Lit(NamedTuple):
-    """What one lamp does at every pixel."""
+    """The light of one lamp at every pixel."""
 
-    diffuse: FloatArray  # (H, W) linear light of a reflectance of 1
-    received: FloatArray  # (H, W) the same before the angle to the surface
+    diffuse: FloatArray  # (H, W) linear light of reflectance 1
+    received: FloatArray  # (H, W) the same without the cosine term
     half: FloatArray  # (3, H, W) unit vectors half-way between lamp and eye
 
 
 class Blocker(NamedTuple):
-    """The instruments of a frame as a screen that throws shadows."""
+    """The instruments of a frame as a flat screen that casts shadows."""
 
     cover: FloatArray  # (H, W) 0 .. 1, softened
-    camera: Camera  # in whose picture it lies, at z = INSTRUMENT_DEPTH x distance
+    camera: Camera  # the screen covers its picture at z = INSTRUMENT_DEPTH x distance
 
 
 def lit_by_endoscope(
@@ -38,7 +38,7 @@ def lit_by_endoscope(
 ) -> Lit:
     """The lamp at the camera: n.l with scattering, (distance / r)^2 and its beam.
 
-    eye      the camera of the view if the lamp is not there
+    eye      the camera of the view, if the lamp is elsewhere
     """
     towards, r = _towards(view, camera_centre(camera))
     axis = view.depth / r  # cosine of the angle to the optical axis
@@ -50,7 +50,7 @@ def lit_by_endoscope(
 
 
 def lit_by_second(settings: SimulatorSettings, view: SurfaceView, blocker: Blocker | None, eye: Camera) -> Lit:
-    """The second lamp, at a fixed place and without a beam."""
+    """The second lamp, at a fixed position, without fall-off away from its axis."""
     part = settings.second_light
     lamp = np.array([part.right, part.down, 0.0])
     towards, r = _towards(view, lamp)
@@ -61,19 +61,20 @@ def lit_by_second(settings: SimulatorSettings, view: SurfaceView, blocker: Block
 
 
 def _towards(view: SurfaceView, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors (3, H, W) from the tissue to a place in the world (3,), and its distance (H, W)."""
+    """Unit vectors (3, H, W) from the tissue to a world position (3,), and the distance (H, W)."""
     towards = place[:, None, None] - view.point
     r = np.sqrt((towards**2).sum(axis=0))
     return towards / r, r
 
 
 def _diffuse(view: SurfaceView, towards: FloatArray, received: FloatArray) -> FloatArray:
-    """The light received at the angle to the surface, softened by scattering inside the tissue."""
+    """The received light with the cosine term, softened by subsurface scattering."""
     return received * np.maximum((view.normal * towards).sum(axis=0) + WRAP, 0.0) / (1 + WRAP)
 
 
 def bent_normal(normal: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Unit normals n' (3, H, W) of the wet surface: those of the sheet, turned by slopes (2, H, W) of its relief."""
+    """Unit normals n' (3, H, W) of the wet surface: normals of the sheet, tilted by the slopes (2, H, W) of its
+    relief."""
     bent = normal.copy()
     bent[0] += slopes[0]
     bent[1] += slopes[1]
@@ -82,15 +83,15 @@ def bent_normal(normal: FloatArray, slopes: FloatArray) -> FloatArray:
 
 
 def mirrored(settings: SimulatorSettings, lit: Lit, bent: FloatArray) -> FloatArray:
-    """The highlights of a lamp, (H, W): strength received (n'.half)^exponent, with n' of `bent_normal`."""
+    """The highlights of a lamp, (H, W): strength received (n'.half)^exponent, with n' from `bent_normal`."""
     mirror = np.maximum((bent * lit.half).sum(axis=0), 0.0) ** settings.highlights.exponent
     return settings.highlights.strength * lit.received * mirror
 
 
 def shadow(settings: SimulatorSettings, blocker: Blocker, lamp: FloatArray, view: SurfaceView) -> FloatArray:
-    """The factor on the light of a lamp at world position (3,), (H, W): 1 - strength where instruments stand between.
+    """The shadow factor (H, W) of a lamp at world position (3,): 1 - strength where instruments block the light.
 
-    The line from the lamp to each piece of tissue meets the plane of the instruments; their cover is read there.
+    The cover is sampled where the line from the lamp to the tissue crosses the plane of the instruments.
     """
     from endotsr.opencv import warp_bilinear
 
@@ -107,7 +108,7 @@ def shadow(settings: SimulatorSettings, blocker: Blocker, lamp: FloatArray, view
 
 
 def make_blocker(settings: SimulatorSettings, cover: FloatArray, camera: Camera) -> Blocker:
-    """The instruments of a frame, (H, W) in [0, 1], with their softened edge."""
+    """The screen for a coverage (H, W) in [0, 1], with softened edges."""
     from scipy.ndimage import gaussian_filter
 
     radius = settings.shadows.softness * settings.width

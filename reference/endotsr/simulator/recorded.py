@@ -1,8 +1,8 @@
-"""The true motion of a sequence folder that `endotsr simulate` wrote, for the frames that a reader took from it.
+"""The true motion of a folder written by `endotsr simulate`, for the frames of a sequence read from it.
 
-In: the folder and the `Sequence` read from it. Out: world positions as `SimulatedSequence.true_positions` gives them.
-The material point of every pixel comes from `truth/frames`, its place at another time from the formula of the surface,
-which the settings in `truth/truth.json` determine. All of it is user input and is checked.
+In: the folder and the `Sequence` read from it. Out: world positions as in `SimulatedSequence.true_positions`. The
+material point of every pixel comes from `truth/frames`. Its position at another time follows from the formula of the
+surface, with the settings in `truth/truth.json`. These files are user input and are checked.
 """
 
 from collections.abc import Callable
@@ -21,14 +21,14 @@ TOLERANCE = 1e-6  # mm, between the tracks in the file and the formula; both are
 
 
 def has_truth(folder: Path) -> bool:
-    """Whether a sequence folder holds the truth of a simulated scene."""
+    """Whether a sequence folder contains the truth of a simulated scene."""
     return (Path(folder) / TRUTH / "truth.json").is_file()
 
 
 def check_truth(folder: Path) -> tuple[SceneTruth, Surface]:
     """The truth of a folder and its surface.
 
-    Raises:  InputError as `read_truth` does, or if the tracks are not those of the settings.
+    Raises:  InputError as `read_truth` does, or if the tracks contradict the settings.
     """
     truth = read_truth(folder)
     surface = make_surface(truth.settings)
@@ -45,11 +45,11 @@ def check_truth(folder: Path) -> tuple[SceneTruth, Surface]:
 def recorded_positions(folder: Path, sequence: Sequence) -> Callable[[int, int], FloatArray] | None:
     """(frame, other frame) of the sequence -> (3, H, W) world positions, mm, at the time of the other frame.
 
-    A position is NaN where the first frame shows a wound. The result is None without a truth, or if the sequence was
-    read at another size than that of the files.
+    A position is NaN where the first frame shows a wound. The result is None without truth, or if the size of the
+    sequence differs from that of the files.
 
-    Raises:  InputError if the truth is damaged or does not have the frames of the sequence. Files of single frames are
-             read, and checked, when they are asked for.
+    Raises:  InputError if the truth is damaged or lacks a frame of the sequence. Files of single frames are read and
+             checked on demand.
     """
     if not has_truth(folder):
         return None
@@ -62,7 +62,7 @@ def recorded_positions(folder: Path, sequence: Sequence) -> Callable[[int, int],
     if (settings.width, settings.height) != (sequence.width, sequence.height):
         return None
 
-    @lru_cache(maxsize=1)  # one frame after another is asked for, each with all times
+    @lru_cache(maxsize=1)  # callers request all times of one frame before the next frame
     def material(frame: int) -> FloatArray:
         return truth.frame(frame).material.astype(np.float64)
 

@@ -1,7 +1,7 @@
-"""Scenes by name, from trivial to full, at the size of published clips.
+"""Named scenes, from trivial to full, at the size of published clips.
 
-In: a name, or the names of effects. Out: `SimulatorSettings` for a sequence that is written to files: 640x512 pixels,
-63 frames, with a right picture and with the prior depth in whole millimetres, as the folder layout holds it.
+In: a name, or the names of effects. Out: `SimulatorSettings` for a sequence folder: 640x512 pixels, 63 frames, with a
+right picture and prior depth in whole millimetres.
 """
 
 import msgspec
@@ -10,7 +10,7 @@ from endotsr.errors import InputError
 from endotsr.simulator.settings import EFFECTS, SimulatorSettings, with_effects
 
 SIZE = SimulatorSettings(width=640, height=512, frames=63)
-IN_FILES = ("stereo", "depth_rounding")  # on in every scene: properties of a sequence folder
+IN_FILES = ("stereo", "depth_rounding")  # on in every scene: required by a sequence folder
 SCENES: dict[str, tuple[str, ...]] = {
     "still": ("noise",),
     "breathing": ("breathing", "pulsation", "highlights", "noise"),
@@ -22,7 +22,7 @@ SCENES: dict[str, tuple[str, ...]] = {
     "moving-camera": ("camera_motion", "motion_blur", "vignetting", "second_light", "highlights", "noise"),
     "everything": EFFECTS,
 }  # fmt: skip
-"""Name -> the effects that are on, beside those of `IN_FILES`."""
+"""Name -> the effects that are on, in addition to `IN_FILES`."""
 
 
 def named_scene(name: str) -> SimulatorSettings:
@@ -33,7 +33,7 @@ def named_scene(name: str) -> SimulatorSettings:
 
 
 def scene_of(effects: str, size: SimulatorSettings = SIZE) -> SimulatorSettings:
-    """A scene with exactly the effects of a list "breathing,smoke" beside those of `IN_FILES`; "" has none.
+    """A scene with the effects of a list such as "breathing,smoke" and those of `IN_FILES`; "" adds none.
 
     Raises:  InputError for a name that is not in EFFECTS.
     """

@@ -1,7 +1,7 @@
-"""One section of settings for every effect of the simulator, each with its switch `on`.
+"""One section of settings for each effect of the simulator, with a switch `on`.
 
-Lengths are in millimetres, times in cycles per sequence (the unit of the model's frequencies; t = i / n) or as
-normalised time in [0, 1]. The order is that in which the effects act: motion, light, instruments, camera, depth.
+Lengths are in millimetres, rates in cycles per sequence (the unit of the model's frequencies; t = i / n), times in
+normalised time in [0, 1]. The effects act in this order: motion, light, instruments, camera, depth.
 """
 
 from typing import Annotated
@@ -12,21 +12,21 @@ from endotsr.config import Fraction, NonNegative, Positive, PositiveCount, Secti
 
 
 class Effect(Section, frozen=True, kw_only=True):
-    """An effect that is off unless it is asked for."""
+    """An effect that is off by default."""
 
     on: bool = False
     """switch"""
 
 
 class ActiveEffect(Effect, frozen=True, kw_only=True):
-    """An effect that is on unless it is switched off."""
+    """An effect that is on by default."""
 
     on: bool = True
     """switch"""
 
 
 class Breathing(ActiveEffect, frozen=True, kw_only=True):
-    """Every breath lifts the whole tissue towards the camera and shifts it, unevenly."""
+    """Each breath lifts the whole tissue towards the camera and shifts it, unevenly."""
 
     amplitude: NonNegative = 2.5
     """largest displacement, mm"""
@@ -51,11 +51,11 @@ class Pull(ActiveEffect, frozen=True, kw_only=True):
     amplitude: NonNegative = 5.0
     """displacement of the spot while it is held, mm"""
     width: Positive = 11.0
-    """Gaussian radius of the tissue that moves along, mm"""
+    """Gaussian radius of the pulled region, mm"""
     start: Fraction = 0.15
     """normalised time at which the pull begins"""
     stop: Fraction = 0.9
-    """normalised time at which the tissue is back"""
+    """normalised time at which the tissue has returned"""
 
 
 class GainDrift(ActiveEffect, frozen=True, kw_only=True):
@@ -88,7 +88,7 @@ class Highlights(ActiveEffect, frozen=True, kw_only=True):
 
 
 class Instrument(ActiveEffect, frozen=True, kw_only=True):
-    """A grasper in front of the tissue. It is drawn; the mask and the prior depth exclude its pixels."""
+    """A grasper in front of the tissue. The mask and the prior depth exclude its pixels."""
 
     travel: NonNegative = 0.06
     """radius of the path of its tip, image widths"""
@@ -99,7 +99,7 @@ class Instrument(ActiveEffect, frozen=True, kw_only=True):
 
 
 class CameraMotion(Effect, frozen=True, kw_only=True):
-    """The camera swings around the middle of the tissue; off = one Camera object for all frames."""
+    """The camera orbits the middle of the tissue; off = one Camera object for all frames."""
 
     amplitude: NonNegative = 3.0
     """largest sideways shift of the camera, mm"""
@@ -124,18 +124,18 @@ class DepthErrors(Effect, frozen=True, kw_only=True):
 
 
 class Cutting(Effect, frozen=True, kw_only=True):
-    """A blade runs along a line; behind it the tissue parts, and a wound that was inside before becomes visible."""
+    """A blade moves along a line. Behind it the tissue parts and exposes a wound."""
 
     opening: Positive = 4.0
     """largest width of the slit, mm"""
     length: Positive = 18.0
     """length of the finished slit, mm"""
     reach: Positive = 7.0
-    """Gaussian radius of the tissue that moves aside, mm"""
+    """Gaussian radius of the displaced tissue, mm"""
     depth: NonNegative = 0.8
-    """depth of the wound where it is widest, mm"""
+    """depth of the wound at its widest point, mm"""
     start: Fraction = 0.15
-    """normalised time at which the blade begins"""
+    """normalised time at which the blade starts"""
     stop: Fraction = 0.7
     """normalised time at which the slit has its full length and width"""
 
@@ -146,39 +146,39 @@ class Bleeding(Effect, frozen=True, kw_only=True):
     radius: Positive = 6.0
     """mean radius at the end of the sequence, mm"""
     opacity: Fraction = 0.9
-    """fraction of the colour that is replaced"""
+    """fraction of the colour that blood replaces"""
     start: Fraction = 0.2
     """normalised time at which the bleeding begins"""
 
 
 class Smoke(Effect, frozen=True, kw_only=True):
-    """Smoke between camera and tissue: it replaces a fraction of the light of a pixel by grey, and drifts."""
+    """Drifting smoke between camera and tissue, which replaces a fraction of the light of a pixel with grey."""
 
     density: Fraction = 0.6
     """fraction of the light that the densest smoke replaces"""
     size: Positive = 0.16
     """size of the clouds, image widths"""
     drift: float = 0.5
-    """way of the clouds to the right during the sequence, image widths"""
+    """drift of the clouds to the right during the sequence, image widths"""
     start: Fraction = 0.1
     """normalised time at which the smoke rises"""
     stop: Fraction = 0.95
-    """normalised time at which it has gone"""
+    """normalised time at which the smoke has cleared"""
 
 
 class SecondLight(Effect, frozen=True, kw_only=True):
-    """A second lamp, at a fixed place beside the camera of frame 0."""
+    """A second lamp, at a fixed position near the camera of frame 0."""
 
     strength: NonNegative = 0.5
     """brightness, relative to the lamp at the camera"""
     right: float = -30.0
-    """place to the right of the camera, mm"""
+    """position to the right of the camera, mm"""
     down: float = -20.0
-    """place below the camera, mm"""
+    """position below the camera, mm"""
 
 
 class AutoExposure(Effect, frozen=True, kw_only=True):
-    """The automatic exposure of the camera jumps: between two steps the gain is constant."""
+    """The automatic exposure of the camera jumps; the gain is constant between jumps."""
 
     amplitude: Fraction = 0.25
     """largest relative change of the gain, linear light"""
@@ -190,45 +190,45 @@ class Vignetting(Effect, frozen=True, kw_only=True):
     """The lens darkens the picture towards its corners."""
 
     amplitude: Fraction = 0.4
-    """fraction of the light that is lost in the corners"""
+    """fraction of the light lost in the corners"""
 
 
 class MotionBlur(Effect, frozen=True, kw_only=True):
-    """The picture is the mean over the time for which the shutter is open, centred on the time of the frame."""
+    """The picture is the mean over the exposure, which is centred on the time of the frame."""
 
     shutter: Fraction = 0.5
-    """fraction of the frame interval for which the shutter is open"""
+    """exposure time, as a fraction of the frame interval"""
     samples: Annotated[int, msgspec.Meta(ge=2, le=64)] = 5
-    """moments of the exposure that are averaged"""
+    """times of the exposure that are averaged"""
 
 
 class MoreInstruments(Effect, frozen=True, kw_only=True):
-    """Further graspers, which enter from other sides; travel, cycles and margin are those of `instrument`."""
+    """Further graspers that enter from other sides, with travel, cycles and margin of `instrument`."""
 
     count: Annotated[int, msgspec.Meta(ge=1, le=2)] = 1
     """number of further graspers"""
 
 
 class Shadows(Effect, frozen=True, kw_only=True):
-    """The instruments throw shadows, because no lamp is exactly at the camera."""
+    """The instruments cast shadows, because the lamp is next to the camera."""
 
     strength: Fraction = 0.6
-    """fraction of the light of a lamp that the shadow takes away"""
+    """fraction of the light of a lamp that the shadow removes"""
     offset: float = 5.0
-    """place of the lamp of the endoscope to the right of the camera, mm; for the shadow alone"""
+    """position of the endoscope's lamp to the right of the camera, mm; affects the shadows only"""
     softness: NonNegative = 0.01
     """Gaussian radius of the edge of the shadow, image widths"""
 
 
 class Stereo(Effect, frozen=True, kw_only=True):
-    """A second camera to the right. What it does not see, a strip at the left, has no prior depth and is excluded."""
+    """A second camera to the right. The strip at the left that it does not see has no prior depth and is excluded."""
 
     baseline: Positive = 4.0
-    """distance of the two cameras, mm"""
+    """distance between the two cameras, mm"""
 
 
 class DepthRounding(Effect, frozen=True, kw_only=True):
-    """The prior depth is rounded as in the files of a sequence folder."""
+    """The prior depth is rounded, as in the files of a sequence folder."""
 
     step: Positive = 1.0
     """step, mm"""

@@ -1,7 +1,7 @@
-"""Settings of the simulator: the scene, and one section with a switch for every effect (sections.py).
+"""Settings of the simulator: the scene, and one section with a switch for each effect (sections.py).
 
-Lengths are in millimetres, times in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
-that is off is exactly absent: no part of it is computed, and no random number is drawn for it.
+Lengths are in millimetres, rates in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
+that is off is not computed and draws no random numbers.
 """
 
 from typing import Annotated
@@ -24,7 +24,7 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     height: Side = 128
     """rows, pixels"""
     frames: FrameCount = 24
-    """n; frame i shows the time i / n"""
+    """n; frame i is at time i / n"""
     seed: Count = 0
     """seed of the surface, the texture and all noise"""
     distance: Positive = 50.0
@@ -64,7 +64,7 @@ EFFECTS = tuple(
 
 
 def with_effects(settings: SimulatorSettings, *names: str) -> SimulatorSettings:
-    """The same settings with exactly the named effects on and all others off.
+    """The same settings with the named effects on and all others off.
 
     Raises:  InputError for a name that is not in EFFECTS.
     """

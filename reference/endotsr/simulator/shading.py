@@ -1,4 +1,4 @@
-"""From geometry and reflectance to linear light: lamps with fall-off, brightening tissue, blood, the wound, highlights.
+"""Linear light from geometry and reflectance: lamps with fall-off, brightening tissue, blood, the wound, highlights.
 
 In: a `SurfaceView` of the sheet, its texture, the lamps on it, the time. Out: linear RGB light from the tissue.
 """
@@ -16,15 +16,15 @@ from endotsr.simulator.texture import Texture, sample
 from endotsr.simulator.views import SurfaceView
 from endotsr.splatting.camera import Camera
 
-BLOCK_ROWS = 32  # shaded together: they stay in the processor's cache
-WOUND = np.array([0.30, 0.020, 0.018])  # linear reflectance of tissue that was inside
+BLOCK_ROWS = 32  # rows shaded together, which fit in the processor's cache
+WOUND = np.array([0.30, 0.020, 0.018])  # linear reflectance of inner tissue
 
 
 class TissueLight(NamedTuple):
     """Linear light from the tissue."""
 
-    light: FloatArray  # (3, H, W) highlights included
-    highlight: FloatArray | None  # (H, W) the highlights alone, white; None while they are off
+    light: FloatArray  # (3, H, W) including highlights
+    highlight: FloatArray | None  # (H, W) the highlights alone, white; None if they are off
 
 
 def lit_by_all(
@@ -34,7 +34,7 @@ def lit_by_all(
     blocker: Blocker | None = None,
     eye: Camera | None = None,
 ) -> list[Lit]:
-    """The lamps that are on, the one at the camera first. `eye` is the camera of the view if it is another one."""
+    """The active lamps, starting with the lamp at the camera. `eye` is the camera of the view, if it differs."""
     lamps = [lit_by_endoscope(settings, view, camera, blocker, eye)]
     if settings.second_light.on:
         lamps.append(lit_by_second(settings, view, blocker, eye or camera))
@@ -45,8 +45,8 @@ def shade(settings: SimulatorSettings, texture: Texture, view: SurfaceView, lamp
     """Linear light from the tissue, before exposure.
 
     reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.half)^exponent with the same
-    fall-off, where l points to a lamp, r is its distance, half lies half-way between lamp and camera, and n' is the
-    normal of the fine relief; summed over the lamps. Rows that stay in the processor's cache are shaded together.
+    fall-off, summed over the lamps. l points to a lamp at distance r, half is half-way between lamp and camera, and n'
+    is the normal of the fine relief. Rows that fit in the processor's cache are shaded together.
     """
     parts = []
     for top in range(0, view.material.shape[1], BLOCK_ROWS):

@@ -1,6 +1,6 @@
-"""A simulated sequence with known geometry, motion and light: the `Sequence` of a reader, and the truth.
+"""A simulated sequence with known geometry, motion and light: a `Sequence` and its ground truth.
 
-In: `SimulatorSettings`. Out: frames, masks, depth prior, cameras, split, and per pixel the material point that is seen.
+In: `SimulatorSettings`. Out: frames, masks, prior depth, cameras, split, and the visible material point of every pixel.
 Equal settings give bitwise equal sequences. This module does not depend on the model.
 """
 
@@ -21,17 +21,17 @@ UNIT = "mm"
 
 
 class SequenceTruth(NamedTuple):
-    """Quantities that a real sequence does not contain. Behind the instrument they are those of the hidden tissue."""
+    """Quantities that a real sequence lacks. Behind an instrument they describe the hidden tissue."""
 
     depth: NDArray[np.floating]  # (n, H, W)    view-space z of the tissue, mm
     material_coordinates: NDArray[np.floating]  # (n, 2, H, W) material point at the pixel centre, mm; NaN in a wound
-    instrument: NDArray[np.bool_]  # (n, H, W)    pixels the instrument covers, margin not included
+    instrument: NDArray[np.bool_]  # (n, H, W)    pixels covered by an instrument, without margin
     surface: Surface
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSequence:
-    """A sequence and the truth behind it."""
+    """A sequence and its ground truth."""
 
     sequence: Sequence
     truth: SequenceTruth
@@ -42,11 +42,12 @@ class SimulatedSequence:
         return surface_point(self.truth.surface, material, t)
 
     def true_positions(self, source: int, target: int) -> NDArray[np.floating]:
-        """World position (3, H, W), mm, at the time of frame `target` of what the pixels of frame `source` show."""
+        """World positions (3, H, W), mm, at the time of frame `target`, of the tissue in the pixels of frame
+        `source`."""
         return self.surface_point(self.truth.material_coordinates[source], float(self.sequence.times[target]))
 
     def true_flow(self, source: int, target: int) -> NDArray[np.floating]:
-        """Motion in pixels (2, H, W), x first, of the tissue at every pixel of frame `source` to frame `target`.
+        """Motion of the tissue from every pixel of frame `source` to frame `target`, (2, H, W) px, x first.
 
         NaN where frame `source` shows the wound of a slit.
         """
@@ -56,7 +57,7 @@ class SimulatedSequence:
 
 
 def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:
-    """Simulate a sequence; without settings the demonstration (160x128, 24 frames, all effects of a static camera).
+    """Simulate a sequence. The default settings are 160x128 pixels and 24 frames of a static camera.
 
     Raises:  InputError if the settings fold the tissue over itself or the frames cannot be split.
     """

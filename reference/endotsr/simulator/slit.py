@@ -1,13 +1,13 @@
-"""Cutting: a slit that a blade opens in the tissue, and how far the tissue beside it moves aside.
+"""Cutting: a slit that a blade opens in the tissue, and the displacement of the tissue next to it.
 
-Along the slit runs x, across it y, in millimetres of the material (a, b). At time t the slit reaches from one end to
-the blade, and half its width at x is w(x, t) = h(t) (1 - s^2)^2, with s in [-1, 1] from end to blade. A material point
-beside it moves by
+x runs along the slit and y across it, in millimetres of the material (a, b). At time t the slit extends from one end to
+the blade. Its half width at x is w(x, t) = h(t) (1 - s^2)^2, with s in [-1, 1] from end to blade. A material point
+moves by
 
     +-w(x, t) exp(-y^2 / (2 reach^2)) across,    + for y >= 0,
 
-so the tissue is torn apart at y = 0 and nowhere else. Between the two edges lies the wound, a groove with the points
-x along + y across, |y| <= w, which did not exist before: such a point has no material coordinates.
+which is discontinuous only at y = 0. The wound is a groove between the two edges, at x along + y across with |y| <= w.
+Its points are new: they have no material coordinates.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ LARGEST_STRETCH = 0.9  # of the tissue at the edge; from 1 on it would fold over
 
 
 class Slit(NamedTuple):
-    """The slit at rest and the course of its opening."""
+    """The slit at rest and its opening over time."""
 
     centre: FloatArray  # (2,) material coordinates, mm
     along: FloatArray  # (2,) unit vectors of the material plane
@@ -39,7 +39,8 @@ class Slit(NamedTuple):
 
 
 def make_slit(settings: SimulatorSettings) -> Slit:
-    """The slit of the settings. Raises InputError if the tissue beside it would fold, or it ends before it begins."""
+    """The slit of the settings. Raises InputError if the tissue next to it would fold, or if it stops before it
+    starts."""
     part = settings.cutting
     widest = 2 * LARGEST_STRETCH * part.reach / STEEPEST
     if part.opening > widest:
@@ -56,7 +57,7 @@ def make_slit(settings: SimulatorSettings) -> Slit:
 
 
 def is_open(slit: Slit, t: float) -> bool:
-    """Whether the blade has begun."""
+    """Whether the blade has started."""
     return t > slit.start
 
 
@@ -67,14 +68,14 @@ def slit_coordinates(slit: Slit, a: FloatArray, b: FloatArray) -> tuple[FloatArr
 
 
 def side_of(slit: Slit, a: FloatArray, b: FloatArray) -> FloatArray:
-    """The side on which material points lie: +1 or -1. Points on the line count as +1."""
+    """The side of material points, +1 or -1. Points on the line count as +1."""
     return np.where(slit_coordinates(slit, a, b)[1] >= 0, 1.0, -1.0)
 
 
 def half_width(slit: Slit, x: FloatArray, t: float) -> tuple[FloatArray, FloatArray]:
-    """Half the width of the slit at x, mm, and its slope. Both are 0 while it is closed and beyond its ends.
+    """Half the width of the slit at x, mm, and its derivative. Both are 0 for a closed slit and beyond its ends.
 
-    The blade runs at constant speed and the width grows with the smooth step 3 p^2 - 2 p^3 of its progress p.
+    The blade moves at constant speed. The width is proportional to the smooth step 3 p^2 - 2 p^3 of its progress p.
     """
     progress = min(max((t - slit.start) / (slit.stop - slit.start), 0.0), 1.0)
     if progress == 0.0:
@@ -90,8 +91,8 @@ def parting(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Displacement across the slit, mm, and its derivatives with respect to a and b.
 
-    side     +1 or -1; None takes the side on which each point lies. A side given for points beyond the line continues
-             the formula of that side smoothly.
+    side     +1 or -1; None selects the side of each point. For points beyond the line, a given side continues its own
+             formula smoothly.
     """
     x, y = slit_coordinates(slit, a, b)
     side = np.where(y >= 0, 1.0, -1.0) if side is None else side

@@ -1,7 +1,7 @@
-"""Smoke between camera and tissue: drifting clouds that replace a fraction of the light by their own grey.
+"""Smoke between camera and tissue: drifting clouds that replace a fraction of the light with grey.
 
-In: the size of the picture and a time. Out: the fraction of smoke in every pixel. The clouds are a smooth random field
-in the picture, drawn in image widths, so that another image size shows the same smoke.
+In: settings and a time. Out: the fraction of smoke in every pixel. The clouds are a smooth random field in units of the
+image width: every image size shows the same smoke.
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ from endotsr.simulator.surface import smooth_step
 from endotsr.simulator.texture import SPLINE_DEVIATION, spline_basis
 
 GREY = np.array([0.50, 0.50, 0.53])  # linear light of dense smoke
-CONTRAST = 1.5  # of the clouds, deviations of the field
-RISE, FALL = 0.25, 0.35  # fraction of its time in which the smoke comes and goes
+CONTRAST = 1.5  # of the clouds, in standard deviations of the field
+RISE, FALL = 0.25, 0.35  # fractions of its time during which the smoke rises and clears
 TURNS = 2.0  # changes of shape during the sequence
 
 
@@ -24,7 +24,7 @@ def with_smoke(settings: SimulatorSettings, light: FloatArray, t: float) -> Floa
 
 
 def smoke_fraction(settings: SimulatorSettings, t: float) -> FloatArray:
-    """The fraction of the light that smoke replaces, (H, W), at most the density."""
+    """The fraction of the light replaced by smoke, (H, W), at most the density."""
     part = settings.smoke
     if not part.start < t < part.stop:
         return np.zeros((settings.height, settings.width))
@@ -36,7 +36,7 @@ def smoke_fraction(settings: SimulatorSettings, t: float) -> FloatArray:
 
 
 def clouds(settings: SimulatorSettings, t: float, which: int) -> FloatArray:
-    """A smooth random field (H, W) of deviation about 1, drifted to time t."""
+    """A smooth random field (H, W) with standard deviation about 1, shifted by the drift to time t."""
     part = settings.smoke
     rng = np.random.default_rng([settings.seed, 6, which])
     way = abs(part.drift)

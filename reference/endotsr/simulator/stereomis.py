@@ -1,4 +1,4 @@
-"""A simulated scene as a raw recording in the layout of StereoMIS, with the truth beside it.
+"""A simulated scene as a raw recording in the layout of StereoMIS, with its ground truth.
 
     simulated.mp4             left picture over right, one pair per frame
     StereoCalibration.ini     both cameras, OpenCV's convention; R and T of x_right = R x_left + T, millimetres
@@ -6,8 +6,8 @@
     masks/000123l.png         of the left picture, any value above 0 = tissue; only where there are instruments
     truth/                    see truth.py
 
-In: settings. Out: files, one frame at a time. The cameras are an ideal pair: without distortion, rectified already. The
-video is compressed as real recordings are, or without loss; then its pictures are those of `write_sequence`.
+In: settings. Out: files, one frame at a time. The cameras form an ideal pair, rectified and without distortion. The
+video is compressed like real recordings, or lossless; a lossless video has the pictures of `write_sequence`.
 """
 
 from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ METRE = 1000.0  # millimetres
 
 
 def check_recording(settings: SimulatorSettings) -> None:
-    """Raises InputError for settings that cannot become such a recording; nothing is rendered."""
+    """Raises InputError for settings that cannot become such a recording. Nothing is rendered."""
     if not settings.stereo.on:
         raise InputError("simulator: stereo.on = False does not fit the layout stereomis; allowed: True")
     if settings.width % 2:
@@ -49,7 +49,7 @@ def write_recording(
 ) -> None:
     """Write a recording and its truth into an existing, empty folder. `on_frame` is called after every frame.
 
-    lossless  a video without loss, which is about ten times as large
+    lossless  a lossless video, about ten times as large
 
     Raises:  InputError as `check_recording` does, or where the settings fold the tissue over itself.
     """
@@ -63,7 +63,7 @@ def write_recording(
 
 
 def _stacked(folder: Path, scene: SimulatedScene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:
-    """The pictures of the video, (2H, W, 3) uint8; masks and truth are written on the way."""
+    """The pictures of the video, (2H, W, 3) uint8. Masks and truth are written at the same time."""
     from endotsr.opencv import write_png
 
     masked = bool(graspers(scene.settings))
@@ -78,7 +78,7 @@ def _stacked(folder: Path, scene: SimulatedScene, name: str, on_frame: Callable[
 
 
 def calibration_text(scene: SimulatedScene) -> str:
-    """The ini file. Its principal point counts from the centre of the first pixel, as OpenCV's does."""
+    """The ini file. Its principal point is relative to the centre of the first pixel, as in OpenCV."""
     camera = scene.cameras[0]
     numbers = {
         "res_x": camera.width, "res_y": camera.height, "fc_x": camera.fx, "fc_y": camera.fy,
@@ -93,7 +93,7 @@ def calibration_text(scene: SimulatedScene) -> str:
 
 
 def trajectory_text(scene: SimulatedScene) -> str:
-    """One line a frame, with all digits."""
+    """One line per frame, at full precision."""
     from scipy.spatial.transform import Rotation
 
     lines = []

@@ -1,12 +1,12 @@
-"""The tissue sheet as a formula: the position of every material point over time.
+"""The tissue sheet as a formula for the position of every material point over time.
 
-A material point has two coordinates (a, b) in millimetres. At rest it lies at (a, b, distance + h(a, b)); at time t at
+A material point has two coordinates (a, b) in millimetres. Its position at time t is
 
     X(a, b, t) = (a, b, distance + h(a, b)) + sum_k s_k(t) w_k(a, b) v_k
 
-with a wave h, and for every motion k a time course s_k (0 at t = 0), a spatial weight w_k and a direction v_k. A slit
-adds the parting of its two sides (slit.py). World axes are those of the resting camera: x right, y down, z forward.
-Because X and its derivatives with respect to a and b are formulas, the geometry is known to rounding.
+with waves h, and for every motion k a time course s_k (0 at t = 0), a spatial weight w_k and a direction v_k. A slit
+adds the parting of its two sides (slit.py). World axes are the axes of the camera at rest: x right, y down, z forward.
+X and its derivatives with respect to a and b are closed formulas: the geometry is exact to rounding.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ Weight = Callable[
     [FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
 ]  # (a, b) -> weight, its derivatives with respect to a and b
 
-PULSATION_CENTRE = (-0.2, 0.1)  # of the regions that beat and are pulled, distances of the camera
+PULSATION_CENTRE = (-0.2, 0.1)  # centres of the beating and the pulled region, in camera distances
 PULL_CENTRE = (0.06, 0.04)
 
 
@@ -46,7 +46,7 @@ class Surface(NamedTuple):
 
 
 def make_surface(settings: SimulatorSettings) -> Surface:
-    """The sheet and the motions that are switched on. The folds depend on the seed, the motions do not."""
+    """The sheet and the active motions. Only the folds depend on the seed."""
     rng = np.random.default_rng([settings.seed, 0])
     wavelength = np.array([42.0, 31.0, 22.0, 15.0, 11.0])  # mm
     height = np.array([2.6, 1.4, 0.7, 0.25, 0.12])  # mm; the slopes add up to 1.05 at most

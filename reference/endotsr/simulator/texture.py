@@ -1,7 +1,7 @@
-"""The appearance of the tissue: colour and fine relief over material coordinates, as one tabulated map.
+"""The appearance of the tissue: colour and fine relief over material coordinates, in one tabulated map.
 
-The map is made from smooth random fields (cubic B-splines over a lattice in millimetres) and random vessel trees. All
-random numbers are drawn per millimetre, not per pixel: a larger image samples the same tissue more finely.
+The map combines smooth random fields (cubic B-splines over a lattice in millimetres) and random vessel trees. Random
+numbers are drawn per millimetre, not per pixel: a larger image samples the same tissue more finely.
 """
 
 from typing import NamedTuple, cast
@@ -19,23 +19,23 @@ FAT = np.array([0.85, 0.62, 0.28])
 ARTERY = np.array([0.42, 0.03, 0.03])
 VEIN = np.array([0.26, 0.05, 0.10])
 FINEST_STEP = 0.08  # mm; half the radius of the thinnest vessel
-SPLINE_DEVIATION = 0.479  # of a cubic B-spline field over independent unit normals, two dimensions
+SPLINE_DEVIATION = 0.479  # standard deviation of a two-dimensional cubic B-spline field with unit normal weights
 
 
 class Texture(NamedTuple):
-    """Maps over material coordinates, sampled bilinearly. Outside, the border value holds."""
+    """Maps over material coordinates, sampled bilinearly. Outside the maps, the border value is used."""
 
-    values: NDArray[np.float32]  # (rows, columns, 5) linear RGB reflectance, relief slope by a and by b
+    values: NDArray[np.float32]  # (rows, columns, 5) linear RGB reflectance; relief slopes along a and b
     origin: tuple[float, float]  # material coordinates (a, b) of texel [0, 0], mm
     step: tuple[float, float]  # mm per texel along a and b
 
 
 def make_texture(settings: SimulatorSettings) -> Texture:
-    """The texture of the part of the sheet that the camera can see, with a margin for motion."""
+    """The texture of the part of the sheet in view, with a margin for motion."""
     pixel = settings.distance / (settings.focal * settings.width)
     step = max(0.5 * pixel, FINEST_STEP)
     half_a, half_b = half_extent(settings)
-    # linspace: the ends, and with them all random draws, are the same for every image size
+    # linspace: the ends, hence all random numbers, are the same for every image size
     a = np.linspace(-half_a, half_a, round(2 * half_a / step) + 1)
     b = np.linspace(-half_b, half_b, round(2 * half_b / step) + 1)
     rng = np.random.default_rng([settings.seed, 1])
@@ -46,7 +46,7 @@ def make_texture(settings: SimulatorSettings) -> Texture:
 
 
 def half_extent(settings: SimulatorSettings) -> tuple[float, float]:
-    """The texture reaches this far to each side of the middle, along a and b, mm."""
+    """Half the extent of the texture along a and b, mm."""
     pixel = settings.distance / (settings.focal * settings.width)
     return 0.5 * settings.width * pixel * 1.2 + 8.0, 0.5 * settings.height * pixel * 1.2 + 8.0
 
@@ -61,7 +61,7 @@ def sample(texture: Texture, material: FloatArray) -> FloatArray:
 def _sample_kernel(
     values: FloatArray, origin: tuple[float, float], step: tuple[float, float], material: FloatArray, out: FloatArray
 ) -> None:
-    """Fill `out` pixel by pixel. Compiled, because a picture with motion blur samples the maps a dozen times."""
+    """Fill `out` pixel by pixel. Compiled, because motion blur samples the maps a dozen times per picture."""
     rows, columns, maps = values.shape
     for i in range(material.shape[1]):
         for j in range(material.shape[2]):
@@ -94,7 +94,7 @@ def _colour(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> FloatArra
 
 
 def _fine_relief(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the fine relief of the wet surface. They change the normal of highlights only, never the geometry."""
+    """Slopes of the fine relief of the wet surface. They affect only the normals of highlights, not the geometry."""
     slope_a, slope_b = np.zeros((len(b), len(a))), np.zeros((len(b), len(a)))
     for spacing, slope in ((5.0, 0.20), (2.2, 0.14), (0.9, 0.05)):
         da, db = _field_slopes(a, b, rng, spacing)
@@ -104,7 +104,7 @@ def _fine_relief(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> tupl
 
 
 def _field(a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: float) -> FloatArray:
-    """A smooth random field (rows, columns) of deviation about 1 with features of `spacing` mm."""
+    """A smooth random field (rows, columns) with standard deviation about 1 and features of `spacing` mm."""
     over_a, over_b = spline_basis(a, spacing)[0], spline_basis(b, spacing)[0]
     return over_b @ _lattice(rng, over_a, over_b) @ over_a.T
 
@@ -112,7 +112,7 @@ def _field(a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: floa
 def _field_slopes(
     a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of such a field by a and by b, per mm."""
+    """Derivatives of such a field with respect to a and b, per mm."""
     over_a, slope_a = spline_basis(a, spacing)
     over_b, slope_b = spline_basis(b, spacing)
     lattice = _lattice(rng, over_a, over_b)
@@ -124,7 +124,8 @@ def _lattice(rng: np.random.Generator, over_a: FloatArray, over_b: FloatArray) -
 
 
 def spline_basis(x: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
-    """Cubic B-splines on knots of `spacing` that cover x, and their derivatives: two (len(x), knots) matrices."""
+    """Cubic B-splines on knots of spacing `spacing` that cover x, and their derivatives: two (len(x), knots)
+    matrices."""
     position = (x - x[0]) / spacing
     distance = position[:, None] - np.arange(-1, int(position[-1]) + 3)
     r = np.abs(distance)

@@ -1,8 +1,8 @@
-"""True trajectories of material points: where a piece of tissue is at every frame time, in world and picture.
+"""True trajectories of material points: world and image positions at every frame time.
 
-In: a `SimulatedSequence` and material coordinates in millimetres, for example those seen at chosen pixels of a frame
-(`material_at`). Out: `MaterialTracks`. World axes are those of the simulator: x right, y down, z forward of the resting
-camera, in millimetres. The positions are the formula of the surface, without interpolation.
+In: a `SimulatedSequence` and material coordinates in millimetres, for example at chosen pixels of a frame
+(`material_at`). Out: `MaterialTracks`. World axes are the axes of the camera at rest: x right, y down, z forward, in
+millimetres. Positions come from the formula of the surface, without interpolation.
 """
 
 from typing import NamedTuple
@@ -30,11 +30,11 @@ class MaterialTracks(NamedTuple):
 def material_at(simulated: SimulatedSequence, pixel: FloatArray, frame: int = 0) -> FloatArray:
     """Material coordinates of the tissue at image positions of one frame.
 
-    pixel    (2, P) px, x first; the centre of the first pixel is (0.5, 0.5); positions outside the picture are allowed
+    pixel    (2, P) px, x first; the first pixel centre is (0.5, 0.5); positions outside the picture are allowed
     frame    index of the frame; frame 0 shows the tissue at rest
-    returns  (2, P) mm. Behind an instrument they are those of the hidden tissue; NaN in the wound of a slit.
+    returns  (2, P) mm; of the hidden tissue behind an instrument; NaN in the wound of a slit
 
-    Raises:  IndexError for a frame that the sequence does not have; InputError where the ray misses the tissue.
+    Raises:  IndexError for a frame outside the sequence; InputError if a ray misses the tissue.
     """
     sequence = simulated.sequence
     if not 0 <= frame < sequence.count:
@@ -47,9 +47,9 @@ def material_at(simulated: SimulatedSequence, pixel: FloatArray, frame: int = 0)
 
 
 def material_tracks(simulated: SimulatedSequence, material: FloatArray) -> MaterialTracks:
-    """The trajectories of material points (2, P), mm, at the times of all frames.
+    """The trajectories of material points (2, P), mm, at all frame times.
 
-    Edges:   no point gives arrays without points. A point behind the camera is not visible, and its pixel is NaN.
+    Edges:   P = 0 gives empty arrays. A point behind the camera is not visible, and its pixel is NaN.
     """
     sequence, truth = simulated.sequence, simulated.truth
     tracks = empty_tracks(material, sequence.count)
@@ -70,7 +70,7 @@ def empty_tracks(material: FloatArray, count: int) -> MaterialTracks:
 def follow(
     tracks: MaterialTracks, i: int, surface: Surface, camera: Camera, t: float, covered: NDArray[np.bool_]
 ) -> None:
-    """Fill frame i of the tracks. covered (H, W): the pixels that an instrument covers."""
+    """Fill frame i of the tracks. covered (H, W): pixels covered by an instrument."""
     tracks.position[i] = surface_point(surface, tracks.material, t)
     found = pixel_of(camera, tracks.position[i])
     tracks.pixel[i], tracks.depth[i] = found[:2], found[2]
@@ -78,7 +78,7 @@ def follow(
 
 
 def _visible(pixel: FloatArray, covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether image positions lie in the picture and on a pixel that no instrument covers. The sheet hides nothing."""
+    """Whether image positions are in the picture and not covered by an instrument. The sheet never occludes itself."""
     height, width = covered.shape
     x, y = pixel
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)

@@ -1,4 +1,4 @@
-"""The truth of a simulated scene in files, written and read: the folder `truth` inside a sequence folder.
+"""Writing and reading the truth of a simulated scene: the folder `truth` inside a sequence folder.
 
     truth.json          format, scene, unit, and the settings, from which all of this can be made again
     light.npz           times (n,); gain (n, 3) of the camera in linear light; its Fourier content over cycles (K,):
@@ -8,8 +8,8 @@
     frames/000000.npz   depth (H, W) and material (2, H, W) mm, float32, NaN in the wound of a slit; highlight (H, W)
     instrument/*.png    255 = an instrument covers the pixel, margin not included
 
-Lengths are in mm, image positions in px with the first pixel centre at (0.5, 0.5). Numbers and names in the files are
-user input: `read_truth` checks them and raises an `InputError` that names file and key.
+Lengths are in mm, image positions in px with the first pixel centre at (0.5, 0.5). The files are user input:
+`read_truth` checks them and raises an `InputError` that names file and key.
 """
 
 import json
@@ -42,17 +42,15 @@ MAY_BE_NAN = ("pixel", "position", "material")
 class FrameTruth(NamedTuple):
     """The truth of one frame."""
 
-    depth: NDArray[
-        np.float32
-    ]  # (H, W)    view-space z of the tissue, mm; behind an instrument that of the hidden tissue
+    depth: NDArray[np.float32]  # (H, W)    view-space z of the tissue, mm, including tissue hidden by an instrument
     material: NDArray[np.float32]  # (2, H, W) material coordinates at the pixel centre, mm; NaN in the wound of a slit
-    highlight: NDArray[np.float32]  # (H, W)    linear light of the highlights on the tissue, 0 without any
-    instrument: BoolArray  # (H, W)    pixels that an instrument covers
+    highlight: NDArray[np.float32]  # (H, W)    linear light of the highlights on the tissue; 0 if they are off
+    instrument: BoolArray  # (H, W)    pixels covered by an instrument
 
 
 @dataclass(frozen=True, eq=False)
 class SceneTruth:
-    """The truth of a scene. The frames are read one at a time by `frame`."""
+    """The truth of a scene. `frame` reads one frame at a time."""
 
     folder: Path
     scene: str  # the name that was asked for, or the list of effects
@@ -81,7 +79,7 @@ class SceneTruth:
 
 
 def write_frame(folder: Path, i: int, frame: SimulatedFrame) -> None:
-    """The truth of one frame; the folders `frames` and `instrument` exist."""
+    """Write the truth of one frame. The folders `frames` and `instrument` must exist."""
     from endotsr.opencv import write_png
 
     highlight = np.zeros(frame.depth.shape) if frame.highlight is None else frame.highlight
@@ -95,7 +93,7 @@ def write_frame(folder: Path, i: int, frame: SimulatedFrame) -> None:
 
 
 def write_scene(folder: Path, scene: SimulatedScene, name: str, tracks: MaterialTracks, light: FloatArray) -> None:
-    """All that does not belong to one frame."""
+    """Write the truth that is not specific to a frame."""
     settings = scene.settings
     gain = gain_series(settings, scene.times)
     spectrum = gain_spectrum(gain)
@@ -115,14 +113,14 @@ def write_scene(folder: Path, scene: SimulatedScene, name: str, tracks: Material
 
 
 def noise_sigma(settings: SimulatorSettings) -> float:
-    """Standard deviation of the sensor noise, display units; rounding to 8 bits comes on top."""
+    """Standard deviation of the sensor noise, display units, without the rounding to 8 bits."""
     return settings.noise.sigma if settings.noise.on else 0.0
 
 
 def read_truth(sequence: Path) -> SceneTruth:
-    """The truth of a sequence folder that `endotsr simulate` wrote.
+    """The truth of a sequence folder written by `endotsr simulate`.
 
-    Raises:  InputError if there is none, or if a file is missing, damaged, or does not fit the others.
+    Raises:  InputError without truth, or if a file is missing, damaged or inconsistent with the others.
     """
     folder = Path(sequence) / TRUTH
     name, settings = _record(folder / "truth.json")
@@ -153,7 +151,7 @@ def _record(path: Path) -> tuple[str, SimulatorSettings]:
 
 
 def _arrays(path: Path, shapes: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
-    """The arrays of a file, with checked names, shapes, kinds and finite numbers. A length "P" is any, once."""
+    """The arrays of a file, checked for names, shapes, types and finite values. "P" is an arbitrary common length."""
     found = read_npz(path, shapes, LARGEST_FILE)
     free: int | None = None
     for name, expected in shapes.items():

@@ -1,7 +1,7 @@
-"""The view of the sheet from a camera: the material point that every ray meets, its position, normal and depth.
+"""The view of the sheet from a camera: for every ray the material point it meets, with position, normal and depth.
 
-In: a surface, a camera, a time. Out: a `SurfaceView`, solved by Newton's method to 1e-10 mm beside the ray. With an
-open slit a ray meets one side of it, the other side, or the wound between them.
+In: a surface, a camera, a time. Out: a `SurfaceView`, solved by Newton's method to 1e-10 mm from the ray. With an open
+slit, a ray meets one of its sides or the wound between them.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from endotsr.splatting.camera import Camera
 Formula = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 # (p, q) -> position, its derivatives with respect to p and q, each (3, ...)
 
-RESIDUAL_TOLERANCE = 1e-10  # mm, beside the ray
+RESIDUAL_TOLERANCE = 1e-10  # distance from the ray, mm
 MOST_STEPS = 30
 BLOCK_PIXELS = 16384
 
@@ -26,7 +26,7 @@ BLOCK_PIXELS = 16384
 class SurfaceView(NamedTuple):
     """The part of the sheet that a camera sees, per pixel."""
 
-    material: FloatArray  # (2, H, W) material coordinates a, b, mm; in the wound those of the nearest edge point
+    material: FloatArray  # (2, H, W) material coordinates a, b, mm; in the wound, of the nearest edge point
     point: FloatArray  # (3, H, W) world position, mm
     normal: FloatArray  # (3, H, W) unit normal, towards the camera
     depth: FloatArray  # (H, W) view-space z, mm
@@ -36,11 +36,11 @@ class SurfaceView(NamedTuple):
 def see(surface: Surface, camera: Camera, t: float) -> SurfaceView:
     """Intersect every pixel's ray with the sheet by Newton's method on the material coordinates.
 
-    Solved is X_c - p_x Z_c = 0, Y_c - p_y Z_c = 0 in (a, b), with the camera position (X_c, Y_c, Z_c) of X(a, b, t) and
-    the ray (p_x, p_y, 1) through the pixel centre. The start is the plane z = distance, the same for every call, so
+    The equations X_c - p_x Z_c = 0, Y_c - p_y Z_c = 0 are solved for (a, b), where (X_c, Y_c, Z_c) is X(a, b, t) in
+    camera axes and (p_x, p_y, 1) is the ray through the pixel centre. Every solution starts on the plane z = distance:
     equal inputs give bitwise equal views.
 
-    Raises:  InputError if a ray has no solution or meets the back of the sheet: the settings fold the sheet over.
+    Raises:  InputError if a ray has no solution or meets the back of the sheet, because the settings fold the sheet.
     """
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
@@ -59,7 +59,7 @@ def see(surface: Surface, camera: Camera, t: float) -> SurfaceView:
 
 
 def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
-    """The view along chosen rays (ray_x, ray_y, 1) in camera axes, each array of one shape. Raises as `see` does."""
+    """The view along rays (ray_x, ray_y, 1) in camera axes; both arrays have the same shape. Raises as `see` does."""
     if surface.slit is not None and is_open(surface.slit, t):
         return _see_cut(surface, camera, t, ray_x, ray_y)
     return see_side(surface, camera, t, ray_x, ray_y)
@@ -68,7 +68,8 @@ def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_
 def see_side(
     surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray, side: FloatArray | None = None
 ) -> SurfaceView:
-    """The view of the sheet alone, in which the side of an open slit is given for every ray and continues beyond it."""
+    """The view of the sheet alone. `side` fixes the side of an open slit for every ray; the side continues beyond its
+    edge."""
     start = _start(surface, camera, ray_x, ray_y)
     return _meet(lambda a, b: evaluate(surface, a, b, t, side), camera, t, ray_x, ray_y, start)
 
@@ -76,9 +77,9 @@ def see_side(
 def see_wound(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
     """The view of the wound of an open slit along rays that pass between its edges.
 
-    The wound is the groove between the two edges: at x along and y across the slit it lies at
-    X(x) + y across + depth (w^2 - y^2) / h^2 in z, where X(x) is the point of the line, moved by everything but the
-    slit, w the half width of the slit at x and h the largest half width.
+    The wound is a groove between the two edges. Its point at x along and y across the slit is X(x) + y across + depth
+    (w^2 - y^2) / h^2 in z, where X(x) is the point of the line, moved by all motions except the slit, w is the half
+    width of the slit at x and h the largest half width.
     """
     slit = surface.slit
     assert slit is not None
@@ -106,9 +107,10 @@ def see_wound(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray
 
 
 def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
-    """The view along rays with an open slit: the side on which each ray begins, else the other one, else the wound.
+    """The view along rays with an open slit: on the initial side of each ray, else on the other side, else in the
+    wound.
 
-    The two sides cover different parts of the picture, so that a solution on the side it was sought on is the only one.
+    The two sides cover different parts of the picture. A solution on the assumed side is therefore unique.
     """
     slit = surface.slit
     assert slit is not None
@@ -128,7 +130,7 @@ def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_
 
 
 def view_of_points(surface: Surface, camera: Camera, material: FloatArray, t: float) -> SurfaceView:
-    """The view of given material points (2, P), as a picture of one row, whether or not the camera sees them."""
+    """The view of given material points (2, P), visible or not, as a picture with one row."""
     a, b = material[:, None]
     point, along_a, along_b = evaluate(surface, a, b, t)
     normal = np.stack(_cross(along_b, along_a))
@@ -137,7 +139,7 @@ def view_of_points(surface: Surface, camera: Camera, material: FloatArray, t: fl
 
 
 def put(view: SurfaceView, where: BoolArray, other: SurfaceView) -> None:
-    """Overwrite the chosen pixels of a view by those of another, in place."""
+    """Overwrite the chosen pixels of a view with those of another, in place."""
     for target, source in zip(view, other):
         if target is not None:
             target[..., where] = source
@@ -151,7 +153,8 @@ def _meet(
     ray_y: FloatArray,
     start: tuple[FloatArray, FloatArray],
 ) -> SurfaceView:
-    """The points of a surface, given as a formula of two coordinates, that rays meet. `material` holds those two."""
+    """The points where rays meet a surface that is a formula of two coordinates; `material` contains these
+    coordinates."""
     a, b = start
     for _ in range(MOST_STEPS):
         point, along_a, along_b = formula(a, b)
@@ -189,7 +192,7 @@ def pixel_of(camera: Camera, point: FloatArray) -> FloatArray:
 
 
 def _start(surface: Surface, camera: Camera, ray_x: FloatArray, ray_y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Material coordinates at which the rays meet the plane z = distance."""
+    """Material coordinates where the rays meet the plane z = distance."""
     direction = rotate(camera.rotation.T, np.stack([ray_x, ray_y, np.ones_like(ray_x)]))
     centre = -camera.rotation.T @ camera.translation
     length = (surface.distance - centre[2]) / direction[2]
@@ -197,7 +200,7 @@ def _start(surface: Surface, camera: Camera, ray_x: FloatArray, ray_y: FloatArra
 
 
 def rotate(rotation: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Vectors (3, ...) turned by a matrix; the identity returns them as they are."""
+    """Vectors (3, ...) rotated by a matrix. The identity returns them unchanged."""
     if np.array_equal(rotation, np.eye(3)):  # the static camera: nothing to do
         return vectors
     x, y, z = vectors

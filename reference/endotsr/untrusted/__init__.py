@@ -1,12 +1,12 @@
-"""What comes from a file is untrusted: it passes one of these modules before anything else reads it.
+"""File content is untrusted. It passes through one of these modules before any other code reads it.
 
-names    names and lines of text that become a path, or that a terminal shows
-files    opening and reading: regular files alone, up to a stated size
-json     JSON objects without NaN; lists of numbers within their range
-arrays   .npy and .npz without pickle, no larger than the file that holds them
-writing  files and folders that appear whole, under names that nobody can put a link at
-png      PNG files whose pixels are all there, without chunks that the pixels do not need
+names    names that become paths, and text that a terminal displays
+files    opening and reading: regular files only, up to a given size
+json     JSON objects without NaN; numbers and lists checked for type and range
+arrays   .npy and .npz without pickle, using no more memory than the file
+writing  atomic writing of files and folders, under unpredictable temporary names
+png      complete PNG files, reduced to the chunks that define the pixels
 
-Every refusal is an `InputError` of one line that names the file, the reason and what is allowed. These modules know
-nothing of sequences, runs or models: their callers say what a number may be.
+Every refusal is an `InputError` of one line that names the file, the reason and the allowed values. These modules do
+not depend on sequences, runs or models. Callers state the allowed range of a number.
 """

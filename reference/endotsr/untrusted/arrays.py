@@ -1,7 +1,7 @@
-"""Arrays from .npy and .npz files: plain numbers, never pickled objects, never more memory than the file has bytes.
+"""Arrays from .npy and .npz files: plain numbers only, no pickled objects, no more memory than the file has bytes.
 
-A header that promises another size than the file has is refused before anything is allocated. The entries of an .npz
-must be stored without compression unless the caller allows it, so that a small file cannot become a large array.
+A header whose size contradicts the file size is refused before any allocation. Entries of an .npz must be uncompressed
+unless the caller allows compression: a small file cannot become a large array.
 """
 
 import ast
@@ -25,16 +25,16 @@ from endotsr.untrusted.names import plain_line
 LONGEST_HEADER = 4096  # bytes of the header of an array
 WRITTEN_BY_PYTHON_2 = re.compile(r"(?<=\d)L\b")  # after an integer
 MOST_AXES = 8
-NUMBERS = "biuf"  # kinds of NumPy: truth values, integers, unsigned integers, floating-point numbers
+NUMBERS = "biuf"  # NumPy kinds: Boolean, signed, unsigned and floating-point numbers
 DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, NotImplementedError, RuntimeError, KeyError)
 
 
 class RefusedArray(ValueError):
-    """Data that is no array of plain numbers; the message states the reason."""
+    """The data is not an array of plain numbers; the message states the reason."""
 
 
 def read_npy(path: Path, largest: int) -> NDArray:
-    """The array of an .npy file. Raises InputError if it holds anything but one array of plain numbers."""
+    """The array of an .npy file. Raises InputError for anything but one array of plain numbers."""
     with open_regular(path, largest) as file:
         length = file.seek(0, io.SEEK_END)
         file.seek(0)
@@ -45,7 +45,7 @@ def read_npy(path: Path, largest: int) -> NDArray:
 
 
 def array_from(file: io.BufferedIOBase, length: int) -> NDArray:
-    """One array in .npy form that fills the next `length` bytes of a stream. Raises RefusedArray."""
+    """One array in .npy format that fills the next `length` bytes of a stream. Raises RefusedArray."""
     shape, fortran, dtype, start = _header(file)
     size = math.prod(shape) * dtype.itemsize
     if size != length - start:
@@ -58,7 +58,7 @@ def array_from(file: io.BufferedIOBase, length: int) -> NDArray:
 
 
 def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, int]:
-    """Shape, order, dtype and length in bytes of the header of an array."""
+    """Shape, order and dtype from the header of an array, and the length of the header in bytes."""
     start = file.read(8)
     if start[:6] != npy.MAGIC_PREFIX:
         raise RefusedArray("not an .npy file")
@@ -86,15 +86,15 @@ def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, i
 
 
 def _entries(header: str) -> tuple[tuple[int, ...], bool, np.dtype]:
-    """Shape, order and dtype from the text of a header, a literal of Python.
+    """Shape, order and dtype from the text of a header, which is a Python literal.
 
-    NumPy's own reader splits a header that is no literal into words, which takes seconds for one of 4096 bytes.
+    NumPy's own reader tokenises an invalid header, which takes seconds for 4096 bytes.
     """
     try:
         found = ast.literal_eval(WRITTEN_BY_PYTHON_2.sub("", header).strip())
         shape, fortran, name = (found[key] for key in ("shape", "fortran_order", "descr"))
         dtype = np.dtype(name)
-    except Exception as error:  # whatever the literal, or the name of a type, makes Python raise
+    except Exception as error:  # any error that the literal or a dtype name causes
         raise RefusedArray(f"its header cannot be read: {plain_line(str(error)) or 'damaged'}") from None
     if not isinstance(shape, tuple) or any(type(side) is not int for side in shape) or type(fortran) is not bool:
         raise RefusedArray(
@@ -104,7 +104,7 @@ def _entries(header: str) -> tuple[tuple[int, ...], bool, np.dtype]:
 
 
 class NpzFile:
-    """The arrays of an open .npz file, read one by one. Made by `open_npz`."""
+    """The arrays of an open .npz file, read one at a time. Created by `open_npz`."""
 
     def __init__(self, archive: zipfile.ZipFile) -> None:
         self._archive = archive
@@ -112,7 +112,7 @@ class NpzFile:
 
     @property
     def names(self) -> list[str]:
-        """Names of the arrays, in the order of the file."""
+        """Array names, in file order."""
         return list(self._entries)
 
     def read(self, name: str) -> NDArray:
@@ -129,13 +129,13 @@ class NpzFile:
 
 @contextmanager
 def open_npz(path: Path, largest: int, *, compressed: bool = False) -> Iterator[NpzFile]:
-    """An .npz file for reading.
+    """An .npz file, opened for reading.
 
-    largest      bytes of the file, and of all its arrays together
+    largest      upper limit in bytes, for the file and for the sum of its arrays
     compressed   allow compressed entries
 
-    Raises: InputError if it is no .npz file, if an entry is not an .npy file, is listed twice, or is compressed, or if
-            the arrays together are larger than `largest`.
+    Raises: InputError if it is not an .npz file, if an entry is listed twice, encrypted or (unless allowed) compressed,
+            or if the arrays together exceed `largest`.
     """
     with open_regular(path, largest) as file:
         try:
@@ -148,9 +148,9 @@ def open_npz(path: Path, largest: int, *, compressed: bool = False) -> Iterator[
 
 
 def read_npz(path: Path, names: Collection[str], largest: int) -> dict[str, NDArray]:
-    """The arrays with these names, which may be compressed; those that the file lacks are left out.
+    """The arrays with these names; missing ones are omitted. Compression is allowed.
 
-    Raises: InputError as `open_npz` does, and naming an array that is damaged or holds anything but plain numbers.
+    Raises: InputError as `open_npz` does, and for an array that is damaged or is not plain numbers, naming it.
     """
     found, name = {}, ""
     with open_npz(path, largest, compressed=True) as file:

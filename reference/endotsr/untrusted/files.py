@@ -1,8 +1,8 @@
-"""Opening and reading of files that another program or person made, and renaming where another program reads.
+"""Opening and reading files of unknown origin, and renaming files that another program may be reading.
 
-Only regular files are opened: a named pipe would block the command for ever, and a device may never end. Reading is
-bounded by a size that the caller states. It happens in the calling thread, or in threads that do not keep the process
-alive (`in_threads`), so that Ctrl-C ends a command while a file system does not answer.
+Only regular files are opened: a named pipe would block the command indefinitely, and a device may never end. The caller
+limits the size. Reading happens in the calling thread or in daemon threads (`in_threads`): Ctrl-C ends a command even
+while a file system does not respond.
 """
 
 import io
@@ -18,8 +18,8 @@ from endotsr.errors import InputError
 
 LARGEST_TEXT = 1 << 26  # bytes of a settings or record file: 64 MiB
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192
-PATIENCE = 2.0  # seconds that a file which another program has open is waited for, on Windows
-MOST_READERS = 8  # threads that read files at the same time
+PATIENCE = 2.0  # seconds to wait for a file that another program has open, on Windows
+MOST_READERS = 8  # concurrent reader threads
 KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a named pipe",
@@ -30,15 +30,15 @@ KINDS = {
 
 
 def open_regular(path: Path, largest: int) -> io.BufferedReader:
-    """A regular file, opened for reading as bytes; a link to one is followed.
+    """A regular file, opened for reading bytes. Links are followed.
 
-    largest   bytes that the file may have
+    largest   size limit, bytes
 
-    Raises: InputError if there is none, if it is a pipe, a socket, a device or a folder, or if it is larger.
+    Raises: InputError for a missing file, a pipe, a socket, a device, a folder, or a file over the limit.
     """
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
     try:
-        _check_regular(path, os.stat(path).st_mode)  # before opening: the opening alone can change a device
+        _check_regular(path, os.stat(path).st_mode)  # before opening: opening alone can change a device
         descriptor = os.open(path, flags)
     except (OSError, ValueError) as error:
         raise _refusal(path, error) from None
@@ -59,7 +59,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
     with open_regular(path, largest) as file:
         try:
             size = os.fstat(file.fileno()).st_size
-            data = file.read(size + 1)  # no more memory than the file needs
+            data = file.read(size + 1)  # allocates no more than the file size
         except OSError as error:
             raise _refusal(path, error) from None
     if len(data) > size:
@@ -68,7 +68,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
 
 
 def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
-    """The content of a regular file as UTF-8; a byte-order mark at its start is left out.
+    """The content of a regular UTF-8 file, without a byte-order mark.
 
     Raises: InputError as `read_bytes` does, and if the bytes are not UTF-8.
     """
@@ -79,9 +79,9 @@ def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
 
 
 def rename(source: Path, target: Path) -> None:
-    """Put a file or folder in the place of another, as `os.replace`.
+    """Rename a file or folder, replacing the target, as `os.replace`.
 
-    Windows refuses that while a program has one of the two open, a virus scanner or a viewer say: it is tried again.
+    Windows refuses while another program, such as a virus scanner, has either one open. The call is then retried.
     Raises: OSError of the file system.
     """
     ends = time.monotonic() + (PATIENCE if os.name == "nt" else 0.0)
@@ -101,17 +101,17 @@ def _check_regular(path: Path, mode: int) -> None:
 
 
 def _refusal(path: Path, error: OSError | ValueError) -> InputError:
-    """InputError for an error of the file system, or for a path that holds a zero byte (ValueError)."""
+    """InputError for a file-system error, or for a path with a zero byte (ValueError)."""
     if isinstance(error, InputError):
         return error
     return InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}")
 
 
 def in_threads(work: Callable[[int], object], count: int) -> None:
-    """Call work(0) ... work(count - 1) in several threads and wait for all of them.
+    """Call work(0) ... work(count - 1) in several threads and wait for all calls.
 
-    The threads end with the process: KeyboardInterrupt leaves them behind, whatever they wait for.
-    Raises: the error of the smallest index that raised one, after all calls have ended.
+    The threads are daemons: KeyboardInterrupt does not wait for them. Raises: the error with the smallest index, after
+    all calls have ended.
     """
     todo: Iterator[int] = iter(range(count))  # of a range: `next` is atomic
     done: SimpleQueue[tuple[int, BaseException | None]] = SimpleQueue()

@@ -1,4 +1,4 @@
-"""JSON from a file: objects without NaN, the numbers in them, and the types that structures of them are made of."""
+"""JSON from a file: objects without NaN, checks of single values, and the types of structures."""
 
 import json
 import math
@@ -22,7 +22,7 @@ Structure = TypeVar("Structure")
 
 
 def read_json(path: Path, largest: int = LARGEST_TEXT) -> dict[str, Any]:
-    """The JSON object of a file. Raises InputError if the file cannot be read or holds anything else, NaN included."""
+    """The JSON object of a file. Raises InputError for an unreadable file and for any other content, including NaN."""
     data = parsed(read_text(path, largest), str(path))
     if not isinstance(data, dict):
         raise InputError(f"{path}: holds {type(data).__name__}; allowed: an object with keys, as the run wrote it")
@@ -30,10 +30,10 @@ def read_json(path: Path, largest: int = LARGEST_TEXT) -> dict[str, Any]:
 
 
 def parsed(text: str | bytes, where: str) -> Any:
-    """JSON text as Python values. Raises InputError for anything else: NaN, or too many brackets inside each other."""
+    """JSON text as Python values. Raises InputError for invalid JSON, NaN, infinity, and excessive nesting."""
     try:
         found = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_integer)
-        json.dumps(found, ensure_ascii=False).encode()  # half of a pair of surrogates is no letter
+        json.dumps(found, ensure_ascii=False).encode()  # refuses unpaired surrogates
         return found
     except RecursionError:
         raise InputError(f"{where}: cannot be read: it is nested too deeply") from None
@@ -42,7 +42,7 @@ def parsed(text: str | bytes, where: str) -> Any:
 
 
 def typed(data: Any, kind: type[Structure], where: object) -> Structure:
-    """Plain data as a structure. Raises InputError naming the key if a value has another type or range."""
+    """Plain data as a structure. Raises InputError naming the key of a value with the wrong type or range."""
     try:
         return msgspec.convert(data, kind, strict=True)
     except msgspec.ValidationError as error:
@@ -69,7 +69,7 @@ def _refuse_constant(name: str) -> Any:
 
 
 def number(value: Any, where: str, low: float = -math.inf, high: float = math.inf) -> float:
-    """A finite number in [low, high]. Raises InputError for anything else; True and False are no numbers."""
+    """A finite number in [low, high]. Raises InputError for anything else, including True and False."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         if low <= value <= high and abs(value) <= 1.7e308:  # refuses NaN, infinity and integers beyond any float
             return float(value)
@@ -77,21 +77,21 @@ def number(value: Any, where: str, low: float = -math.inf, high: float = math.in
 
 
 def integer(value: Any, where: str, low: float = -math.inf, high: float = math.inf) -> int:
-    """An integer in [low, high]. Raises InputError for anything else; True and False are no integers."""
+    """An integer in [low, high]. Raises InputError for anything else, including True and False."""
     if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
         return value
     raise InputError(f"{where}: {shown(value)} is not allowed; allowed: {_range('an integer', low, high)}")
 
 
 def text(value: Any, where: str) -> str:
-    """Text. Raises InputError for anything else, and for a zero byte, which no path can hold."""
+    """Text without a zero byte, which no path can contain. Raises InputError for anything else."""
     if isinstance(value, str) and "\0" not in value:
         return value
     raise InputError(f"{where}: {shown(value)} is not allowed; allowed: text")
 
 
 def listed(value: Any, where: str, count: int | None = None) -> list[Any]:
-    """A list, of `count` entries if given. Raises InputError for anything else."""
+    """A list, of `count` entries if `count` is given. Raises InputError for anything else."""
     if isinstance(value, list) and count in (None, len(value)):
         return value
     found = f"{len(value)} entries" if isinstance(value, list) else type(value).__name__

@@ -1,4 +1,4 @@
-"""Names from a file that become the name of a file, and text from a file that a terminal shows."""
+"""File names and displayed text that come from a file."""
 
 import os
 import re
@@ -6,20 +6,20 @@ import unicodedata
 
 from endotsr.errors import INVISIBLE, InputError, visible
 
-LONGEST_NAME = 200  # bytes in UTF-8: file systems allow 255, and endings such as `_comparison.png` are appended
+LONGEST_NAME = 200  # bytes in UTF-8: file systems allow 255, and suffixes such as `_comparison.png` are appended
 ALLOWED = f"allowed: the name of one file, without folders and control characters, at most {LONGEST_NAME} bytes"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{k}" for port in ("COM", "LPT") for k in "0123456789¹²³")}
-SEPARATORS = "/\\"  # of any system: a run folder may be read on another one
+SEPARATORS = "/\\"  # of every system: a run folder may be read on another one
 REFUSED_ON_WINDOWS = '<>:"|?*'
 
 
 def file_name(name: object, where: str) -> str:
-    """`name` if it can be the name of a file in the folder that the caller chose; every name from a file passes here.
+    """`name` if it is a safe name for a file in a folder that the caller chose. Every name from a file passes here.
 
-    where    the file and the key that hold the name, for the message
+    where    file and key that contain the name, for the message
 
-    Raises: InputError for anything but text, for an empty or a hidden name, `..`, an absolute path or any separator,
-            control characters, a name of a device (`NUL`, `con.png`), a final dot or space, and over 200 bytes.
+    Raises: InputError for anything but text, an empty or hidden name, `..`, an absolute path or any separator, control
+            characters, a device name (`NUL`, `con.png`), a final dot or space, and more than 200 bytes.
     """
     reason = _obstacle(name)
     if reason:
@@ -28,9 +28,9 @@ def file_name(name: object, where: str) -> str:
 
 
 def relative_path(path: object, where: str) -> str:
-    """`path` if every part of it, between forward slashes, can be the name of a file: it cannot leave its folder.
+    """`path` if every part between forward slashes is a safe file name. Such a path cannot leave its folder.
 
-    Raises: InputError as `file_name` does for the first part that cannot.
+    Raises: InputError as `file_name` does, for the first unsafe part.
     """
     if not isinstance(path, str):
         return file_name(path, where)
@@ -40,7 +40,7 @@ def relative_path(path: object, where: str) -> str:
 
 
 def _obstacle(name: object) -> str:
-    """The reason why this is no name of a file; empty if it is one."""
+    """The reason why this is not a safe file name; empty if it is."""
     if not isinstance(name, str):
         return f"is {type(name).__name__}, not text"
     if any(unicodedata.category(letter) in INVISIBLE for letter in name):
@@ -61,11 +61,11 @@ def _obstacle(name: object) -> str:
 
 
 def shown(value: object, longest: int = 80) -> str:
-    """The value in quotation marks for a message: control characters as escapes, cut after `longest` letters."""
+    """The value in quotation marks for a message: control characters escaped, truncated after `longest` characters."""
     text = repr(value)
     return plain_line(text if len(text) <= longest else f"{text[:longest]}...")
 
 
 def plain_line(text: str) -> str:
-    """Text on one line, `visible`; every run of spaces, tabs and ends of lines becomes one space."""
+    """`visible` text on one line; every run of white space becomes one space."""
     return visible(re.sub(r"[ \t\n\r\f\v]+", " ", text).strip())

@@ -1,8 +1,8 @@
-"""PNG files whose pixels are all there, reduced to the chunks that decide them.
+"""Complete PNG files, reduced to the chunks that define their pixels.
 
-A decoder fills what is missing with grey, prints its complaints on standard error, and reads chunks of text, colour
-profiles and metadata that no pixel depends on. Here the compressed pixels are unpacked once to a size that the header
-fixes, before the decoder sees them, and every other chunk is left out.
+A decoder fills missing pixels with grey, prints warnings on standard error, and parses text, colour profiles and
+metadata that do not affect the pixels. Here the compressed pixels are unpacked once, to the size that the header
+states, before the decoder sees them. All other chunks are removed.
 """
 
 import struct
@@ -17,10 +17,10 @@ from endotsr.untrusted.names import plain_line
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 LARGEST_FILE = 1 << 28  # bytes: 256 MiB
-MOST_EXTRA = 64  # bytes after the end of the compressed pixels, which some programs leave there
+MOST_EXTRA = 64  # bytes after the compressed pixels; some programs leave a few
 CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type
 DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
-TRANSPARENT = {0: 2, 2: 6}  # bytes of tRNS by colour type
+TRANSPARENT = {0: 2, 2: 6}  # length of tRNS by colour type
 PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))  # Adam7
 LAST_FILTER = 4
 
@@ -36,14 +36,14 @@ class PngHeader(NamedTuple):
 
 
 def pixels_only(data: bytes, name: object) -> bytes:
-    """The same picture with the chunks IHDR, PLTE, tRNS, IDAT and IEND alone.
+    """The same picture with only the chunks IHDR, PLTE, tRNS, IDAT and IEND.
 
     data     content of a PNG file
     name     for messages
 
-    Raises: InputError if the signature, the length or the checksum of a chunk up to IEND is wrong, if the header is not
-            allowed, if the picture has more than 2^26 pixels, if a chunk that the pixels need is missing, repeated or
-            unknown, if the file holds several pictures (APNG), or if the compressed pixels do not match the header.
+    Raises: InputError for a wrong signature, chunk length or checksum up to IEND, an invalid header, more than 2^26
+            pixels, a necessary chunk that is missing, repeated or unknown, several pictures (APNG), or compressed
+            pixels that do not match the header.
     """
     chunks = _chunks(data, name)
     header = _header(chunks, name)
@@ -103,14 +103,14 @@ def _header(chunks: list[tuple[bytes, bytes]], name: object) -> PngHeader:
 
 
 def _refuse_moving(chunks: list[tuple[bytes, bytes]], name: object) -> None:
-    """Refuse a moving PNG, of which a decoder shows the first picture."""
+    """Refuse an animated PNG, of which a decoder returns the first picture only."""
     frames = next((int.from_bytes(content[:4], "big") for kind, content in chunks if kind == b"acTL"), 1)
     if frames > 1:
         raise InputError(f"{name}: holds {frames} pictures; allowed: one picture per file")
 
 
 def _palette(chunks: list[tuple[bytes, bytes]], header: PngHeader, name: object) -> list[tuple[bytes, bytes]]:
-    """The palette of a picture that has one, as a list of no or one chunk; a suggested palette is left out."""
+    """The palette chunk of a palette picture, as a list; [] for other colour types, whose palette is only suggested."""
     if header.colour != 3:
         return []
     found = [chunk for chunk in chunks if chunk[0] == b"PLTE"]
@@ -121,16 +121,16 @@ def _palette(chunks: list[tuple[bytes, bytes]], header: PngHeader, name: object)
 
 
 def _transparency(chunks: list[tuple[bytes, bytes]], header: PngHeader, entries: int) -> list[tuple[bytes, bytes]]:
-    """The chunk tRNS if its length is that of the colour type."""
+    """The chunk tRNS if its length fits the colour type."""
     found = [chunk for chunk in chunks if chunk[0] == b"tRNS"][:1]
     fits = [c for c in found if TRANSPARENT.get(header.colour) == len(c[1]) or 0 < len(c[1]) <= entries]
     return fits
 
 
 def _check_pixels(packed: bytes, header: PngHeader, name: object) -> int:
-    """Refuse compressed pixels that are damaged, too few or too many, or that use an unknown filter of a row.
+    """Refuse compressed pixels that are damaged, too few or too many, or that use an unknown row filter.
 
-    returns  bytes after the end of the compressed pixels
+    returns  number of bytes after the compressed pixels
     """
     rows = _rows(header)
     size = sum(count * (1 + stride) for count, stride in rows)
@@ -152,7 +152,7 @@ def _check_pixels(packed: bytes, header: PngHeader, name: object) -> int:
 
 
 def _rows(header: PngHeader) -> list[tuple[int, int]]:
-    """Number of rows and bytes of a row, without the byte of its filter, for every pass over the picture."""
+    """Number of rows, and bytes per row without the filter byte, for every interlacing pass."""
     passes = PASSES if header.interlaced else ((0, 0, 1, 1),)
     bits, found = CHANNELS[header.colour] * header.bits, []
     for left, top, across, down in passes:

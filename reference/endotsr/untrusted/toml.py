@@ -1,4 +1,4 @@
-"""TOML of settings and sequences: read with a bound on its size, and written from plain values."""
+"""TOML of settings and sequences: size-limited reading, and writing of plain values."""
 
 import tomllib
 from pathlib import Path
@@ -13,18 +13,18 @@ LARGEST_FILE = 1 << 20  # bytes
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file, unchecked. Raises InputError naming the file."""
+    """The tables of a TOML file, not validated. Raises InputError naming the file."""
     text = read_text(Path(path), LARGEST_FILE)
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: it is nested too deeply") from None
-    except ValueError as error:  # of TOML, and of dates or integers that Python cannot hold
+    except ValueError as error:  # invalid TOML, and dates or integers beyond the range of Python
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
 def toml_text(data: dict[str, Any]) -> str:
-    """TOML of plain values and one level of sections; a key whose value is None is left out."""
+    """TOML of plain values and one level of sections. Keys outside a section whose value is None are omitted."""
     lines, sections = [], []
     for key, value in data.items():
         if isinstance(value, dict):
@@ -47,7 +47,7 @@ def _toml_value(value: Any) -> str:
 
 
 def by_key(settings: Any) -> dict[str, Any]:
-    """`section.key` -> value of plain tables; a key outside of a section stands alone. {} for anything else."""
+    """`section.key` -> value of plain tables, and `key` -> value outside a section. {} for anything else."""
     found = {}
     for name, values in settings.items() if isinstance(settings, dict) else ():
         inside = isinstance(values, dict)

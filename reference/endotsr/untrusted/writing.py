@@ -1,6 +1,6 @@
-"""Files and folders that appear whole or not at all, under temporary names that nobody can put a link at beforehand.
+"""Atomic writing of files and folders, under unpredictable temporary names that cannot be linked in advance.
 
-In: a path, and what fills it. Out: the file or folder, in place of an older one.
+In: a path, and a function or block that writes. Out: the file or folder, in place of an older one.
 """
 
 import contextlib
@@ -15,16 +15,16 @@ from endotsr.untrusted.files import rename
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step.
+    """Let `write` fill a temporary file in the folder of `path`, then rename it to `path` in one step.
 
-    Raises: OSError of the file system, with `path` in place of the temporary name.
+    Raises: OSError of the file system, naming `path` instead of the temporary file.
     """
-    temporary = _beside(path)  # it keeps the ending, by which writers choose the format
+    temporary = _beside(path)  # keeps the extension, by which writers choose the format
     try:
         write(temporary)
         rename(temporary, path)
     except BaseException as error:
-        with contextlib.suppress(OSError):  # of a folder that is missing or is none
+        with contextlib.suppress(OSError):  # a missing parent, or one that is not a folder
             temporary.unlink(missing_ok=True)
         if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
             error.filename = str(path)
@@ -38,11 +38,11 @@ def replace_text(path: Path, text: str) -> None:
 
 @contextlib.contextmanager
 def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
-    """A temporary folder beside `path` that is renamed to `path` after the block, or removed if the block fails.
+    """A temporary folder next to `path`. It is renamed to `path` after the block, or removed if the block fails.
 
-    replace   False: a folder that has appeared at `path` in the meantime is kept, and InputError raised
+    replace   False: InputError is raised if a folder has appeared at `path` in the meantime; that folder is kept
 
-    A folder that is replaced stays until the new one has its name.
+    The old folder is deleted only after the new one has been renamed.
     """
     if path.is_symlink():
         raise InputError(f"{path}: is a link; allowed: a folder, or a name that is free")

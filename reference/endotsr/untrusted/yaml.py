@@ -1,4 +1,4 @@
-"""YAML from a file: plain values, and the matrices that OpenCV writes."""
+"""YAML from a file: plain values, and matrices as OpenCV writes them."""
 
 from pathlib import Path
 from typing import Any
@@ -10,18 +10,18 @@ from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
 
 LARGEST_FILE = 1 << 20  # bytes
-DIRECTIVE = "%YAML"  # of OpenCV, with a colon that YAML does not know
+DIRECTIVE = "%YAML"  # written by OpenCV with a colon, which is not YAML
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping of a file; a matrix of OpenCV is a mapping with rows, cols and data.
+    """The mapping of a file. An OpenCV matrix becomes a mapping with rows, cols and data.
 
-    Raises:  InputError if the file cannot be read, or holds no mapping. No object is made from a tag.
+    Raises:  InputError if the file cannot be read or is not a mapping. Tags never create objects.
     """
     import yaml
 
     class Loader(yaml.SafeLoader):
-        """Plain values alone."""
+        """Plain values only."""
 
     Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
     text = read_text(path, LARGEST_FILE)
@@ -41,9 +41,9 @@ def _matrix(loader: Any, node: Any) -> dict[Any, Any]:
 
 
 def matrix(value: Any, where: str, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
-    """Finite numbers: a list, a list of rows, or a mapping with `data`; of one of these shapes (-1: any length).
+    """Finite numbers from a list, a list of rows, or a mapping with `data`, in one of these shapes (-1: any length).
 
-    Raises:  InputError naming the place and the shapes.
+    Raises:  InputError naming `where` and the shapes.
     """
     stored = value.get("data") if isinstance(value, dict) else value
     try:

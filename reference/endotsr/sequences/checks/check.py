@@ -1,7 +1,7 @@
 """`endotsr check`: one pass over a sequence that collects every finding.
 
-Comes in: a folder in the common format or in the EndoNeRF layout, and the settings; goes out: `Checked`. Frames are
-read one at a time. What stops a single file from being read is a finding of that file, and the pass goes on.
+In: a folder in the common format or in the EndoNeRF layout, and the settings. Out: `Checked`. Frames are read one at a
+time. What stops a single file from being read is a finding of that file, and the pass goes on.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,6 @@
 """Checks of the prior depth: unit, scale, constancy, quantisation, coverage, and pictures of depth instead of depth.
 
-Comes in: one `DepthFacts` per frame; goes out: findings. Lengths are judged as in endoscopy: tissue is between 5 and
-500 mm.
+In: one `DepthFacts` per frame. Out: findings. Lengths are judged as in endoscopy: tissue is between 5 and 500 mm.
 """
 
 from typing import NamedTuple

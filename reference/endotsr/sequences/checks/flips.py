@@ -1,8 +1,8 @@
 """Depth that is stored upside down or mirrored against its picture.
 
-Comes in: the picture, depth and tissue of sampled frames, and the disparity of a stereo pair where there is one; goes
-out: findings. The light is on the scope, so that brightness falls where the depth grows: over a picture the two slopes
-point against one another. They do so in the right position of the depth alone.
+In: the picture, depth and tissue of sampled frames, and the disparity of a stereo pair where there is one. Out:
+findings. The light is on the scope, so that brightness falls where the depth grows: over a picture the two slopes point
+against one another. They do so in the right position of the depth alone.
 """
 
 from typing import NamedTuple

@@ -1,6 +1,6 @@
 """Checks of the pictures: black, white, grey, repeated frames, jumps of the exposure, gaps in the numbers.
 
-Comes in: one small `FrameFacts` a frame, so that a clip of any length fits; goes out: findings.
+In: one small `FrameFacts` a frame, so that a clip of any length fits. Out: findings.
 """
 
 from itertools import pairwise

@@ -1,7 +1,7 @@
 """The checks of `endotsr check` on frames that a training reads: refusals stop it, warnings become notes.
 
-Comes in: the facts that a reader collected of every frame, masks, depth and cameras; goes out: sentences for the notes
-of the sequence, or an `InputError` in the words of the finding.
+In: the facts that a reader collected of every frame, masks, depth and cameras. Out: sentences for the notes of the
+sequence, or an `InputError` in the words of the finding.
 """
 
 from collections import Counter
