@@ -19,7 +19,7 @@ def adam_step(parameter, gradient, first, second, step, learning_rate, beta1, be
 
 
 def adam_update(state, parameters, gradients, rates, beta1, beta2, epsilon):
-    """New (state, parameters) after one step of the arrays that have a gradient; the others keep theirs."""
+    """New (state, parameters) after one step of the arrays that have a gradient; the others are unchanged."""
     state, parameters = dict(state), dict(parameters)
     for name, gradient in gradients.items():
         m, v, k = state[name]

@@ -8,19 +8,19 @@ Calibration = namedtuple("Calibration", "lambda_lap ratios")  # The weight, and 
 
 
 def rms(gradient):
-    """Equation (7): root mean square of a gradient image, excluded pixels included."""
+    """Equation (7): root mean square of a gradient image over all pixels, masked ones included."""
     return np.sqrt((gradient**2).mean())  # (11.2)
 
 
 def calibration_views(n_train, count):
-    """Positions within the training frames, ascending, each once; halves are rounded to even."""
+    """Distinct ascending positions within the training frames, rounded half to even."""
     return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(int))
 
 
 def calibrate(views, gradient_ratio):
-    """Equation (7): from (name, g_rgb, g_lap) of every view; a view without a finite ratio is left out.
+    """Equation (7): from (name, g_rgb, g_lap) of every view; a view without a finite ratio is dropped.
 
-    Raises: ValueError where no view is left, or where the median is 0.
+    Raises: ValueError if no view remains or the median is 0.
     """
     ratios = np.array([fine / rgb for _, rgb, fine in views if rgb > 0 and np.isfinite(fine / rgb)])  # (11.6)
     if ratios.size == 0 or np.median(ratios) == 0:

@@ -34,7 +34,7 @@ def reach(projected, opacity_logit, settings, size, axis):
 
 
 def seen(projected, opacity_logit, settings, width, height):
-    """(N,) bool: the support holds a pixel of the image."""
+    """(N,) bool: the support contains a pixel of the image."""
     columns, rows = (reach(projected, opacity_logit, settings, n, axis) for axis, n in enumerate((width, height)))
     return columns.any(axis=0) & rows.any(axis=0)
 
@@ -63,7 +63,7 @@ def layers_of(projected, opacity_logit, settings, width, height):
 def composite_forward(projected, opacity_logit, colour, settings, background, width, height):
     """Equation (B5): Composite of Gaussians on the screen; colour (3, N), background (3,), logits (N,).
 
-    The kernels cut the image into tiles and write q as a sum of squares, which keeps the digits of needles.
+    The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles.
     """
     layers, t = layers_of(projected, opacity_logit, settings, width, height)
     image, depth, opacity = t * background[:, None, None], 0 * t, 0 * t

@@ -14,7 +14,7 @@ CovarianceGrads = namedtuple("CovarianceGrads", "d_quaternion d_log_scale")
 
 
 def unit(quaternion):
-    """q / |q| (4, N) and 1 / |q| (N,); (1, 0, 0, 0) and 0 for q = 0. Divided by the largest entry first."""
+    """q / |q| (4, N) and 1 / |q| (N,); (1, 0, 0, 0) and 0 for q = 0. The largest entry is divided out first."""
     largest = np.abs(quaternion.real).max(axis=0, initial=0)
     zero = largest == 0
     q = np.where(zero, np.eye(4)[:, :1], quaternion / np.where(zero, 1, largest))
@@ -44,7 +44,7 @@ def covariance_forward(quaternion, log_scale):
 
 
 def covariance_reverse(d_shape, saved):
-    """Reverse of (B2): what is along q is removed, a clipped log-scale has no gradient."""
+    """Reverse of (B2): the component along q is removed; a clipped log-scale has gradient 0."""
     q, inverse_norm = unit(saved.quaternion)
     g = rotation_reverse(q, d_shape.rotation)
     d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (5.8)
@@ -53,5 +53,5 @@ def covariance_reverse(d_shape, saved):
 
 
 def covariance_matrix(shape):
-    """Sigma (3, 3, N), scene units squared. The kernels never form it, because a needle loses its digits in it."""
+    """Sigma (3, 3, N), scene units squared. The kernels never form it: Sigma of a needle loses digits."""
     return np.einsum("ikn,kn,jkn->ijn", shape.rotation, shape.scale**2, shape.rotation)

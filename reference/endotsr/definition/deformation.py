@@ -23,7 +23,7 @@ def deformation_forward(fdm_weight, fdm_centre, fdm_width, t, basis="quartic"):
 
 
 def deformation_reverse(d_offsets, saved):
-    """Reverse of (B1): from d_offsets (10, N). The kernel takes one exponential for value and derivatives."""
+    """Reverse of (B1): from d_offsets (10, N). The kernel computes one exponential for value and derivatives."""
     w, centre, width, t, basis = saved
     delta, sigma, e = bell(centre, width, t, basis)
     d_e = w * d_offsets[:, None]  # (3.1)

@@ -8,7 +8,7 @@ from endotsr.definition.compositing import opacity_of
 from endotsr.definition.covariance import rotation_of, unit
 
 DensityStatistics = namedtuple("DensityStatistics", "gradient_sum visits")  # (N,) each
-# The column that every new Gaussian comes from; from `survivors` on they are new, with moments 0.
+# Source column of every Gaussian; those from `survivors` on are new and have zero moments.
 GatherPlan = namedtuple("GatherPlan", "source survivors")
 Densified = namedtuple("Densified", "gaussians plan statistics cloned split pruned")
 
@@ -19,7 +19,7 @@ def empty_statistics(count):
 
 
 def gather_statistics(statistics, d_mean, visible, width, height):
-    """Equation (B11): the statistics with one more view; d_mean (2, N) per px, visible (N,)."""
+    """Equation (B11): add one view to the statistics; d_mean (2, N) per px, visible (N,)."""
     norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)  # (12.6)
     return DensityStatistics(statistics.gradient_sum + np.where(visible, norm, 0), statistics.visits + visible)
 
@@ -33,7 +33,7 @@ def scene_extent(config, cameras):
 
 
 def densify(gaussians, statistics, config, rng, extent, remaining=1):
-    """Equation (B11): prune, clone and split, `remaining` times; one draw (2, 3, splits) of normal numbers."""
+    """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
     least, calls = (config.gradient_threshold, 1) if config.growth == "threshold" else (0, remaining)
@@ -52,7 +52,7 @@ def densify(gaussians, statistics, config, rng, extent, remaining=1):
 
 
 def with_children(gaussians, noise):
-    """The last Gaussians, copies of their parents, drawn from the parents and 1.6 times smaller."""
+    """Move the last Gaussians, copies of their parents, to samples of the parents and shrink them by 1.6."""
     noise = np.concatenate(noise, axis=1)
     children = slice(gaussians.opacity_logit.size - noise.shape[1], None)
     rotation = rotation_of(unit(gaussians.quaternion[:, children])[0])

@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-DepthTarget = namedtuple("DepthTarget", "normalised valid count")  # The part that belongs to the frame.
+DepthTarget = namedtuple("DepthTarget", "normalised valid count")  # Precomputed once per frame.
 # The render, its largest depth (0 = no loss) and the signs of the residuals.
 DepthSaved = namedtuple("DepthSaved", "rendered_depth largest sign count")
 
@@ -17,7 +17,7 @@ def depth_target(prior_depth, mask):
 
 
 def normalised_depth_forward(rendered_depth, target):
-    """Equation (B8): both depths over their own maximum; 0 with fewer than 10 valid pixels or nothing rendered."""
+    """Equation (B8): each depth is divided by its maximum; 0 below 10 valid pixels or for an empty render."""
     largest = np.where(np.isfinite(rendered_depth), rendered_depth, 0).max()
     if target.count < 10 or largest <= 0:
         return 0.0, DepthSaved(rendered_depth, 0.0, 0 * target.normalised, 1)
@@ -27,7 +27,7 @@ def normalised_depth_forward(rendered_depth, target):
 
 
 def normalised_depth_reverse(d_loss, saved):
-    """Reverse of (B8): d_rendered_depth (H, W); that of the maximum is shared by the pixels that hold it."""
+    """Reverse of (B8): d_rendered_depth (H, W). Pixels that tie for the maximum share its gradient equally."""
     depth, largest, sign, count = saved
     if largest == 0:
         return np.zeros_like(depth)

@@ -11,7 +11,7 @@ AtomStatistics = namedtuple("AtomStatistics", "mean rms dead")
 
 
 def frequencies(count, low, high):
-    """Equation (1): omega (F,), cycles per sequence, log-spaced; both ends are set, not computed."""
+    """Equation (1): omega (F,), cycles per sequence, log-spaced with exact end points."""
     omega = low * (high / low) ** (np.arange(count) / max(count - 1, 1))
     omega[1:][-1:] = high
     return omega
@@ -20,7 +20,7 @@ def frequencies(count, low, high):
 def dictionary_forward(t, omega):
     """Equation (1): phi (2F,), all sines, then all cosines, at normalised time t.
 
-    Quarter turns are taken out first: with a sine of 1e-16 in place of 0, Adam would move A and C by a full step.
+    Quarter turns are removed first: for a sine of 1e-16 instead of 0, Adam would move A and C by a full step.
     """
     turns = omega * t
     quarters = np.rint(4 * turns.real)
@@ -39,7 +39,7 @@ def dictionary_reverse(d_phi, saved):
 
 
 def atom_statistics(times, omega):
-    """Equation (1b): over the distinct training stamps `times` (n,); divided by n, not by n - 1."""
+    """Equation (1b): population statistics (divisor n) over the distinct training stamps `times` (n,)."""
     atoms = np.array([dictionary_forward(t, omega)[0] for t in np.unique(times)])
     mean = atoms.mean(axis=0)
     rms = np.sqrt(((atoms - mean) ** 2).mean(axis=0))

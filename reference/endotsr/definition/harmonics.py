@@ -9,7 +9,7 @@ from endotsr.definition.appearance import Y00
 C1, C2A, C2B, C2C = (np.sqrt(n / (d * np.pi)) for n, d in ((3, 4), (15, 4), (5, 16), (15, 16)))
 C3A, C3B, C3C, C3D, C3E = (np.sqrt(n / (d * np.pi)) for n, d in ((35, 32), (105, 4), (21, 32), (7, 16), (105, 16)))
 
-# Y_k as a polynomial: its factor, then coefficient and exponents of x, y, z of every monomial. The kernel is unrolled.
+# Y_k as a polynomial: a factor, then the coefficient and exponents of x, y, z of each monomial. The kernel is unrolled.
 POLYNOMIALS = [
     (Y00, [(1, 0, 0, 0)]),
     (-C1, [(1, 0, 1, 0)]),
@@ -41,7 +41,7 @@ def basis(direction, terms):
 
 
 def basis_slopes(direction, terms):
-    """dY_k / d(x, y, z), (terms, 3, N), the three taken as independent."""
+    """dY_k / d(x, y, z), (terms, 3, N), for independent x, y, z."""
     out = np.zeros((terms, *direction.shape), direction.dtype)
     for row, (factor, polynomial) in enumerate(POLYNOMIALS[:terms]):
         for c, *powers in polynomial:
@@ -60,7 +60,7 @@ def directions(position, centre):
 
 
 def harmonics_forward(harmonics, residual, position, centre, degree):
-    """Equation (B4): display colour (3, N), clamped at 0 from below."""
+    """Equation (B4): display colour (3, N), clamped to at least 0."""
     terms = (degree + 1) ** 2
     y = basis(directions(position, centre)[0], terms)
     colour = 0.5 + np.einsum("kn,kcn->cn", y, harmonics[:terms]) + (0 if residual is None else Y00 * residual)

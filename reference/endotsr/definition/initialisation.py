@@ -14,7 +14,7 @@ def initialise(sequence, config, model, rng):
 
 
 def drawn_pixels(sequence, config, rng):
-    """(frame, flat indices): of the first training frame, then of what is new or has moved in the others."""
+    """(frame, flat indices): pixels of the first training frame, then new or moved pixels of the others."""
     usable = sequence.masks & (sequence.depth > 0) & np.isfinite(sequence.depth)
     first, count = sequence.train_index[0], len(sequence.images)
     for k in sequence.train_index:
@@ -37,7 +37,7 @@ def lift(sequence, k, pixels):
 
 
 def neighbour_distance(position):
-    """(N,) mean squared distance to the 3 nearest others, by the table of all distances. The fast path has a tree."""
+    """(N,) mean squared distance to the 3 nearest others, from all pairwise distances. The fast path uses a tree."""
     squared = sum((axis[:, None] - axis) ** 2 for axis in position)
     return np.sort(squared, axis=1)[:, 1:4].sum(axis=1) / max(min(3, position.shape[1] - 1), 1)
 
@@ -57,7 +57,7 @@ def gaussians_at(position, colour, model):
 
 
 def activate_residuals(gaussians, count, appearance, spectral_motion):
-    """A and C (3, 2F, N) start at 0; arrays that exist already are kept."""
+    """Add A and C (3, 2F, N) as zeros; existing arrays are kept."""
     zero = np.zeros((3, 2 * count, gaussians.opacity_logit.size))
     a, c = gaussians.appearance_coefficients, gaussians.motion_coefficients
     return gaussians._replace(

@@ -45,7 +45,7 @@ def laplacian_levels(image, levels=3, upsampling="co_sited"):
 
 
 def support_masks(mask, levels=3, upsampling="co_sited"):
-    """V_j: no excluded pixel of `mask` (H, W) has a weight in the value. S_0 = mask is sent through D and U."""
+    """V_j: values to which no excluded pixel of `mask` (H, W) contributes. S_0 = mask is propagated through D and U."""
     bands, valid = [], mask
     for _ in range(levels):
         d_rows, u_rows, d_columns, u_columns = (matrix != 0 for matrix in matrices(valid.shape, upsampling))
@@ -56,7 +56,7 @@ def support_masks(mask, levels=3, upsampling="co_sited"):
 
 
 def laplacian_loss_forward(rendered, observed, masks, upsampling="co_sited"):
-    """Equation (5): display units. Two pyramids; the kernel builds that of the difference, once."""
+    """Equation (5): display units, from two pyramids. The kernel builds one pyramid of the difference."""
     images = [np.where(masks.image, image, 0) for image in (rendered, observed)]
     one, other = (laplacian_levels(image, len(masks.bands), upsampling).bands for image in images)
     loss, slopes = 0.0, []

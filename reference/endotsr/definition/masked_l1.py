@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-# The difference on tissue, and how many numbers it has there.
+# The difference on tissue, and its number of entries there.
 MaskedL1Saved = namedtuple("MaskedL1Saved", "difference count")
 
 

@@ -22,14 +22,14 @@ def blurred(image):
 
 
 def ssim_target(observed, mask):
-    """The part that belongs to the frame."""
+    """The part that depends on the frame only."""
     return SsimTarget(np.where(mask, observed, 0), mask, len(observed) * mask.sum())
 
 
 def masked_ssim_forward(rendered, target):
     """Equation (B7): mean of the map over tissue, in [-1, 1]; 1 without tissue.
 
-    The kernel forms 1 - s from the difference and the sum of the images, with variances about the centre of the window.
+    The kernel computes 1 - s from the difference and the sum of the images, with variances about the window's centre.
     """
     x, y = np.where(target.mask, rendered, 0), target.image
     mu_x, mu_y = blurred(x), blurred(y)

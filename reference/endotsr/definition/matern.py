@@ -10,14 +10,14 @@ MaternSaved = namedtuple("MaternSaved", "motion_coefficients rho")
 def matern_weights(omega, length):
     """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) and the correlation length, as printed.
 
-    The kernel divides by the largest frequency first, so that no length overflows; below 1e-40 rho is 1 to rounding.
+    The kernel first divides by the largest frequency, which avoids overflow. Below a length of 1e-40, rho rounds to 1.
     """
     rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3  # (4.2)
     return rho / rho.mean()  # (4.3)
 
 
 def matern_penalty_forward(motion_coefficients, rho):
-    """Equation (4), lower line: scene units squared; the two atoms of a frequency have one weight."""
+    """Equation (4), lower line: scene units squared; both atoms of a frequency share its weight."""
     n, count = motion_coefficients.shape[2], rho.size
     squares = np.einsum("dkn,dkn->k", motion_coefficients, motion_coefficients)
     return np.tile(rho, 2) @ squares / (6 * max(n, 1) * count), MaternSaved(motion_coefficients, rho)  # (4.4)

@@ -11,7 +11,7 @@ from endotsr.definition.masked_ssim import masked_ssim_forward, masked_ssim_reve
 from endotsr.definition.smoothness import smoothness_forward, smoothness_reverse
 
 Frame = namedtuple("Frame", "image mask depth time camera")
-Targets = namedtuple("Targets", "image mask ssim depth supports")  # what belongs to the frame
+Targets = namedtuple("Targets", "image mask ssim depth supports")  # precomputed once per frame
 LossWeights = namedtuple("LossWeights", "ssim depth smoothness laplacian")  # in force at this iteration
 ImageLoss = namedtuple("ImageLoss", "loss terms d_colour d_depth")
 
@@ -31,12 +31,12 @@ def photometric_loss(colour, targets, ssim_weight):
 
 
 def no_edges(depth):
-    """In place of a Canny edge map, which is no formula."""
+    """No edges, in place of a Canny edge map, which has no closed formula."""
     return np.zeros(depth.shape, bool)
 
 
 def image_loss(rendered, targets, weights, config, edges=no_edges):
-    """Equation (6) without the Matern penalty; `edges` (H, W) bool, or the function that finds them in the depth."""
+    """Equation (6) without the Matern penalty; `edges` (H, W) bool, or a function that detects them in the depth."""
     colour, depth = rendered.colour, rendered.depth
     loss, terms, d_colour = photometric_loss(colour, targets, weights.ssim)
     d_depth = np.zeros_like(depth)

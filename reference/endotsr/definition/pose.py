@@ -11,7 +11,7 @@ PoseGrads = namedtuple("PoseGrads", "d_rotation d_translation d_rotation_vector 
 
 
 def exponential(matrix):
-    """Sum of matrix^k / k!, of a 2^-s part of the matrix, squared s times; the kernel has its closed form for 3 x 3."""
+    """Taylor series of exp(matrix / 2^s), squared s times. The kernel uses the closed form for 3 x 3."""
     halvings = max(0, int(np.ceil(np.log2(np.abs(matrix).sum() + 1))))
     term = total = np.eye(len(matrix))
     for k in range(1, 20):

@@ -16,7 +16,7 @@ ProjectionGrads = namedtuple("ProjectionGrads", "d_position d_rotation d_scale d
 
 
 def jacobian(point, camera, settings):
-    """J (2, 3, N) at points (3, N) in camera axes, its slopes x'/z, y'/z (2, N), and which are free of the clamp."""
+    """J (2, 3, N) at points (3, N) in camera axes, its slopes x'/z, y'/z (2, N), and which slopes are unclamped."""
     (x, y, z), fx, fy = point, camera.fx, camera.fy
     kappa, sizes = settings.jacobian_clamp, np.array([[camera.width / fx], [camera.height / fy]])
     limit = kappa * sizes / 2 if kappa > 0 else np.inf * sizes
@@ -30,7 +30,7 @@ def jacobian(point, camera, settings):
 def projection_forward(position, shape, camera, settings):
     """Equation (B3): Projected of centres (3, N); cov = J W Sigma W^T J^T + low-pass, det = a c - b^2.
 
-    The kernel adds up the determinant from terms that are not negative, and clips axes above 1e60 px.
+    The kernel sums the determinant from nonnegative terms, and clips axes above 1e60 px.
     """
     point = camera.rotation @ position + camera.translation[:, None]
     visible = point[2].real > settings.near
@@ -46,7 +46,7 @@ def projection_forward(position, shape, camera, settings):
 
 
 def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
-    """Reverse of (B3): b stands for two entries; the kernel of the render starts from A, m, r, for needles."""
+    """Reverse of (B3): b represents two entries. For needles, the kernel of the render starts from A, m, r."""
     position, shape, camera, settings, visible = saved
     d_mean2d, d_covariance2d, d_depth = (np.where(visible, g, 0) for g in (d_mean2d, d_covariance2d, d_depth))
     w, point = camera.rotation, camera.rotation @ position + camera.translation[:, None]
@@ -65,7 +65,7 @@ def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
 
 
 def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera, settings):
-    """From the derivatives with respect to J, (u, v) and depth to dL/d(point in camera axes), (3, N)."""
+    """dL/d(point in camera axes) (3, N), from the derivatives with respect to J, (u, v) and depth."""
     z, focal = point[2], np.array([[camera.fx], [camera.fy]])
     g_slope = -focal / z * np.array([g_j[0, 2], g_j[1, 2]])  # J_02 = -f x'/z / z; (6.6)
     g_clipped = np.where(free, g_slope, 0)  # (6.7)

@@ -1,4 +1,4 @@
-"""Equations (B1) to (3): the moving scene, raw Gaussians at one time with every component applied."""
+"""Equations (B1) and (1) to (3): the moving scene, raw Gaussians at one time with every component applied."""
 
 from collections import namedtuple
 
@@ -52,7 +52,7 @@ def scene_at(gaussians, spectral, model, t):
 
 
 def scene_reverse(grads, saved):
-    """Gradients with respect to every array of the Gaussians, by name, from those of the Scene."""
+    """Gradients with respect to every array of the Gaussians, by name, from the gradients of the Scene."""
     names = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics")
     found = {name: getattr(grads, f"d_{name}") for name in names}
     if saved.deformation is not None:

@@ -1,4 +1,4 @@
-"""A small moving scene with known pictures: a wavy, textured surface that stretches, and an instrument before it."""
+"""A small simulated scene: a wavy, textured surface that stretches, and an instrument in front of it."""
 
 from collections import namedtuple
 

@@ -17,7 +17,7 @@ from endotsr.definition.scene import arrays, scene_at, spectral_from
 from endotsr.definition.settings import PAPER
 from endotsr.definition.view import view_gradients
 
-State = namedtuple("State", "gaussians adam statistics iteration")  # all that one iteration hands to the next
+State = namedtuple("State", "gaussians adam statistics iteration")  # everything that changes between iterations
 
 
 def start(gaussians):
@@ -32,21 +32,21 @@ def frame_of(sequence, k):
 
 
 def weights_at(iteration, config):
-    """The weights of the image terms in force."""
+    """Weights of the image terms at this iteration."""
     loss, ramp = config.loss, schedules.laplacian_ramp(iteration, config)
     smoothness = loss.smoothness_weight if schedules.smoothness_active(iteration, config) else 0.0
     return LossWeights(loss.ssim_weight, loss.depth_weight, smoothness, ramp * loss.lambda_lap)
 
 
 def activated(state, config):
-    """The state with A and C at zero, with moments of their own."""
+    """The state with A and C added as zeros, with zero moments."""
     model = config.model
     gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
     return state._replace(gaussians=gaussians, adam=adam_state(arrays(gaussians)) | state.adam)
 
 
 def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges):
-    """One iteration: the new state, and the ViewGradients of a training frame that is drawn uniformly."""
+    """One iteration on a uniformly drawn training frame: the new state and the ViewGradients."""
     i, o = state.iteration + 1, config.optimiser
     if schedules.residuals_active(i, config) and not schedules.residuals_active(i - 1, config):
         state = activated(state, config)
@@ -80,7 +80,7 @@ def controlled(state, sequence, config, rng):
 
 
 def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
-    """lambda_lap of equation (7): from training views that are rendered without A and S."""
+    """lambda_lap of equation (7), from training views rendered without A and S."""
     base, views = gaussians._replace(appearance_coefficients=None, motion_coefficients=None), []
     chosen = calibration_views(len(sequence.train_index), config.loss.calibration_views)
     for k in sequence.train_index[chosen]:
@@ -94,7 +94,7 @@ def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
 
 
 def train(sequence, config, rng, raster=PAPER, on_iteration=lambda state, view: None):
-    """Gaussians and Spectral after all iterations, from the depth of the training frames."""
+    """Gaussians and Spectral after all iterations, initialised from the depth of the training frames."""
     state = start(initialise(sequence, config.initialisation, config.model, rng))
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     while state.iteration < config.training.iterations:

@@ -1,4 +1,4 @@
-"""One training view, equation (6), made of the documented pairs: the twin of `endotsr.fitting.view`.
+"""One training view, equation (6), composed of forward and reverse pairs: the twin of `endotsr.fitting.view`.
 
 Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
                         camera --(B16)--^
@@ -19,7 +19,7 @@ ViewGradients = namedtuple("ViewGradients", "loss terms gradients d_exposure d_p
 
 def view_gradients(gaussians, spectral, targets, weights, config, camera, t, edges=no_edges,
                    *, exposure=None, pose=None, raster=PAPER, degree=3):  # fmt: skip
-    """Loss, gradients by name, and those of exposure (log_gain, bias) and pose (rotation vector, offset), if given."""
+    """Loss and gradients by name; also of exposure (log_gain, bias) and pose (rotation vector, offset) if given."""
     scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
     d_exposure = d_pose = exposure_saved = pose_saved = None
     if pose is not None:
