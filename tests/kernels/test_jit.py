@@ -62,7 +62,7 @@ def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_source
     done = process(tmp_path, tmp_path / "no_folder")
     assert float(done.stdout) == answer(tmp_path)
     (line,) = done.stderr.splitlines()
-    assert line.startswith(f"endotsr: warning: {tmp_path / 'no_folder'}") and "compiled anew at every start" in line
+    assert line.startswith(f"endotsr: warning: {tmp_path / 'no_folder'}") and "recompiled at every start" in line
     assert "set NUMBA_CACHE_DIR" in line
     assert not list((tmp_path / "endotsr").rglob("*.nb?"))
 

@@ -1,1 +1,1 @@
-"""Kernel support: compilation, threads, local arrays, the exponential, array types. This room holds no equation."""
+"""Kernel support: compilation, threads, local arrays, the exponential, array types. No equation is implemented here."""

@@ -1,4 +1,4 @@
-"""Names for the array types of annotations. The name gives the kind of number; comments and docstrings the shape."""
+"""Type aliases for arrays. The alias gives the kind of number; comments and docstrings give the shape."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ IntArray = NDArray[np.integer]
 """Counts, ranks and positions, of any integer width."""
 
 IndexArray = NDArray[np.intp]
-"""Numbers of frames or Gaussians, as NumPy takes them for an index."""
+"""Indices of frames or Gaussians, in NumPy's index type."""
 
 Array = NDArray[Any]
-"""Any dtype: picture files hold 8 or 16 bits, floating images 32 or 64."""
+"""Any dtype: picture files have 8 or 16 bits, floating-point images 32 or 64."""

@@ -1,8 +1,8 @@
-"""Exponential and logarithm of float32 with the same bits on every system.
+"""Exponential and logarithm of float32, bitwise equal on every system.
 
-The C library of each system has its own `expf` and `logf`. These are one of them, written as arithmetic: the algorithms
-and coefficients of the optimised routines of Arm (MIT licence), which the C library of Linux uses too. They compute in
-float64 and round once: a fused multiply-add there changes about one result in 10^8. Loops over them vectorise.
+Results of `expf` and `logf` differ between C libraries. These functions use the algorithms and coefficients of Arm's
+optimised routines (MIT licence), which glibc uses too. They compute in float64 and round once; a fused multiply-add
+there changes about one result in 10^8. Loops over them vectorise.
 
     exp:  x = (k + r) ln 2 / 32 with integer k and |r| <= 1/2;  e^x = 2^(k / 32) p(r), the power by table and exponent
     log:  x = 2^k z, z near 1 / c of a table of 16;  log x = k ln 2 + log c + p(z c - 1)
@@ -23,7 +23,7 @@ def _hex(*rows: str) -> "np.ndarray":
 
 _STEPS = np.int64(32)
 _INV_LN2 = 32 * float.fromhex("0x1.71547652b82fep+0")
-_TO_INTEGER = float.fromhex("0x1.8p+52")  # added to a number, it leaves its integer part in the last bits
+_TO_INTEGER = float.fromhex("0x1.8p+52")  # adding it moves the rounded integer of a number into the last bits
 _E0, _E1, _E2 = (
     _hex("0x1.c6af84b912394p-5", "0x1.ebfce50fac4f3p-3", "0x1.62e42ff0c52d6p-1") / (32**3, 32**2, 32)
 ).tolist()
@@ -61,7 +61,7 @@ _POWERS = _hex(
     "0x1.dfc97337b9b5fp+0",
     "0x1.ea4afa2a490dap+0",
     "0x1.f50765b6e4540p+0",
-).view(np.int64) - (np.arange(32) << 47)  # 2^(i / 32) as bits, without what k brings into the exponent
+).view(np.int64) - (np.arange(32) << 47)  # bits of 2^(i / 32), minus the part that adding k puts into the exponent
 
 _LN2 = float.fromhex("0x1.62e42fefa39efp-1")
 _L0, _L1, _L2 = _hex("-0x1.00ea348b88334p-2", "0x1.5575b0be00b6ap-2", "-0x1.ffffef20a4123p-2").tolist()

@@ -1,8 +1,8 @@
 """2^x for x <= 0 as straight-line arithmetic, so that loops over pixels and Gaussians vectorise.
 
-The machine exponential is a scalar library call inside a compiled loop; this one is a polynomial and a
-shift. Split x = k + f with k = trunc(x) and f in (-1, 0]; 2^f is a polynomial with p(0) = 1 and
-p(-1) = 1/2 exactly (continuous across k, and 2^0 is exactly 1); 2^k is built from its exponent bits.
+The library exponential is a scalar call inside a compiled loop; this one is a polynomial and a shift.
+Split x = k + f with k = trunc(x) and f in (-1, 0]. 2^f is a polynomial with p(0) = 1 and p(-1) = 1/2
+exactly, so it is continuous across k and 2^0 is exactly 1. 2^k is built from its exponent bits.
 
 Polynomials: float32 degree 6, minimax in relative error (2.2e-9 before rounding); float64 degree 11,
 interpolation at Chebyshev nodes (5.5e-17). With rounding: 2e-7 and 4.5e-16 relative (tested).

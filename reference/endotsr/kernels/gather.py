@@ -1,7 +1,6 @@
-"""Gathering of columns: the one move by which arrays with one column per Gaussian are reordered, grown and thinned.
+"""Column gather: reorders, extends and prunes arrays with one column per Gaussian.
 
-In: an array whose last axis is the index, and the source column of every new one. Out: a new array. Nothing here knows
-what the columns mean.
+In: an array whose last axis is the index, and the source column of every new column. Out: a new array.
 """
 
 import numpy as np
@@ -11,7 +10,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-HEADROOM = 1.5  # memory of a regathered array, over its need: pages that are never written cost nothing
+HEADROOM = 1.5  # allocated over needed memory of a regathered array: pages that are never written cost nothing
 
 
 def gather_columns(array: FloatArray, source: NDArray[np.intp], kept: int) -> FloatArray:
@@ -46,10 +45,10 @@ _gather_kernel = jit(_gather)
 
 
 def regather_columns(array: FloatArray, source: NDArray[np.intp], kept: int) -> FloatArray:
-    """As `gather_columns`, in the memory of `array` where that has room; `array` must not be used afterwards.
+    """As `gather_columns`, in place if the memory of `array` is large enough; `array` must not be used afterwards.
 
-    New memory comes from the system page by page, each filled with zeros: for 60 000 Gaussians that took longer than
-    the gather. Rows move in the order in which none is overwritten before it was read.
+    The system zeroes every new page of memory; for 60 000 Gaussians this took longer than the gather. The order of the
+    moves ensures that no row is overwritten before it is read.
     """
     need, room = array.size // max(array.shape[-1], 1) * source.size, array.base
     fits = room is not None and room.ndim == 1 and room.dtype == array.dtype and room.size >= need
@@ -61,7 +60,7 @@ def regather_columns(array: FloatArray, source: NDArray[np.intp], kept: int) -> 
 
 
 def _regather(room, rows, before, source, kept):
-    """Rows of `before` numbers become rows of source.size numbers."""
+    """Change the row length from `before` to source.size."""
     count, row_before = source.size, np.empty(before, room.dtype)
     for k in range(rows):
         row = k if count <= before else rows - 1 - k

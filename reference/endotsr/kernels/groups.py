@@ -1,4 +1,4 @@
-"""The driver of a stage: it carries the formula of one item to all of them, a group at a time, as vector code.
+"""The loop of a stage: it applies the formula of one item to all items, one group at a time, as vector code.
 
     results = local_array(RESULTS, position)  # rows of the results times GROUP
     for start in range(first, stop, GROUP):
@@ -7,13 +7,13 @@
             keep(results, item, formula(column(position, 3, start + item), ...))
         write_group(results, start, count, out)
 
-The results of a group wait in a local array (`vectors`). No store in the loop over the group can change what the loop
-reads, so the compiler needs no proof that two dozen arrays do not overlap, and the loop becomes vector code: the
-projection takes a third of the time of one Gaussian after the other. A formula takes scalars and tuples of scalars,
-returns a tuple, and knows no array (`jit_formula`).
+The results of a group are kept in a local array (`vectors`). Stores in the loop over the group therefore cannot alias
+its inputs, and the compiler vectorises the loop without proving that two dozen arrays do not overlap. The projection
+then runs three times faster than one Gaussian at a time. A formula maps scalars and tuples of scalars to a tuple and
+has no array arguments (`jit_formula`).
 
-As in `vectors`, each function is a plain Python function, which is its definition and runs when the JIT is off, beside
-the instructions that stand for it in compiled code.
+As in `vectors`, each function has two forms: a plain Python function, which defines it and runs when the JIT is off,
+and the instructions that replace it in compiled code.
 """
 
 from typing import Any
@@ -28,36 +28,36 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.jit import jit_inline
 
-GROUP = 64  # items whose results wait in a local array
-_instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
+GROUP = 64  # items whose results are kept in a local array
+_instructions: Any = intrinsic  # typed as Any: the decorated function is called with a kernel's arguments
 
 
 def column(table: NDArray[np.floating], size: int, item: Any) -> tuple[Any, ...]:
     """The first `size` numbers of a column of a two-dimensional array; in compiled code `size` is a constant.
 
-    The column must exist: no index counts from the end.
+    The column must exist; negative indices are not supported.
     """
     return tuple(table[row, item] for row in range(size))
 
 
 def keep(results: NDArray[np.floating], item: int, values: tuple[Any, ...]) -> None:
-    """The results of an item of the group, 0 ... GROUP - 1, to the local array: row k of it begins at k GROUP."""
+    """Store the results of an item of the group, 0 ... GROUP - 1, in the local array, whose row k starts at k GROUP."""
     for k, value in enumerate(values):
         results[k * GROUP + item] = value
 
 
 def keep_where(valid: Any, results: NDArray[np.floating], item: int, values: tuple[Any, ...]) -> None:
-    """As `keep`, but zeros where not `valid`, whatever the values are: a select, so that there is no branch."""
+    """As `keep`, but zeros if not `valid`, even for NaN values: a select, not a branch."""
     keep(results, item, values if valid else (results.dtype.type(0),) * len(values))
 
 
 def kept(results: NDArray[np.floating], size: int, item: Any) -> tuple[Any, ...]:
-    """The first `size` numbers that `keep` has stored for an item; in compiled code `size` is a constant."""
+    """The first `size` numbers stored by `keep` for an item; in compiled code `size` is a constant."""
     return tuple(results[k * GROUP + item] for k in range(size))
 
 
 def _write_group(results: NDArray[np.floating], start: int, count: int, out: NDArray[np.floating]) -> None:
-    """The rows of `results`, GROUP numbers each, to columns start ... start + count - 1 of the rows of `out`."""
+    """Copy the rows of `results`, GROUP numbers each, to columns start ... start + count - 1 of `out`."""
     for row in range(out.shape[0]):
         for item in range(count):
             out[np.uint64(row), np.uint64(start + item)] = results[np.uint64(row * GROUP + item)]

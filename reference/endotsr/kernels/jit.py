@@ -1,18 +1,18 @@
-"""How kernels are compiled: the only module that calls `numba.njit`.
+"""Compilation of kernels: the only module that calls `numba.njit`.
 
-Kernels are plain module-level functions, compiled by assignment (`blend = jit(_blend)` or
-`blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools. The formulas that they
-carry to all items are compiled by the decorator `jit_formula`.
+Kernels are plain module-level functions, compiled by assignment (`blend = jit(_blend)` or `blend = jit(blend)`). Their
+Python bodies stay visible to coverage and mutation tools. The decorator `jit_formula` compiles the formulas that
+kernels apply to all items.
 
-No fast-math: sums keep the order they are written in. The fast path may contract a*b+c into one fused
-multiply-add (`contract=True`), which stays bitwise reproducible on one machine.
+No fast-math: sums keep their written order. The fast path may contract a*b+c into one fused multiply-add
+(`contract=True`), which stays bitwise reproducible on one machine.
 
-Kernels are serial; threads come from `endotsr.kernels.threads`, which calls one kernel for several ranges at once.
-Numba's own parallel loops compile their body several times, and its OpenMP layer spins at every barrier: with one other
-busy process on two cores, an iteration took 650 ms instead of 300.
+Kernels are serial; `endotsr.kernels.threads` calls one kernel for several ranges at once. Numba's own parallel loops
+compile their body several times, and its OpenMP layer spins at every barrier: with one other busy process on two
+cores, an iteration took 650 ms instead of 300.
 
-Numba's disk cache notices an edit of the file that holds a kernel, but not of the files it calls into.
-The cache therefore lives in a folder named after a hash of all kernel sources: an edited kernel is never stale.
+Numba's disk cache detects an edit of a kernel's own file, but not of the files that the kernel calls. The name of the
+cache folder therefore contains a hash of all kernel sources: an edited kernel is never stale.
 """
 
 import atexit
@@ -38,8 +38,8 @@ _TAKES = re.compile(r"^from (endotsr[\w.]*) import (\([^)]*\)|[^\n(]+)", re.MULT
 def kernel_sources() -> list[Path]:
     """Every source file whose text is part of a kernel.
 
-    These are the files that compile something, and those from which they take a constant (a name in capitals) or a
-    whole module. No other name can reach the inside of a kernel: a function that is not compiled cannot be called.
+    These are the files that compile something, and those from which they import a constant (a name in capitals) or a
+    whole module. Other names cannot occur in a kernel, because kernels call compiled functions only.
     """
     files = {file: file.read_text(encoding="utf-8") for file in sorted(_PACKAGE.rglob("*.py"))}
     found = {file for file, text in files.items() if _COMPILES.search(text)} | set((_PACKAGE / "kernels").glob("*.py"))
@@ -51,7 +51,7 @@ def kernel_sources() -> list[Path]:
 
 
 def _constants_from(text: str) -> Iterator[Path]:
-    """Files of the modules that a source takes constants from, or takes whole."""
+    """Files of the modules that a source imports, or imports constants from."""
     for module, names in _TAKES.findall(text):
         base = _PACKAGE.parent.joinpath(*module.split("."))
         for name in re.findall(r"\w+", names):
@@ -82,7 +82,7 @@ def _use_hashed_cache_folder() -> None:
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether files can be created there. Otherwise Numba would silently cache beside the sources, without the hash."""
+    """Whether files can be created there. If not, Numba would silently cache next to the sources, without the hash."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -97,8 +97,8 @@ def _passing_folder(wanted: Path) -> Path:
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     os.environ["NUMBA_CACHE_DIR"] = folder
     print(
-        f"endotsr: warning: {wanted} cannot be written: kernels are compiled anew at every start;"
-        " set NUMBA_CACHE_DIR to a folder that can be written",
+        f"endotsr: warning: {wanted} is not writable: kernels are recompiled at every start;"
+        " set NUMBA_CACHE_DIR to a writable folder",
         file=sys.stderr,
     )
     return Path(folder)
@@ -110,7 +110,7 @@ if not os.environ.get("NUMBA_THREADING_LAYER"):
 
 
 def jit(function: F, *, contract: bool = False) -> F:
-    """Compile `function` on first call, for whatever dtypes it is called with.
+    """Compile `function` on first call, once for each combination of dtypes.
 
     contract   allow fused multiply-add; for the fast path only
     """
@@ -120,7 +120,7 @@ def jit(function: F, *, contract: bool = False) -> F:
         error_model="numpy",  # 1/0 is inf as in NumPy: one meaning with the JIT on or off
         fastmath={"contract"} if contract else False,
     )(function)
-    return compiled  # to a type checker a kernel is the function it was made from
+    return compiled  # typed as the function it was compiled from
 
 
 def jit_inline(function: F) -> F:
@@ -130,10 +130,10 @@ def jit_inline(function: F) -> F:
 
 
 def jit_formula(function: F) -> F:
-    """Compile a formula of scalars and tuples of scalars; every kernel that calls it holds it inlined. A decorator.
+    """Decorator: compile a formula of scalars and tuples of scalars, to be inlined into every kernel that calls it.
 
-    Unlike `jit_inline` it leaves the inlining to LLVM: types are inferred once for each dtype and not at every call,
-    which halves the compilation of the projection. A local array of `vectors` must not be passed to it.
+    Unlike in `jit_inline`, LLVM does the inlining. Types are then inferred once per dtype instead of at every call,
+    which halves the compile time of the projection. A local array of `vectors` must not be passed to a formula.
     """
     compiled: Any = numba.njit(forceinline=True, error_model="numpy")(function)
     return compiled

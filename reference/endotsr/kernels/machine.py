@@ -1,4 +1,4 @@
-"""What this machine offers to a computation: its cores, its memory, and what decides the last bits of its results."""
+"""Properties of this machine: cores, memory, and the compile target, which affects the last bits of results."""
 
 import hashlib
 import os
@@ -6,15 +6,15 @@ import platform
 
 
 def usable_cores() -> int:
-    """Cores that this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def compiled_for() -> str:
-    """What kernels are compiled for, as words without spaces: processor, and what else can change a rounding.
+    """The compile target of kernels, a string without spaces: everything that can change a rounding.
 
-    It is the name of the processor alone on Linux with glibc, without the variables of Numba. Otherwise the system,
-    whose C library has other functions `exp` and `log`, and a digest of NUMBA_CPU_FEATURES follow.
+    On Linux with glibc and without variables of Numba it is the processor name. Another system, whose C library has
+    other `exp` and `log`, and a digest of NUMBA_CPU_FEATURES are appended.
     """
     import numba
     from llvmlite.binding import get_host_cpu_name
@@ -29,12 +29,12 @@ def compiled_for() -> str:
 
 
 def memory_of_machine() -> int | None:
-    """Bytes of memory of this machine; None where the system does not say."""
+    """Bytes of memory of this machine; None if the system does not report it."""
     return _memory("total")
 
 
 def memory_available() -> int | None:
-    """Bytes that programs can still take without swapping; None where the system does not say."""
+    """Bytes available to programs without swapping; None if the system does not report it."""
     return _memory("available")
 
 
@@ -43,5 +43,5 @@ def _memory(kind: str) -> int | None:
 
     try:
         return getattr(psutil.virtual_memory(), kind)
-    except (psutil.Error, NotImplementedError, OSError, RuntimeError):  # a system without /proc, say
+    except (psutil.Error, NotImplementedError, OSError, RuntimeError):  # for example, no /proc
         return None

@@ -1,4 +1,4 @@
-"""Memory: reuse of what an iteration frees, the limit for what a clip may keep, and values kept up to a limit."""
+"""Memory: reuse of freed arrays, the memory limit of a clip, and a cache with a limit."""
 
 import ctypes
 import sys
@@ -12,16 +12,16 @@ from endotsr.kernels.machine import memory_of_machine
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
-ASSUMED = 4e9  # bytes of memory of a machine whose system does not say how much it has
+ASSUMED = 4e9  # bytes of memory assumed if the system does not report its amount
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # of mallopt(3)
 
 
 def keep_freed_memory() -> bool:
     """Let glibc reuse freed arrays instead of returning their pages to the system.
 
-    A returned page costs a page fault when it is allocated again, one per 4 kB: 20 ms of an iteration at 640x512, and
-    two seconds with a million Gaussians. Therefore no array is mapped separately, and the heap keeps what is freed.
-    returns  whether the setting was accepted; on other C libraries nothing changes
+    Reallocating a returned page costs a page fault, one per 4 kB: 20 ms of an iteration at 640x512, and two seconds
+    with a million Gaussians. Therefore no array is mapped separately, and the heap retains freed memory.
+    returns  whether the setting was accepted; other C libraries are left unchanged
     """
     if not sys.platform.startswith("linux"):
         return False
@@ -33,15 +33,15 @@ def keep_freed_memory() -> bool:
 
 
 def memory_limit(gigabytes: float) -> float:
-    """Bytes that the frames of a clip and what is computed from them may take.
+    """Memory limit, in bytes, of the frames of a clip and everything computed from them.
 
-    gigabytes   `sequence.memory`; 0 = half of this machine's memory, or of ASSUMED where the system does not say
+    gigabytes   `sequence.memory`; 0 = half of this machine's memory, or of ASSUMED if that is unknown
     """
     return gigabytes * 1e9 if gigabytes > 0 else (memory_of_machine() or ASSUMED) / 2
 
 
 def unknown_memory() -> str:
-    """Words that say what is assumed where the system does not say how much memory there is; "" if it does."""
+    """A note on the assumed amount of memory; "" if the system reports the amount."""
     return (
         "" if memory_of_machine() else f"the system does not say how much memory it has: {ASSUMED / 1e9:g} GB assumed"
     )
@@ -63,10 +63,10 @@ def bytes_of(value: object) -> int:
 
 
 class Kept(Generic[Key, Value]):
-    """Values by key that were computed once and are kept; the oldest are dropped where they need more than `limit`.
+    """A cache of computed values by key. Beyond `limit` bytes, the oldest values are dropped.
 
-    A dropped value is computed again when it is asked for. It must therefore be a function of its key, and the limit
-    changes no result.
+    A dropped value is recomputed on request. A value must therefore be a function of its key; the limit changes no
+    result.
     """
 
     def __init__(self, limit: float = np.inf) -> None:
@@ -83,14 +83,14 @@ class Kept(Generic[Key, Value]):
         return self._values[key]
 
     def put(self, key: Key, value: Value) -> None:
-        """Keep a value. The newest is kept whatever it needs."""
+        """Store a value. The newest value is kept even if it exceeds the limit."""
         self._values[key] = value
         self.bytes += bytes_of(value)
         while self.bytes > self.limit and len(self._values) > 1:
             self.bytes -= bytes_of(self._values.pop(next(iter(self._values))))
 
     def get(self, key: Key, make: Callable[[], Value]) -> Value:
-        """The value of a key, made at first use."""
+        """The value of a key, computed at first use."""
         if key not in self._values:
             self.put(key, make())
         return self._values[key]

@@ -1,4 +1,4 @@
-"""Sums over all Gaussians whose order depends on nothing: not on the threads, not on what is drawn."""
+"""Sums over all Gaussians in a fixed order, independent of the threads and of visibility."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ _block_sums_kernel = jit(_block_sums)
 
 
 def sum_columns(rows: FloatArray, length: int) -> FloatArray:
-    """Sum of the columns of `rows` (K, N), shape (K,): those of a block of `length` first, then the blocks."""
+    """Sum of the columns of `rows` (K, N), shape (K,): first within blocks of `length` columns, then over blocks."""
     blocks = -(-rows.shape[1] // length)
     sums = np.empty((blocks, rows.shape[0]), rows.dtype)
     parallel_for(_block_sums_kernel, blocks, rows, length, sums)

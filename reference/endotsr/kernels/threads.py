@@ -1,8 +1,8 @@
 """Threads for serial kernels: `parallel_for` distributes the rows (or blocks, or Gaussians) of a kernel.
 
-A kernel `kernel(first, stop, *arguments)` handles the tasks first ... stop - 1 and is compiled once, as a plain
-loop without the interpreter lock. Python threads call it for ranges of tasks. Every task writes cells of its own,
-so neither the number of threads nor the ranges can change a bit of the result.
+A kernel `kernel(first, stop, *arguments)` handles the tasks first ... stop - 1. It is compiled once, as a plain loop
+that releases the interpreter lock. Python threads call it for ranges of tasks. No two tasks write to the same cell, so
+results are bitwise independent of the number of threads and of the ranges.
 
 Numba's `parallel=True` is not used. It compiles the body of a loop about five times (4.4 s instead of 0.9 s for the
 similarity kernel, three times as long for a cold start). Its regions cost 130 us each instead of 15 us. Its static
@@ -20,7 +20,7 @@ import numba
 from endotsr.errors import InputError
 from endotsr.kernels.machine import usable_cores
 
-RANGES_PER_THREAD = 16  # no range is shorter than tasks / (threads RANGES_PER_THREAD), so that there are few of them
+RANGES_PER_THREAD = 16  # the shortest range is tasks / (threads RANGES_PER_THREAD), which limits their number
 
 
 class _Job(NamedTuple):
@@ -38,12 +38,12 @@ _hiring = threading.Lock()
 
 
 def parallel_for(kernel: Callable[..., Any], tasks: int, *arguments: Any) -> None:
-    """Call kernel(first, stop, *arguments) for ranges that make up 0 ... tasks - 1, on several threads.
+    """Call kernel(first, stop, *arguments) for ranges that cover 0 ... tasks - 1, on several threads.
 
-    kernel   made by `jit`; a task must write to cells of its own. Undecorated functions run in this thread alone
+    kernel   compiled by `jit`; no two tasks may write to the same cell. A plain function runs in this thread alone
     The number of threads is `numba.get_num_threads()`, this one included.
-    Edges:   no tasks: nothing is called. The first call of a kernel compiles it, in this thread.
-    Raises:  what the kernel raises, after all ranges have ended.
+    Edges:   without tasks nothing is called. The first call of a kernel compiles it in this thread.
+    Raises:  the kernel's exception, after all ranges have ended.
     """
     threads = min(numba.get_num_threads(), tasks)
     if threads <= 1 or not getattr(kernel, "overloads", None):
@@ -54,11 +54,11 @@ def parallel_for(kernel: Callable[..., Any], tasks: int, *arguments: Any) -> Non
 
 
 def parallel_calls(*calls: Callable[[], Any]) -> list[Any]:
-    """The results of calls that do not depend on one another, in their order, made at the same time.
+    """Results of independent calls, in order; the calls run concurrently.
 
-    This is for the work between kernels: an idle thread takes the next call, or joins the `parallel_for` of a running
-    one. With one thread, or with the JIT off (Python code holds the interpreter lock), the calls run in sequence.
-    Raises:  what a call raises, after all have ended.
+    For the work between kernels: an idle thread starts the next call, or joins the `parallel_for` of a running call.
+    With one thread, or with the JIT off (Python code holds the interpreter lock), the calls run in sequence.
+    Raises:  the exception of a call, after all have ended.
     """
     alone = numba.config.DISABLE_JIT  # type: ignore[attr-defined]
     threads, results = 1 if alone else numba.get_num_threads(), [None] * len(calls)
@@ -76,7 +76,7 @@ def parallel_calls(*calls: Callable[[], Any]) -> list[Any]:
 def use_threads(asked: int) -> int:
     """Set the number of threads of compiled kernels (0 = all cores) and return it. No result depends on it.
 
-    A number above that of the threads Numba started (one per core) means all of them. Raises InputError below 0.
+    A number above Numba's thread count (one per core) selects all threads. Raises InputError below 0.
     """
     if asked < 0:
         raise InputError(f"--threads {asked} is not allowed; allowed: 0 (all cores) or more")
@@ -90,7 +90,7 @@ def use_threads(asked: int) -> int:
 def _distribute(
     kernel: Callable[..., Any], arguments: tuple[Any, ...], pieces: list[tuple[int, int]], threads: int
 ) -> None:
-    """Run every piece in one of the threads, this one included, and wait for all of them."""
+    """Run all ranges on the threads, this one included, and wait for them."""
     _hire(threads - 1)
     job = _Job(kernel, arguments, iter(pieces), SimpleQueue())
     for _ in range(threads - 1):
@@ -102,7 +102,7 @@ def _distribute(
 
 
 def ranges(tasks: int, threads: int) -> list[tuple[int, int]]:
-    """Ranges that make up 0 ... tasks - 1. Each is half of what remains for a thread, so the last ones are short."""
+    """Ranges that cover 0 ... tasks - 1. Each is half of a thread's share of the rest, so the last ones are short."""
     smallest = -(-tasks // (threads * RANGES_PER_THREAD))
     found, first = [], 0
     while first < tasks:
@@ -123,7 +123,7 @@ def _work(job: _Job) -> None:
 
 def _serve(jobs: SimpleQueue) -> None:
     while True:
-        _work(jobs.get())  # without a local name, which would keep the last arrays alive in a waiting thread
+        _work(jobs.get())  # no local name: it would keep the last arrays alive in a waiting thread
 
 
 def _hire(count: int) -> None:
@@ -135,7 +135,7 @@ def _hire(count: int) -> None:
 
 
 def _forget_workers() -> None:
-    """A forked process has none of the threads of its parent."""
+    """Forget the parent's threads in a forked process, where they do not exist."""
     global _jobs, _hiring
     _jobs, _hiring = SimpleQueue(), threading.Lock()
     _workers.clear()

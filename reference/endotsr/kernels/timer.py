@@ -1,8 +1,8 @@
-"""Announcing stages to a timer, so that a benchmark can tell where the time of an iteration goes.
+"""Stage marks for a timer, with which a benchmark splits the time of an iteration.
 
-A function that does the work of several stages takes `timer: Timer = NO_TIMER` and marks each of them with
-`with timer.stage(name):`. Comes in: nothing but the name. Goes out: nothing; results do not depend on the timer.
-The stages and their meaning belong to `endotsr.bench.clock`, which refuses a name that it does not know.
+A function with several stages has an argument `timer: Timer = NO_TIMER` and marks each stage by
+`with timer.stage(name):`. Results do not depend on the timer. `endotsr.bench.clock` defines the stages and rejects
+unknown names.
 """
 
 from collections.abc import Callable
@@ -16,15 +16,15 @@ class Timer(Protocol):
     """Receives the beginning and the end of every stage."""
 
     def stage(self, name: str) -> AbstractContextManager[object]:
-        """The time of the block, in the thread that runs it, belongs to the stage `name`.
+        """Assign the time of the block, in its thread, to the stage `name`.
 
-        Blocks may nest (the inner stage then has its time to itself) and run in several threads at once.
+        Blocks may nest and may run in several threads at once. The time of an inner block is counted only there.
         """
         ...
 
 
 class _NoTimer:
-    """Measures nothing; a stage costs some tenth of a microsecond."""
+    """Measures nothing; a stage costs about 0.1 us."""
 
     def __init__(self) -> None:
         self._nothing = nullcontext()
@@ -37,7 +37,7 @@ NO_TIMER = _NoTimer()
 
 
 def timed(timer: Timer, stage: str, call: Callable[[], Result]) -> Callable[[], Result]:
-    """`call` with its time counted for `stage`: an argument of `parallel_calls`."""
+    """`call` with its time assigned to `stage`, as an argument of `parallel_calls`."""
 
     def counted() -> Result:
         with timer.stage(stage):
