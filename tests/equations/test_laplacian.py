@@ -300,7 +300,7 @@ def test_refused_input():
     masks = support_masks(np.ones((8, 8)))
     with pytest.raises(ValueError, match="fit"):
         laplacian_loss_forward(rendered[:, :7], observed, masks)
-    with pytest.raises(ValueError, match="made for"):
+    with pytest.raises(ValueError, match="in the masks"):
         laplacian_loss_forward(rendered, observed, masks, "half_pixel")
     with pytest.raises(ValueError, match="co_sited"):
         support_masks(np.ones((8, 8)), 3, "bicubic")

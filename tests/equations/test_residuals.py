@@ -169,5 +169,5 @@ def test_refused_input():
             appearance_forward(coefficients, atoms, beta)
     with pytest.raises(ValueError, match="expected"):
         motion_forward(coefficients, atoms[:-1])
-    with pytest.raises(ValueError, match="upstream"):
+    with pytest.raises(ValueError, match="d_out"):
         motion_reverse(upstream[:, :-1], motion_forward(coefficients, atoms)[1])

@@ -1,5 +1,5 @@
-"""The equations of the paper, one per module. The room does not depend on scenes, files or the trainer.
+"""The equations of the paper, one per module, independent of scenes, files and the trainer.
 
-Input: NumPy arrays, Gaussian index last; time normalised to [0, 1]. Output: values, and saved tuples for the reverse
-pass, which stands directly below each forward pass.
+In: NumPy arrays, Gaussian index last; time normalised to [0, 1]. Out: values, and saved tuples for the reverse pass,
+which follows directly below each forward pass.
 """

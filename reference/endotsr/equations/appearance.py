@@ -1,7 +1,7 @@
 """Equation (2): the bounded colour residual of component A.
 
-In: coefficients A (3, 2F, N), dimensionless, and the normalised atoms phi_bar(t) (2F,). Out: the residual (3, N) in
-units of the degree-0 harmonic coefficient, to be added to it: beta tanh(A phi_bar) / Y00. Adding it there moves the
+In: coefficients A (3, 2F, N), dimensionless, and the normalised atoms phi_bar(t) (2F,). Out: the residual (3, N),
+beta tanh(A phi_bar) / Y00, in units of the degree-0 harmonic coefficient. Added to that coefficient, it changes the
 displayed colour by beta tanh(A phi_bar) before the clamp at 0.
 """
 
@@ -38,10 +38,10 @@ class AppearanceGrads(NamedTuple):
 
 
 def _exp_nonpositive(z):
-    """exp(-z) for z >= 0 by straight-line arithmetic, accurate to a few ulp, also for large z.
+    """exp(-z) for z >= 0 by straight-line arithmetic, accurate to a few ulp even for large z.
 
-    z = k ln 2 + r: the product k * LN2_HIGH is exact, so r keeps all its digits (2^(-z log2 e) would lose
-    as many as z has).
+    z = k ln 2 + r: the product k * LN2_HIGH is exact, so r keeps full precision; 2^(-z log2 e) would lose
+    the digits of the integer part of z.
     """
     real = type(z)
     z = real(SATURATED) if z > real(SATURATED) else z
@@ -57,16 +57,16 @@ def _tanh_and_slope(x):
     """tanh x and its derivative, both to a few ulp for every x.
 
     With e = exp(-2|x|): tanh |x| = (1 - e) / (1 + e) and tanh' = 4 e / (1 + e)^2. The textbook 1 - tanh^2
-    loses every digit of a saturated residual (0 from x = 10 in float32), which could then never return.
-    (1 - e) cancels for small |x|, where the seventh convergent of the continued fraction
-    x / (1 + x^2 / (3 + x^2 / (5 + ...))) takes over.
+    loses every digit of a saturated residual (0 from x = 10 in float32), which could then never recover.
+    1 - e cancels for small |x|; there the seventh convergent of the continued fraction
+    x / (1 + x^2 / (3 + x^2 / (5 + ...))) is used.
     """
     real = type(x)
     size = abs(x)
     e = _exp_nonpositive_kernel(size + size)
     one_more = real(1.0) + e
     large = (real(1.0) - e) / one_more
-    q = min(x * x, real(1.0))  # the convergent is used below 1/2 only; elsewhere it must not overflow
+    q = min(x * x, real(1.0))  # the convergent is used only below 1/2; the bound prevents overflow elsewhere
     numerator = real(135135.0) + q * (real(17325.0) + q * (real(378.0) + q))
     denominator = real(135135.0) + q * (real(62370.0) + q * (real(3150.0) + q * real(28.0)))
     small = size * (numerator / denominator)
@@ -99,9 +99,9 @@ def appearance_forward(
     returns              (3, N) residual in units of the degree-0 harmonic coefficient, |residual| <= beta / Y00,
                          dtype of A; and the saved tuple
     Reverse: appearance_reverse, below.
-    Edges:   A = 0 gives exactly 0, so the base colour is bitwise unchanged; a saturated residual is finite and
-             its derivative keeps its digits up to |A phi_bar| = 350 (float64) and 43 (float32).
-    Raises:  ValueError if the shapes do not fit or beta is not finite and positive.
+    Edges:   A = 0 gives exactly 0, so the base colour is bitwise unchanged. A saturated residual is finite, and its
+             derivative is accurate up to |A phi_bar| = 350 (float64) and 43 (float32).
+    Raises:  ValueError if the shapes disagree or beta is not finite and positive.
     Oracle:  `endotsr.definition.appearance`
     """
     if not (math.isfinite(beta) and beta > 0):
@@ -118,9 +118,9 @@ def appearance_reverse(
 ) -> AppearanceGrads:
     """Reverse of equation (2).
 
-    d_residual  (3, N)  gradient of the residual, equal to that of the degree-0 coefficient it is added to
-    returns     gradients of A (3, 2F, N) and phi_bar (2F,), the latter added in float64, None unless `atom_gradient`
-    Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
+    d_residual  (3, N)  derivative of the loss with respect to the residual, as to the degree-0 coefficient
+    returns     gradients of A (3, 2F, N) and phi_bar (2F,), the latter summed in float64, None unless `atom_gradient`
+    Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual, not zero: training can leave A = 0.
     """
     d_argument = argument_gradient(d_residual, saved)
     return AppearanceGrads(

@@ -1,8 +1,8 @@
 """The sum over atoms that equations (2) and (3) share: out[c, i] = sum_a coefficients[c, a, i] atoms[a].
 
-In: coefficients (3, 2F, N), atoms (2F,). Out: (3, N). The sum runs in the order of the atoms, one rounding per step,
-so the result does not depend on the block size or the number of threads. The reverse pass adds over the Gaussians in
-float64, block by block.
+In: coefficients (3, 2F, N), atoms (2F,). Out: (3, N). Atoms are summed in order with one rounding per step, so the
+result does not depend on the block size or the number of threads. The reverse pass sums over the Gaussians in float64,
+block by block.
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-GAUSSIANS_PER_TASK = 1024  # Gaussians a task; a few rows of a block stay in the first-level cache
-LANES = 64  # partial sums side by side: enough to fill the vector units
+GAUSSIANS_PER_TASK = 1024  # Gaussians per task; a few rows of a block fit in the first-level cache
+LANES = 64  # independent partial sums, enough to fill the vector units
 
 
 def _combine(first, last, coefficients, atoms, out):
@@ -96,7 +96,7 @@ def spread(
     """Reverse of `combine`: gradients of the coefficients (3, 2F, N) and, if requested, of the atoms (2F,)."""
     dtype = coefficients.dtype
     if d_out.shape != (coefficients.shape[0], coefficients.shape[2]):
-        raise ValueError(f"upstream {d_out.shape} does not fit coefficients {coefficients.shape}")
+        raise ValueError(f"d_out {d_out.shape} and coefficients {coefficients.shape}; expected (3, N) and (3, 2F, N)")
     d_out = np.ascontiguousarray(d_out, dtype)
     d_coefficients, tasks = np.empty(coefficients.shape, dtype), _blocks(coefficients.shape[2])
     parallel_for(_spread_kernel, tasks, d_out, np.ascontiguousarray(atoms, dtype), d_coefficients)

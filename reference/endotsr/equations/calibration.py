@@ -1,11 +1,11 @@
 """Equation (7): the weight of the Laplacian loss that makes its gradient a given fraction of the photometric one.
 
-In: for every calibration view the RMS, over all pixels and channels, of the gradient of the whole photometric term
-and of L_lap by the unclamped render. Out: lambda_lap = r / median over the views of (g_lap / g_rgb). The trainer
-renders the views; this module does not depend on it.
+In: for every calibration view, the RMS over all pixels and channels of two gradients with respect to the unclamped
+render: of the whole photometric term (g_rgb) and of L_lap (g_lap). Out: lambda_lap = r / median_views(g_lap / g_rgb).
+The trainer renders the views; this module does not depend on it.
 
-For a mean of absolute values these RMS values depend on the signs of the residuals, not on their size: that of (B6) on
-how many are nonzero, that of (5) on the pattern of signs of the bands.
+The gradient of a mean absolute value depends on the signs of the residuals, not on their size. For (B6), the RMS
+depends on the number of nonzero residuals; for (5), on the sign pattern of the bands.
 """
 
 import math
@@ -19,7 +19,7 @@ from endotsr.errors import CalibrationError
 
 
 class ViewRms(NamedTuple):
-    """Gradient sizes of one calibration view."""
+    """Gradient magnitudes of one calibration view."""
 
     name: str  # frame name, for the table
     photometric: float  # g_rgb, RMS of d photometric / d render
@@ -27,7 +27,7 @@ class ViewRms(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """The calibrated weight and the ratios that it is computed from."""
+    """The calibrated weight and the ratios it is computed from."""
 
     lambda_lap: float
     ratios: NDArray[np.float64]  # (valid views,)  g_lap / g_rgb, in the order of the views
@@ -35,7 +35,7 @@ class Calibration(NamedTuple):
 
 
 def rms(gradient: NDArray[np.floating]) -> float:
-    """Root mean square over all entries, added in float64; 0 for an empty array."""
+    """Root mean square over all entries, summed in float64; 0 for an empty array."""
     flat = np.asarray(gradient, np.float64).reshape(-1)
     return math.sqrt(float(np.mean(flat * flat))) if flat.size else 0.0
 
@@ -43,7 +43,7 @@ def rms(gradient: NDArray[np.floating]) -> float:
 def calibration_views(n_train: int, count: int) -> NDArray[np.int64]:
     """Positions, within the training frames, of the views to calibrate on: round(linspace(0, n_train - 1, count)).
 
-    n_train  number of training frames, >= 0; fewer than `count` gives each of them once
+    n_train  number of training frames, >= 0; if fewer than `count`, all of them are returned
     returns  ascending, without repeats
     """
     if n_train <= 0 or count <= 0:
@@ -52,7 +52,7 @@ def calibration_views(n_train: int, count: int) -> NDArray[np.int64]:
 
 
 def _verdict(view: ViewRms) -> str:
-    """The reason why a view cannot be used, or an empty string."""
+    """The reason to drop a view, or an empty string."""
     if not (math.isfinite(view.photometric) and math.isfinite(view.laplacian)):
         return "gradient not finite"
     if view.photometric <= 0:
@@ -67,11 +67,11 @@ def _verdict(view: ViewRms) -> str:
 def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_ratio: float) -> Calibration:
     """Equation (7): lambda_lap = r / median_v(g_lap,v / g_rgb,v).
 
-    views           per view its name, g_rgb and g_lap (loss per display unit)
-    gradient_ratio  r > 0, the wanted ratio of the Laplacian gradient to the photometric one
+    views           name, g_rgb and g_lap (loss per display unit) of each view
+    gradient_ratio  r > 0, the desired ratio of the Laplacian gradient to the photometric one
     returns         lambda_lap (linear in r), the ratios of the valid views, a printable table
-    Edges:          a view with g_rgb = 0 or a gradient that is not finite is dropped; an even number of views
-                    takes the mean of the middle two.
+    Edges:          a view with g_rgb = 0 or a non-finite gradient is dropped. The median of an even number of ratios
+                    is the mean of the middle two.
     Raises:         CalibrationError with the table if no view is valid or the median is 0; ValueError for r <= 0.
     Oracle:         `endotsr.definition.calibration`
     """

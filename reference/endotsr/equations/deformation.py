@@ -4,13 +4,12 @@
     quartic:   basis = exp(-u^2),  u = (t - centre)^2 / S         (what the released code computes)
     gaussian:  basis = exp(-u),    u = (t - centre)^2 / (2 S)     (the textbook form)
 
-Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the log-scale, all before
-activation. In: three arrays (10, B, N) and one time. Out: ten offsets per Gaussian. The use of the offsets is no
-concern of this module.
+Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the log-scale, all before activation (by
+`scene_at`). In: three arrays (10, B, N) and one time. Out: ten offsets per Gaussian.
 
-The arrays hold 510 of about 670 numbers of a Gaussian, so the passes are bound by memory: each (channel,
-basis) row is streamed once, in pieces that stay in the second-level cache. A basis value ends at 2^-60, so that most
-bases do not reach a given time; a stretch of Gaussians of which none does is left out before its exponentials.
+These arrays are 510 of about 670 numbers per Gaussian, so the passes are memory-bound. Each (channel, basis) row is
+streamed once, in pieces that fit in the second-level cache. Basis values below 2^-60 are 0, so most bases do not reach
+a given time. A stretch of Gaussians without a basis that does is skipped before its exponentials are computed.
 """
 
 from typing import Literal, NamedTuple
@@ -32,12 +31,12 @@ LARGEST_U = 128.0  # above it the basis value is 0 for either basis; keeps u^2 f
 REACH_MARGIN = 1.0001  # on the bounds of u below, beyond their rounding
 QUARTIC_REACH = REACH_MARGIN * (-SMALLEST_EXPONENT / LOG2_E) ** 0.5  # u above which a basis value is 0
 GAUSSIAN_REACH = REACH_MARGIN * -2 * SMALLEST_EXPONENT / LOG2_E
-GAUSSIANS_PER_PIECE = 4096  # Gaussians in one piece of a row: long enough for the memory to be read ahead
-GAUSSIANS_PER_STRETCH = 32  # Gaussians of a piece that are left out together, where no basis reaches the time
+GAUSSIANS_PER_PIECE = 4096  # Gaussians in one piece of a row: long enough for hardware prefetching
+GAUSSIANS_PER_STRETCH = 32  # Gaussians of a piece that are skipped together if no basis reaches the time
 
 
 class DeformationSaved(NamedTuple):
-    """What the reverse pass needs: the inputs themselves (references, not copies)."""
+    """References to the inputs, for the reverse pass."""
 
     weight: FloatArray  # (10, B, N)
     centre: FloatArray  # (10, B, N)
@@ -64,12 +63,12 @@ def deformation_forward(
     fdm_centre  (10, B, N)  theta, normalised time
     fdm_width   (10, B, N)  sigma, normalised time, any sign (only its square counts)
     t           normalised time; outside [0, 1] the model fades to the canonical pose
-    returns     (10, N) offsets in the dtype of the input, and what the reverse pass needs
+    returns     (10, N) offsets in the dtype of the input, and the saved tuple
 
     Reverse: `deformation_reverse`.
-    Edges:   all weights 0 -> offsets exactly 0; B = 0 -> 0; N = 0 -> empty; width 0 is finite. A basis of initial
-             width 0.01 reaches 0.014 in time: at first it hardly moves the frames between two of 17 centres.
-    Raises:  ValueError if shapes or dtypes disagree or the basis is not known.
+    Edges:   all weights 0 -> offsets exactly 0; B = 0 -> 0; N = 0 -> empty; width 0 is finite. A basis of the initial
+             width 0.01 decays within 0.014: it initially barely moves frames between two of the 17 centres.
+    Raises:  ValueError if shapes or dtypes disagree or the basis is unknown.
     Oracle:  `endotsr.definition.deformation`.
     """
     _check(fdm_weight, fdm_centre, fdm_width, basis)
@@ -103,7 +102,7 @@ def deformation_reverse(d_offsets: FloatArray, saved: DeformationSaved) -> Defor
 
 def _check(weight: FloatArray, centre: FloatArray, width: FloatArray, basis: str) -> None:
     if basis not in BASES:
-        raise ValueError(f"basis: {basis!r} is not known; allowed: {', '.join(BASES)}")
+        raise ValueError(f"basis: {basis!r} is unknown; allowed: {', '.join(BASES)}")
     if weight.ndim != 3 or weight.shape[0] != CHANNELS:
         raise ValueError(f"fdm_weight: expected (10, B, N), got {weight.shape}")
     for name, array in (("fdm_centre", centre), ("fdm_width", width)):
@@ -122,13 +121,13 @@ _basis_constants_kernel = jit(_basis_constants)
 
 
 def _reached(centre, width, t, quartic, reached):
-    """Which stretches of a piece hold a basis that reaches t: u <= the bound at which exponents end, or NaN.
+    """Which stretches of a piece have a basis that reaches t: u is at most the cutoff, or NaN.
 
     reached   (stretches,) int32, written: 0 = every basis value of the stretch is exactly 0
     """
     real = centre.dtype.type
     floor, bound = real(WIDTH_FLOOR), real(QUARTIC_REACH if quartic else GAUSSIAN_REACH)
-    full = min(reached.size, centre.size // GAUSSIANS_PER_STRETCH)  # no stretch is asked for where no sum is
+    full = min(reached.size, centre.size // GAUSSIANS_PER_STRETCH)  # complete stretches
     for k in range(full):
         found = np.int32(0)
         for lane in range(GAUSSIANS_PER_STRETCH):
@@ -196,7 +195,7 @@ _reverse_run_kernel = jit(_reverse_run)
 
 
 def _add_row(weight, centre, width, t, quartic, out):
-    """out += weight x basis value, over one piece of a row; stretches that no basis reaches are left out."""
+    """out += weight x basis value, over one piece of a row; stretches that no basis reaches are skipped."""
     reached = np.empty((out.size + GAUSSIANS_PER_STRETCH - 1) // GAUSSIANS_PER_STRETCH, np.int32)
     _reached_kernel(centre, width, t, quartic, reached)
     a, b, k = _next_run_kernel(reached, 0)
@@ -206,7 +205,7 @@ def _add_row(weight, centre, width, t, quartic, out):
 
 
 def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
-    """Gradients of one piece of a row; exactly 0 in the stretches that `_add_row` leaves out."""
+    """Gradients of one piece of a row; exactly 0 in the stretches that `_add_row` skips."""
     reached = np.empty((d_offset.size + GAUSSIANS_PER_STRETCH - 1) // GAUSSIANS_PER_STRETCH, np.int32)
     _reached_kernel(centre, width, t, quartic, reached)
     d_weight[:], d_centre[:], d_width[:] = 0, 0, 0
@@ -238,7 +237,7 @@ def _forward(first, last, weight, centre, width, t, quartic, offsets):
 
 
 def _reverse(first, last, weight, centre, width, t, quartic, d_offsets, d_weight, d_centre, d_width, row_sums):
-    """Each task owns one (channel, basis) row; its sum over Gaussians is taken in fixed order in float64."""
+    """Each task owns one (channel, basis) row and sums it over Gaussians in float64, in a fixed order."""
     bases, count = weight.shape[1:]
     time = weight.dtype.type(t)
     for row in range(first, last):

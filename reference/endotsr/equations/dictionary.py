@@ -1,11 +1,11 @@
 """Equation (1): the Fourier dictionary phi(t), and (1b): its statistics over the training stamps.
 
-In: normalised time t (dimensionless, any finite value; the training stamps lie in [0, 1]) and F frequencies in
-cycles per unit of normalised time. Out: 2F atoms, all sines first, then all cosines. The raw atoms phi drive the
-translation residual, the centred and RMS-normalised atoms phi_bar the colour residual.
+In: normalised time t (dimensionless, any finite value; the training stamps are in [0, 1]) and F frequencies in cycles
+per unit of normalised time. Out: 2F atoms, all sines first, then all cosines. The translation residual uses the raw
+atoms phi; the colour residual uses the centred and RMS-normalised atoms phi_bar.
 
-A dictionary has 2F of about 16 numbers, so everything here is plain NumPy, evaluated in float64 and rounded once
-to the dtype of the frequencies. This module does not depend on Gaussians or frames.
+A dictionary is small (2F is about 16). Plain NumPy evaluates it in float64 and rounds once to the dtype of the
+frequencies. This module does not depend on Gaussians or frames.
 """
 
 import math
@@ -16,12 +16,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from endotsr.kernels.arrays import FloatArray
 
-DEAD_RMS = 1e-6  # below it an atom is rounding noise over the stamps; dividing by it would amplify that noise
-WEAK_RMS = 0.05  # below it an atom is amplified more than twentyfold; `report_atoms` lists it
+DEAD_RMS = 1e-6  # below it, an atom is rounding noise over the stamps, which the division would amplify
+WEAK_RMS = 0.05  # below it, an atom is amplified more than twentyfold; `report_atoms` lists it
 
 
 class DictionarySaved(NamedTuple):
-    """What the reverse pass of the dictionary needs."""
+    """Frequencies and atoms, for the reverse pass."""
 
     t: float
     omega: FloatArray  # (F,)  float64
@@ -46,7 +46,7 @@ class AtomStatistics(NamedTuple):
 
     @property
     def weak(self) -> NDArray[np.bool_]:
-        """(2F,) atoms that are not dead but are amplified by more than 1 / WEAK_RMS."""
+        """(2F,) live atoms that are amplified by more than 1 / WEAK_RMS."""
         return ~self.dead & (self.rms < WEAK_RMS)
 
 
@@ -69,7 +69,7 @@ class AtomReport(NamedTuple):
 def frequencies(count: int, low: float, high: float, dtype: DTypeLike = np.float64) -> FloatArray:
     """Log-spaced frequencies of equation (1), end points exact.
 
-    count    F >= 1; one frequency is `low`
+    count    F >= 1; F = 1 gives `low`
     low      lowest frequency, cycles per unit of normalised time, > 0
     high     highest frequency, >= low
     returns  (F,)  omega[0] == low and omega[-1] == high to the last bit
@@ -89,7 +89,7 @@ def frequencies(count: int, low: float, high: float, dtype: DTypeLike = np.float
 def _sine_cosine(phase: FloatArray) -> tuple[FloatArray, FloatArray]:
     """sin(2 pi phase), cos(2 pi phase) with the phase in turns, exact at every quarter turn.
 
-    The fold is exact in floating point: whole turns, then quarter turns are removed before any rounding by pi.
+    Whole turns, then quarter turns are removed, exactly in floating point, before the multiplication by pi rounds.
     """
     turn = phase - np.rint(phase)  # [-1/2, 1/2]
     quarter = np.rint(4.0 * turn)
@@ -105,7 +105,7 @@ def _sine_cosine(phase: FloatArray) -> tuple[FloatArray, FloatArray]:
 def dictionary_forward(t: float, omega: FloatArray) -> tuple[FloatArray, DictionarySaved]:
     """Equation (1): phi(t) = [sin(2 pi omega_f t) ..., cos(2 pi omega_f t) ...].
 
-    t        ()    normalised time, dimensionless; stamps outside [0, 1] evaluate like any other
+    t        ()    normalised time, dimensionless, any finite value
     omega    (F,)  cycles per unit of normalised time
     returns  (2F,) phi in [-1, 1], all sines then all cosines, dtype of omega; and the saved tuple
     Reverse: dictionary_reverse, below.
@@ -153,7 +153,7 @@ def atom_statistics(times: FloatArray, omega: FloatArray) -> AtomStatistics:
     returns  mean, rms (2F,) in float64 and the dead atoms
     Reverse: none (constant in training).
     Edges:   one stamp -> all atoms dead. An atom that is constant over the stamps is dead.
-    Raises:  ValueError without stamps or with a stamp that is not finite.
+    Raises:  ValueError if there is no stamp or a stamp is not finite.
     Oracle:  `endotsr.definition.dictionary`; tests/oracle/fourier_oracle.py
     """
     atoms = _atoms_over(times, omega)
@@ -180,7 +180,7 @@ def normalise_forward(phi: FloatArray, statistics: AtomStatistics) -> tuple[Floa
 
 
 def normalise_reverse(d_phi_bar: FloatArray, saved: NormaliseSaved) -> FloatArray:
-    """Reverse of (1b) with constant statistics: the same gain. (2F,) -> (2F,)"""
+    """Reverse of (1b): the same gain; the statistics are held fixed. (2F,) -> (2F,)"""
     return (np.asarray(d_phi_bar, np.float64) * saved.gain).astype(saved.dtype)
 
 
@@ -194,8 +194,8 @@ def normalised_atoms(t: float, omega: FloatArray, statistics: AtomStatistics) ->
 def report_atoms(times: FloatArray, omega: FloatArray) -> AtomReport:
     """Rank and condition of the normalised dictionary over the training stamps, and its dead and weak atoms.
 
-    A rank below 2F means that the stamps do not determine all coefficients (few frames, or frames on a grid
-    that aliases the highest frequency).
+    If the rank is below 2F, the stamps do not determine all coefficients: there are too few frames, or their
+    spacing aliases the highest frequency.
     """
     statistics = atom_statistics(times, omega)
     gain = np.where(statistics.dead, 0.0, 1.0 / np.where(statistics.dead, 1.0, statistics.rms))

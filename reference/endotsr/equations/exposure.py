@@ -1,9 +1,8 @@
 """Equation (B13): the exposure of one frame, a gain and a bias of each colour channel.
 
 In: the rendered colours of a view and the parameters of its frame. Out: the colours that are compared with the
-observed frame. The same two numbers act on every pixel of a channel, so this is what a camera's automatic exposure
-and white balance can do to a picture, and nothing that differs from place to place. This module knows no frame
-number and no time.
+observed frame. Gain and bias are constant over the image: they model automatic exposure and white balance, not local
+changes of light. This module depends on neither frame number nor time.
 """
 
 from typing import NamedTuple
@@ -38,7 +37,7 @@ def exposure_forward(colour: FloatArray, log_gain: FloatArray, bias: FloatArray)
 
     Reverse: exposure_reverse, below.
     Edges:   log_gain = 0 and bias = 0 return equal colours; H W = 0 works.
-    Raises:  ValueError if the parameters have not one number for each channel.
+    Raises:  ValueError unless each parameter has one number per channel.
     Oracle:  `endotsr.definition.exposure`
     """
     channels = colour.shape[0]
@@ -51,7 +50,7 @@ def exposure_forward(colour: FloatArray, log_gain: FloatArray, bias: FloatArray)
 
 
 def exposure_reverse(d_exposed: FloatArray, saved: ExposureSaved) -> ExposureGrads:
-    """Reverse of equation (B13), with the sums over the pixels taken in float64 and in a fixed order.
+    """Reverse of equation (B13). Sums over pixels are in float64, in a fixed order.
 
     d_exposed  (C, H, W)  derivative of the loss with respect to the exposed colours
     returns    d_colour = gain d_exposed, d_log_gain = gain sum_p d_exposed colour, d_bias = sum_p d_exposed

@@ -7,8 +7,8 @@ tissue. Out: a scalar in display units, and its derivative with respect to the r
     L_lap = (1/3) sum_j mean over the valid band pixels and the channels of |P_j(rendered) - P_j(observed)|
 
 A band pixel is valid when every input pixel of its footprint is tissue. The pyramid is linear, so one pyramid of the
-difference image, with 0 selected where there is no tissue, gives all valid band pixels exactly: values under
-the instrument (NaN included) reach none of them, and equal images have loss and gradient exactly 0.
+difference image, set to 0 outside tissue, gives all valid band pixels exactly. Values under the instrument (NaN
+included) reach none of them, and equal images have loss and gradient exactly 0.
 """
 
 from typing import NamedTuple
@@ -47,7 +47,7 @@ class LaplacianLevels(NamedTuple):
 
 
 class SupportMasks(NamedTuple):
-    """Which band pixels are valid; depends on the frame only, so it is computed once and cached."""
+    """Valid band pixels; they depend on the frame only and are cached."""
 
     image: BoolArray  # (H, W)  the tissue mask
     bands: tuple[BoolArray, ...]  # valid pixels of P_1 ... P_levels
@@ -55,14 +55,14 @@ class SupportMasks(NamedTuple):
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Valid pixels of every band; 0 = an empty level, which adds 0 to the loss."""
+        """Number of valid pixels of every band; an empty level (0) adds 0 to the loss."""
         return tuple(int(np.count_nonzero(band)) for band in self.bands)
 
 
 class LaplacianSaved(NamedTuple):
     """Signs of the valid band differences, and their weights."""
 
-    signs: tuple[NDArray[np.int8], ...]  # (3, h, w) a level: -1, 0, 1; 0 where not valid
+    signs: tuple[NDArray[np.int8], ...]  # (3, h, w) per level: -1, 0, 1; 0 where invalid
     weights: tuple[float, ...]  # 1 / (levels * channels * valid pixels), 0 for an empty level
     mask: BoolArray  # (H, W)
     upsampling: Upsampling
@@ -88,7 +88,7 @@ def laplacian_levels(image: FloatArray, levels: int = LEVELS, upsampling: Upsamp
 
 
 def _reduce_support(valid: BoolArray) -> BoolArray:
-    """A coarse sample is valid when its 5x5 fine samples are: erosion, then the even samples."""
+    """A coarse sample is valid when its 5x5 fine samples are: erosion, then decimation."""
     for axis in (0, 1):
         taps = reflect_indices(valid.shape[axis])
         valid = np.logical_and.reduce([valid.take(tap, axis=axis) for tap in taps])
@@ -96,7 +96,7 @@ def _reduce_support(valid: BoolArray) -> BoolArray:
 
 
 def _expand_support(valid: BoolArray, shape: tuple[int, ...], upsampling: Upsampling) -> BoolArray:
-    """A fine sample is valid when all coarse samples it is interpolated from are."""
+    """A fine sample is valid when all coarse samples of its interpolation are."""
     for axis in (0, 1):
         parents = [[p for p, _ in expand_parents(i, shape[axis], upsampling)] for i in range(shape[axis])]
         first, last = [p[0] for p in parents], [p[-1] for p in parents]
@@ -114,15 +114,15 @@ def _full_bands(shape: tuple[int, ...], levels: int) -> tuple[BoolArray, ...]:
 
 
 def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
-    """Valid pixels of every band: the mask passed through the operations of the pyramid as a boolean.
+    """Valid pixels of every band: the boolean mask propagated through the operations of the pyramid.
 
     mask     (H, W)  True = tissue
-    returns  a mask of the size of each band. A band pixel is valid when every image pixel it depends on is
+    returns  a mask of the size of each band. A band pixel is valid when every image pixel in its footprint is
              tissue: 5-7, 13-17, 29-37 pixels per axis for `co_sited`, 7, 17, 37 for `half_pixel`
-    Edges:   a level may be empty; it then adds 0 to the loss. Raises ValueError for an unknown `upsampling`.
+    Edges:   a level may be empty. Raises ValueError for an unknown `upsampling`.
     Oracle:  `endotsr.definition.laplacian`; impulse responses of the pyramid, tests/oracle/laplacian_oracle.py.
     """
-    expand_weights(upsampling)  # refuses an unknown name also where nothing is propagated
+    expand_weights(upsampling)  # rejects an unknown name even if nothing is propagated
     mask = np.ascontiguousarray(mask, dtype=np.bool_)
     bands, valid = [], mask
     if mask.all():  # nothing to propagate: every band pixel is valid
@@ -154,7 +154,7 @@ def _band_signs(first, stop, fine, coarse, even, odd, valid, signs, sums):
     blend = np.empty(m + 2, fine.dtype)
     pairs = np.empty((m, 2), fine.dtype)
     smooth = pairs.reshape(-1)
-    columns = np.empty(w)  # float64: one partial sum a column
+    columns = np.empty(w)  # float64: one partial sum per column
     for task in range(first, stop):
         c, top = task // chunks, (task % chunks) * ROWS
         for x in range(w):
@@ -221,21 +221,20 @@ def laplacian_loss_forward(
     """Equation (5): mean magnitude of the valid band differences, averaged over the levels.
 
     rendered    (3, H, W)  unclamped render, display units
-    observed    (3, H, W)  observed image, display units. By linearity the pyramid of the difference is used, so
-                           the observed image itself is enough and no pyramid of it is kept
+    observed    (3, H, W)  observed image, display units
     masks       support_masks(mask, levels, upsampling) of this frame, cached by the caller
-    upsampling  the rule the masks were made for
-    returns     the loss, display units, added in float64; and the saved tuple
+    upsampling  the rule of the masks
+    returns     the loss, display units, summed in float64; and the saved tuple
     Reverse:    laplacian_loss_reverse, below.
-    Edges:      an empty level adds 0 and the factor 1/levels stays; pixels outside the mask may hold anything;
-                equal images have loss 0 and gradient exactly 0 (subgradient of |.| at 0 is 0).
-    Raises:     ValueError if the shapes do not fit or the masks were made for another rule.
+    Edges:      an empty level adds 0 and the factor 1/levels stays. Pixels outside the mask may have any value. Equal
+                images have loss 0 and gradient exactly 0 (subgradient of |.| at 0 is 0).
+    Raises:     ValueError if the shapes disagree or the masks have another rule.
     Oracle:     `endotsr.definition.laplacian`, the difference of two separate pyramids.
     """
     if rendered.shape != observed.shape or rendered.shape[1:] != masks.image.shape:
         raise ValueError(f"rendered {rendered.shape}, observed {observed.shape}, mask {masks.image.shape} do not fit")
     if masks.upsampling != upsampling:
-        raise ValueError(f"the masks were made for {masks.upsampling}, not for {upsampling}")
+        raise ValueError(f"upsampling: {upsampling!r}, but {masks.upsampling!r} in the masks")
     dtype = rendered.dtype
     channels = rendered.shape[0]
     even, odd = (dtype.type(weight) for weight in expand_weights(upsampling))

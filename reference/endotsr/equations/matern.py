@@ -26,14 +26,14 @@ class MaternSaved(NamedTuple):
 def matern_weights(omega: FloatArray, length: float) -> FloatArray:
     """Equation (4), upper line: rho_f proportional to (5/l^2 + (2 pi omega_f)^2)^3, scaled to mean 1.
 
-    The reciprocal spectral density of the Matern-5/2 prior. Evaluated relative to the largest frequency, so that
-    it is finite for every l >= 0: the formula as printed overflows below l = 1e-51 (7e-7 in float32).
+    This is the reciprocal spectral density of the Matern-5/2 prior. It is evaluated relative to the largest frequency
+    and is therefore finite for every l >= 0; the printed formula overflows below l = 1e-51 (7e-7 in float32).
 
     omega    (F,)  cycles per unit of normalised time, finite, > 0
     length   ()    l, normalised time, >= 0; 0 weights all frequencies equally, inf gives omega^6
     returns  (F,)  rho, dimensionless, mean 1, increasing with omega; dtype of omega
     Reverse: none (constant in training).
-    Raises:  ValueError for a negative or NaN length, or a frequency that is not finite and positive.
+    Raises:  ValueError if the length is negative or NaN, or a frequency is not finite and positive.
     Oracle:  1 / Student-t density with 5 degrees of freedom and scale 1/l; mpmath.
     """
     if not length >= 0:
@@ -52,7 +52,7 @@ def matern_weights(omega: FloatArray, length: float) -> FloatArray:
 
 
 def _row_square_sums(first, stop, rows, sums):
-    """sums[r] = sum over n of rows[r, n]^2 in float64, in an order that only the length decides."""
+    """sums[r] = sum over n of rows[r, n]^2 in float64, in an order that depends only on the row length."""
     n = rows.shape[1]
     strips = n // LANES
     lanes = np.empty(LANES)
@@ -92,10 +92,10 @@ def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> 
 
     motion_coefficients  (3, 2F, N)  C, scene units; all sines, then all cosines
     rho                  (F,)        weights
-    returns              the mean weighted square, squared scene units, added in float64; and the saved tuple
+    returns              the mean weighted square, squared scene units, summed in float64; and the saved tuple
     Reverse: matern_penalty_reverse, below.
     Edges:   N = 0 gives 0.
-    Raises:  ValueError if the shapes do not fit.
+    Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.matern`
     """
     axes, atoms, n = motion_coefficients.shape
@@ -113,7 +113,7 @@ def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> 
 
 
 def penalty_factors(d_penalty: float, rho: FloatArray, count: int, dtype: np.dtype) -> FloatArray:
-    """rho_f d_penalty / (3 N F) of every atom (2F,): the gradient of the penalty is this times C. N = count, 0 as 1."""
+    """rho_f d_penalty / (3 N F) of every atom (2F,), N = max(count, 1); times C, it is the penalty's gradient."""
     factor = rho.astype(np.float64) * (float(d_penalty) / (3.0 * max(count, 1) * rho.size))
     return np.tile(factor, 2).astype(dtype)
 

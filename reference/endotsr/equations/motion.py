@@ -2,7 +2,7 @@
 
 In: coefficients C (3, 2F, N) in scene units and the RAW atoms phi(t) (2F,). Out: translations (3, N) in scene
 units, added to the deformed centre. The atoms are not normalised: the penalty of equation (4) is invariant to the
-phase of a sine/cosine pair, and centring or scaling the two atoms of a pair differently would break that.
+phase of a sine/cosine pair, and different offsets or scales of its two atoms would break this invariance.
 """
 
 from typing import NamedTuple
@@ -33,7 +33,7 @@ def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[Fl
     returns              (3, N) translation, scene units, dtype of C; and the saved tuple
     Reverse: motion_reverse, below.
     Edges:   C = 0 gives exactly 0; N = 0 works.
-    Raises:  ValueError if the shapes do not fit.
+    Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.motion`
     """
     return combine(motion_coefficients, phi), MotionSaved(motion_coefficients, phi)
@@ -43,6 +43,6 @@ def motion_reverse(d_translation: FloatArray, saved: MotionSaved, *, atom_gradie
     """Reverse of equation (3).
 
     d_translation  (3, N)  derivative of the loss with respect to the translation, loss / scene unit
-    returns        gradients of C (3, 2F, N) and phi (2F,), the latter added in float64, None unless `atom_gradient`
+    returns        gradients of C (3, 2F, N) and phi (2F,), the latter summed in float64, None unless `atom_gradient`
     """
     return MotionGrads(*spread(d_translation, saved.motion_coefficients, saved.phi, atom_gradient=atom_gradient))

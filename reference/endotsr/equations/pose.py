@@ -1,9 +1,8 @@
 """Equation (B16): a correction of the camera pose of one frame, a rotation and a translation in camera axes.
 
-In: the pose that came with the sequence, and the parameters of its frame. Out: the pose that the frame is rendered
-with. Poses of robots and of tracking programs are off by more than a pixel; without this correction the difference is
-fitted as motion of the scene. Everything is computed in float64, because it is six numbers per frame. This module knows
-no frame number and no time.
+In: the pose from the sequence and the parameters of its frame. Out: the pose used to render the frame. Poses from
+robots and trackers are wrong by more than a pixel; without this correction, the model fits the error as scene motion.
+The six numbers per frame are processed in float64. This module depends on neither frame number nor time.
 """
 
 from math import factorial
@@ -13,7 +12,7 @@ import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
 
-SMALL = 1.0  # rad^2; below it the closed forms lose digits, and ten terms of the series are exact to rounding
+SMALL = 1.0  # rad^2; below it, the closed forms lose digits and ten terms of the series are exact to rounding
 _SIGNS = [(-1.0) ** k for k in range(10)]
 # of f = sin r / r, g = (1 - cos r) / r^2, f' / r and g' / r; powers of r^2, constant first
 SERIES = (
@@ -30,7 +29,7 @@ CROSS = np.array(
 
 
 class PoseSaved(NamedTuple):
-    """The pose that came in, and what the rotation was formed from."""
+    """The input pose, and the rotation vector with its exponential."""
 
     rotation: FloatArray  # (3, 3) float64
     translation: FloatArray  # (3,) float64
@@ -59,7 +58,7 @@ def pose_forward(
     returns  rotation' (3, 3) and translation' (3,), float64; and the saved tuple
 
     Reverse: pose_reverse, below.
-    Edges:   rotation_vector = 0 and offset = 0 return equal numbers.
+    Edges:   rotation_vector = 0 and offset = 0 return the input pose.
     Oracle:  `endotsr.definition.pose`; scipy.linalg.expm, tests/oracle/pose_oracle.py
     """
     w, d, vector = (np.asarray(array, np.float64) for array in (rotation, translation, rotation_vector))

@@ -1,15 +1,15 @@
 """The two resampling steps of the Laplacian pyramid, row by row, and their exact adjoints.
 
-Reduce: the separable binomial [1 4 6 4 1]/16 with border reflect-101 (the edge sample is not repeated), then the
-even samples; n becomes ceil(n/2), for every n >= 1.
+Reduce: the separable binomial [1 4 6 4 1]/16 with border reflect-101 (the edge sample is not repeated), then
+decimation to the even samples; n becomes ceil(n/2), for every n >= 1.
 
 Expand, with coarse length m and fine length n = 2m or 2m - 1, edge samples repeated:
     fine[2k]     = even coarse[k] + (1 - even) coarse[k - 1]
     fine[2k + 1] = odd coarse[k] + (1 - odd) coarse[k + 1]
-`co_sited`: even = 1, odd = 1/2 (coarse k sits on fine 2k). `half_pixel`: even = odd = 3/4 (pixel edges coincide).
-All weights are dyadic, so a mask passed through the same arithmetic stays exact.
+`co_sited`: even = 1, odd = 1/2 (coarse k coincides with fine 2k). `half_pixel`: even = odd = 3/4 (pixel edges
+coincide). All weights are dyadic, so the same arithmetic on a mask is exact.
 
-Fine rows are processed as pairs (m, 2) of an even and an odd sample, so that the inner loops have no strides.
+Fine rows are processed as pairs (m, 2) of an even and an odd sample, which keeps the inner loops free of strides.
 `laplacian` builds its kernels from these row helpers; this module does not depend on losses.
 """
 
@@ -29,7 +29,7 @@ Upsampling = Literal["co_sited", "half_pixel"]
 EXPAND_WEIGHTS: dict[str, tuple[float, float]] = {"co_sited": (1.0, 0.5), "half_pixel": (0.75, 0.75)}
 
 BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
-MARGIN = 2  # taps of the binomial filter to either side
+MARGIN = 2  # taps of the binomial filter on either side
 ROWS = 16  # rows in one partial sum of magnitudes
 
 
@@ -58,7 +58,7 @@ reflect = jit(_reflect)
 
 
 def reflect_indices(n: int) -> list[NDArray[np.int64]]:
-    """For each of the five taps, the fine index it reads for every coarse sample of an axis of length n."""
+    """For each of the five taps, the fine index of every coarse sample of an axis of length n."""
     taps = range(-MARGIN, MARGIN + 1)
     return [np.array([_reflect(2 * k + o, n) for k in range(coarse_length(n))], np.int64) for o in taps]
 
@@ -162,7 +162,7 @@ def _expand_row_adjoint(pairs, even, odd, out):
 
 
 class Table(NamedTuple):
-    """The transpose of a one-dimensional resampling: which source rows, with which weight, make a target row."""
+    """Sparse transpose of a one-dimensional resampling: the source rows and weights of each target row."""
 
     starts: NDArray[np.int64]  # (targets + 1,)  entries of target y: starts[y] ... starts[y + 1]
     index: NDArray[np.int64]  # source row of every entry
@@ -190,7 +190,7 @@ def reduce_adjoint_table(n: int) -> Table:
 
 
 def expand_parents(i: int, n: int, upsampling: Upsampling) -> list[tuple[int, float]]:
-    """The coarse samples with nonzero weight that fine sample i of n is interpolated from, with their weights."""
+    """Coarse samples and nonzero weights that interpolate fine sample i of n."""
     even, odd = expand_weights(upsampling)
     k, m = i // 2, coarse_length(n)
     own, other = (even, max(k - 1, 0)) if i % 2 == 0 else (odd, min(k + 1, m - 1))
@@ -238,7 +238,7 @@ _expand_kernel = jit(_expand)
 
 
 def reduce_image(fine: FloatArray) -> FloatArray:
-    """Binomial filter and even samples: (C, h, w) -> (C, ceil(h/2), ceil(w/2)), same dtype."""
+    """Binomial filter and decimation: (C, h, w) -> (C, ceil(h/2), ceil(w/2)), same dtype."""
     channels, h, w = fine.shape
     out = np.empty((channels, coarse_length(h), coarse_length(w)), fine.dtype)
     parallel_for(_reduce_kernel, channels * out.shape[1], np.ascontiguousarray(fine), out)
