@@ -1,7 +1,7 @@
 """Normalised depth loss (B8): both depth images are divided by their largest value and compared over tissue.
 
-The loss is therefore independent of the scale of the prior depth. The largest rendered depth is part of the loss: its
-derivative goes to the pixel that holds it.
+The loss is therefore independent of the scale of the prior depth. The largest rendered depth is part of the loss, so
+the gradient of the normalisation reaches the pixel with that depth.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ FEWEST_VALID = 10  # pixels with a prior; a frame with fewer has no depth loss
 
 
 class DepthTarget(NamedTuple):
-    """The part that is constant for a frame and may be cached between iterations."""
+    """The part that depends on the frame only and may be cached between iterations."""
 
     normalised: FloatArray  # (H, W)  prior / largest prior of the image, 0 where there is none
     valid: BoolArray  # (H, W)  tissue with a finite prior > 0
@@ -24,7 +24,7 @@ class DepthTarget(NamedTuple):
 
 
 class DepthSaved(NamedTuple):
-    """What the reverse pass needs."""
+    """Render, maximum and sum for the reverse pass."""
 
     rendered_depth: FloatArray  # (H, W)
     target: DepthTarget
@@ -37,7 +37,7 @@ def depth_target(prior_depth: FloatArray, mask: BoolArray) -> DepthTarget:
 
     prior_depth  (H, W)  scene units; 0, negative, NaN and Inf all mean "no depth" (D4)
     mask         (H, W)  bool, True = tissue
-    The largest prior is taken over the whole image, instruments included, as in the released code.
+    The largest prior is the maximum over the whole image, instruments included, as in the released code.
     """
     check_mask(mask)
     prior_depth = check_plane("prior_depth", prior_depth, mask.shape)
@@ -57,9 +57,9 @@ def normalised_depth_forward(rendered_depth: FloatArray, target: DepthTarget) ->
     returns         (loss, dimensionless, summed in float64; saved)
 
     Reverse: `normalised_depth_reverse`.
-    Edges:   fewer than 10 valid pixels, or a render without any positive depth: loss 0, gradient 0 (D3, D4).
-             A value that is not finite never becomes the maximum.
-    Raises:  ValueError for shapes that do not match.
+    Edges:   fewer than 10 valid pixels, or a render without positive depth: loss 0, gradient 0 (D3, D4).
+             Non-finite values are excluded from the maximum.
+    Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.depth`.
     Source:  SurgicalGS's depth loss.
     """
@@ -76,8 +76,8 @@ def normalised_depth_forward(rendered_depth: FloatArray, target: DepthTarget) ->
 def normalised_depth_reverse(d_loss: float, saved: DepthSaved) -> FloatArray:
     """d_rendered_depth (H, W).
 
-    With r the residual, m the largest rendered depth, n the valid pixels:  sign(r) / (n m) at valid pixels (0 at
-    r = 0), and  -sum(sign(r) rendered) / (n m^2)  at the pixel that holds m, split evenly when several do.
+    With r the residual, m the largest rendered depth and n the number of valid pixels:  sign(r) / (n m) at valid pixels
+    (0 at r = 0), and  -sum(sign(r) rendered) / (n m^2)  at the pixel of depth m, divided equally between ties.
     """
     depth, target = saved.rendered_depth, saved.target
     d_depth = np.zeros_like(depth)

@@ -15,7 +15,7 @@ from endotsr.losses.rows import check_image, row_total
 
 
 class MaskedL1Saved(NamedTuple):
-    """The inputs of the loss; the reverse pass computes the sign of the difference again."""
+    """The inputs of the loss; the reverse pass recomputes the sign of the difference."""
 
     rendered: FloatArray  # (C, H, W)
     observed: FloatArray  # (C, H, W)
@@ -32,8 +32,8 @@ def masked_l1_forward(rendered: FloatArray, observed: FloatArray, mask: BoolArra
     returns   (loss, saved); the loss is a float summed in float64
 
     Reverse: `masked_l1_reverse`.
-    Edges:   no tissue: loss 0, gradient 0. Values under False are never read into the result (NaN, Inf allowed).
-    Raises:  ValueError for shapes that do not match or a mask that is not boolean.
+    Edges:   no tissue: loss 0, gradient 0. Values where the mask is False have no effect (NaN, Inf allowed).
+    Raises:  ValueError if the shapes disagree or the mask is not boolean.
     Oracle:  `endotsr.definition.masked_l1`; numpy mean of the selected differences.
     """
     rendered = check_image("rendered", rendered, mask)

@@ -9,14 +9,14 @@ Written with the difference e = x - y and the sum s = x + y, the same quantity i
     SSIM = P Q,   P = 1 - mu_e^2 / B1,   B1 = (mu_s^2 + mu_e^2) / 2 + C1,
                   Q = 1 - sigma_e^2 / B2, B2 = (sigma_s^2 + sigma_e^2) / 2 + C2
 
-because B1 - A1 = (mu_x - mu_y)^2 and B2 - A2 is the variance of x - y. This form needs no covariance, is exactly 1
-with an exactly zero gradient for x = y, is symmetric in x and y to the last bit, and keeps 1 - SSIM to full
-relative precision. It needs no moments of the target either: only the masked target itself is cached.
+because B1 - A1 = (mu_x - mu_y)^2 and B2 - A2 is the variance of x - y (A1, A2 the factors of the numerator). This form
+needs no covariance. For x = y it is exactly 1 with an exactly zero gradient. It is bitwise symmetric in x and y, and
+1 - SSIM has full relative precision. No moments of the target are needed: only the masked target is cached.
 
-Variances are sums of squares about the window's own central value c,  sigma^2 = sum w (x - c)^2 - (sum w (x - c))^2,
+Variances are sums of squares about the window's central value c,  sigma^2 = sum w (x - c)^2 - (sum w (x - c))^2,
 first down columns, then along rows (variance of a mixture = mean of variances + variance of means). The central
-weight w0 = 0.27 bounds the cancellation: sigma^2 >= w0 sum w (x - c)^2 in either pass, so no more than a factor
-1/w0 of relative precision is lost, however bright the region. The usual E[x^2] - E[x]^2 has no such bound.
+weight w0 = 0.27 bounds the cancellation: sigma^2 >= w0 sum w (x - c)^2 in either pass. At most a factor 1/w0 of
+relative precision is lost, at any brightness. The usual E[x^2] - E[x]^2 has no such bound.
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ C2 = 0.03**2  # (0.03 x display range)^2
 
 
 class SsimTarget(NamedTuple):
-    """The part that is constant for a frame and may be cached between iterations."""
+    """The part that depends on the frame only and may be cached between iterations."""
 
     image: FloatArray  # (C, H, W)  observed, 0 where the mask is False
     mask: BoolArray  # (H, W)
@@ -61,7 +61,7 @@ def ssim_target(observed: FloatArray, mask: BoolArray) -> SsimTarget:
 
 
 def stored_target(levels: NDArray[np.unsignedinteger], largest: int, mask: BoolArray, dtype: DTypeLike) -> SsimTarget:
-    """`ssim_target` of levels / largest in `dtype`, for a picture that is stored in whole numbers.
+    """`ssim_target` of levels / largest in `dtype`, for an image stored as integers.
 
     levels   (C, H, W) uint8 or uint16 in [0, largest]
     """
@@ -73,16 +73,16 @@ def stored_target(levels: NDArray[np.unsignedinteger], largest: int, mask: BoolA
 
 
 def masked_ssim_forward(rendered: FloatArray, target: SsimTarget) -> tuple[float, SsimSaved]:
-    """Mean over channels and tissue pixels of the SSIM map of the two masked images (B7). See the module text.
+    """Mean over channels and tissue pixels of the SSIM map of the two masked images (B7); see the module docstring.
 
     rendered  (C, H, W)  display units, not clamped
     target    of `ssim_target`
     returns   (mean SSIM in [-1, 1], saved); summed in float64
 
     Reverse: `masked_ssim_reverse`.
-    Edges:   no tissue: 1 with zero gradient. Images smaller than the window are padded by zeros like any other.
-             The step at the mask border belongs to both images and is part of the map.
-    Raises:  ValueError for shapes that do not match.
+    Edges:   no tissue: 1 with zero gradient. Images smaller than the window are zero-padded as well. The step at the
+             mask border exists in both images and enters the map.
+    Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.masked_ssim`; scipy.ndimage.correlate with zero padding.
     Source:  Wang et al. 2004; window, constants and padding as in 3-D Gaussian splatting code.
     """
@@ -174,7 +174,7 @@ def _column_moments(rows, weights, mean, variance):
 
 
 def _row_moments(column_mean, column_variance, weights, mean, variance):
-    """Mean and variance of the whole window from those of its 11 columns."""
+    """Mean and variance of the whole window from the means and variances of its 11 columns."""
     zero = column_mean.dtype.type(0)
     for i in range(mean.size):
         centre = column_mean[i + RADIUS]
@@ -228,7 +228,7 @@ def _similarity(first, stop, difference, total, mask, weights, slopes, totals):
 
 
 def _similarity_reverse(first, stop, difference, total, slopes, mask, weights, scale, d_rendered):
-    """The transposed window is the window itself: three smoothed maps, combined at each tissue pixel."""
+    """Three smoothed maps, combined at each tissue pixel; the window is symmetric and so its own adjoint."""
     height, width = mask.shape
     two, zero = d_rendered.dtype.type(2), d_rendered.dtype.type(0)
     columns = np.empty(width + 2 * RADIUS, d_rendered.dtype)

@@ -1,7 +1,7 @@
 """Helpers of the image losses: the sum over a row, and the checks of shapes and masks.
 
-A loss is a sum over (channel, row) of float64 row totals. The order of the sum over a row does not depend on the
-number of threads, and one thread adds the row totals, so a loss is bitwise reproducible.
+A loss is a sum over (channel, row) of float64 row totals. Each row is summed in a fixed order, and one thread adds the
+row totals, so a loss is bitwise reproducible for any number of threads.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from endotsr.kernels.jit import jit
 
 
 def _row_total(row):
-    """Sum of a row in float64. Four running sums hide the latency of the addition; their order is fixed."""
+    """Sum of a row in float64, in a fixed order; four running sums hide the latency of the addition."""
     first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
     whole = row.size - row.size % 4
     for i in range(0, whole, 4):
@@ -29,7 +29,7 @@ row_total = jit(_row_total)
 
 
 def check_image(name: str, image: NDArray, mask: BoolArray) -> NDArray:
-    """`image` (C, H, W) as a contiguous array. Raises ValueError unless H, W are those of the boolean mask."""
+    """`image` (C, H, W) as a contiguous array. Raises ValueError unless H, W match the boolean mask."""
     check_mask(mask)
     if image.ndim != 3 or image.shape[1:] != mask.shape:
         raise ValueError(f"{name} has shape {image.shape}; expected (C, {mask.shape[0]}, {mask.shape[1]})")
@@ -44,6 +44,6 @@ def check_plane(name: str, plane: NDArray, shape: tuple[int, ...]) -> NDArray:
 
 
 def check_mask(mask: BoolArray) -> None:
-    """Raises ValueError unless `mask` is a boolean (H, W) array: True = tissue; 255 and soft values are refused."""
+    """Raise ValueError unless `mask` is a boolean (H, W) array, True = tissue; 255 and soft masks are rejected."""
     if mask.dtype != np.bool_ or mask.ndim != 2:
         raise ValueError(f"mask must be boolean (H, W), got {mask.dtype} {mask.shape}")

@@ -5,8 +5,8 @@
 S    sum over horizontal and vertical pairs of (D_a - D_b)^2 v_a v_b / (sum v + 1e-6), v = tissue and no edge
 TV   sum over horizontal and vertical pairs of |x_a - x_b| / (C H W)
 
-A pair across the mask border is kept: tissue counts as 0 in (1 - M) x, so the border is a step to zero with a
-gradient. Edges are an input, a boolean array: the edge detector is not differentiated. Depth keeps its units.
+Pairs across the mask border are included: (1 - M) x is 0 on tissue, so the border is a step to zero with a gradient.
+Edges are a boolean input: the edge detector is not differentiated. Depth is not normalised.
 """
 
 from typing import NamedTuple
@@ -18,11 +18,11 @@ from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.losses.rows import check_image, check_plane, row_total
 
-FEW_PIXELS = 1e-6  # added to sum v: keeps S finite without valid pixels
+FEW_PIXELS = 1e-6  # added to sum v; S stays finite without valid pixels
 
 
 class SmoothnessSaved(NamedTuple):
-    """The inputs of the loss; the reverse pass computes the differences of the pairs again."""
+    """The inputs of the loss; the reverse pass recomputes the differences of the pairs."""
 
     rendered_depth: FloatArray  # (H, W)
     rendered: FloatArray  # (C, H, W)
@@ -45,18 +45,18 @@ def smoothness_forward(
     edges: BoolArray,
     total_variation_factor: float,
 ) -> tuple[float, SmoothnessSaved]:
-    """Smoothness loss (B9), in units of squared depth. See the module text.
+    """Smoothness loss (B9), in units of squared depth; see the module docstring.
 
     rendered_depth          (H, W)     scene units, as rendered
     rendered                (C, H, W)  display units, not clamped
     mask                    (H, W)     bool, True = tissue
-    edges                   (H, W)     bool, True = an edge of the depth image: no smoothing across it
+    edges                   (H, W)     bool, True = an edge of the depth image, which is not smoothed
     total_variation_factor  f, 30 in SurgicalGS; 0 omits the two TV terms
     returns                 (loss, saved); summed in float64
 
     Reverse: `smoothness_reverse`; subgradient 0 where a TV pair is equal.
     Edges:   all tissue: TV is 0; no tissue: S is 0; one pixel: no pairs, 0.
-    Raises:  ValueError for shapes that do not match.
+    Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.smoothness`; skimage's total variation is isotropic and not comparable.
     Source:  SurgicalGS's depth smoothness and masked total variation.
     """
@@ -64,7 +64,7 @@ def smoothness_forward(
     depth = check_plane("rendered_depth", rendered_depth, mask.shape)
     smooth = mask & ~check_plane("edges", edges, mask.shape)
     mask = np.ascontiguousarray(mask)
-    # without an excluded pixel the total variation and its gradient are exactly 0
+    # if every pixel is tissue, the total variation and its gradient are exactly 0
     factor = 0.0 if mask.all() else float(total_variation_factor)
     saved = SmoothnessSaved(depth, rendered, mask, smooth, factor)
     loss = _squared_steps_kernel(depth, smooth) * _smooth_weight(smooth)
@@ -93,7 +93,7 @@ def _smooth_weight(smooth: BoolArray) -> float:
 
 
 def _total_variation(image: FloatArray, mask: BoolArray) -> float:
-    """TV((1 - M) image), dimension of the image."""
+    """TV((1 - M) image), in the units of the image."""
     totals = np.empty(image.shape[0] * image.shape[1])
     parallel_for(_variation_kernel, totals.size, image, mask, totals)
     return float(totals.sum()) / image.size
@@ -118,10 +118,10 @@ def _variation(first, stop, image, mask, totals):
 
 
 def _variation_reverse(first, stop, image, mask, weight, d_image):
-    """weight x (sign of the steps that end here - sign of the steps that start here) outside tissue, 0 on tissue."""
+    """weight x (signs of the steps ending here - signs of the steps starting here) off tissue, 0 on tissue."""
     height, width = mask.shape
     zero = image.dtype.type(0)
-    rows = np.empty((3, width + 2), image.dtype)  # with one more sample at either end
+    rows = np.empty((3, width + 2), image.dtype)  # one extra sample at each end
     above, line, below = rows[0], rows[1], rows[2]
     for index in range(first, stop):
         channel, y = index // height, index % height
@@ -140,7 +140,7 @@ def _variation_reverse(first, stop, image, mask, weight, d_image):
 
 def _outside_tissue(row, tissue, out):
     for i in range(row.size):
-        value = row[i]  # loaded before the choice, so that the loop is one select per lane
+        value = row[i]  # loaded unconditionally: the loop becomes one select per lane
         out[i] = row.dtype.type(0) if tissue[i] else value
 
 
