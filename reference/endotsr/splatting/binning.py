@@ -1,9 +1,9 @@
 """The lists of Gaussians that reach each tile, in depth order (B5, support and order).
 
-Three steps: a pixel box for every Gaussian (its support), a stable sort by view depth with ties in index
-order, and a counting sort of (tile, Gaussian) pairs. Every pair has one slot: the reverse pass writes the
-gradient of the pair there, and a gather adds the slots of a Gaussian in tile order. No two threads write the same cell,
-and the sum does not depend on the number of threads.
+Three steps: a pixel box for every Gaussian (its support), a stable sort by view depth with ties in index order, and a
+counting sort of (tile, Gaussian) pairs. Every pair has one slot. The reverse pass writes the gradient of the pair
+there, and a gather adds the slots of a Gaussian in tile order. No two threads write to the same cell, and the sum does
+not depend on the number of threads.
 """
 
 import math
@@ -18,7 +18,7 @@ from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.projection import Projected
 from endotsr.splatting.settings import RasterSettings
 
-CHUNKS = 16  # fixed, so that the lists do not depend on the number of threads
+CHUNKS = 16  # fixed: the lists must not depend on the number of threads
 LEGACY_TILE = 16
 _RADIX_BITS = 11
 
@@ -40,7 +40,7 @@ def _boxes(
 ):
     """Inclusive pixel box x0, x1, y0, y1 of each Gaussian; clears `visible` when the box is empty.
 
-    The ellipse box is the exact extent of alpha >= cutoff plus a margin far above rounding: lossless.
+    The ellipse box is the exact extent of alpha >= cutoff plus a margin far above rounding, so it loses no pixel.
     """
     real = mean2d.dtype.type
     half, one, two, three, zero, tenth = real(0.5), real(1), real(2), real(3), real(0), real(0.1)
@@ -122,7 +122,8 @@ def _count_pairs(first, last, box, order, tile_width, tile_height, tiles_x, tile
     """First and last tile column and row of each Gaussian; pairs of each (chunk, tile), and of each Gaussian at the
     next entry of `pair_starts`.
 
-    A division takes as long as all the rest, so it is done here once. It is unsigned, because boxes lie in the image.
+    A division costs as much as everything else, so each is computed once, here. It is unsigned: boxes are inside the
+    image.
     """
     n = order.size
     w, h = np.uint32(tile_width), np.uint32(tile_height)

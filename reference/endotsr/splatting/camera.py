@@ -25,7 +25,7 @@ class Camera(NamedTuple):
 
 
 class CameraGrads(NamedTuple):
-    """Derivative of a loss with respect to the camera pose, every entry of the rotation matrix taken as independent."""
+    """Derivative of a loss with respect to the camera pose; the entries of the rotation matrix are independent."""
 
     d_rotation: FloatArray  # (3, 3)
     d_translation: FloatArray  # (3,)
@@ -54,7 +54,7 @@ def project(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray,
     """Image position (u, v) in pixels and view depth z of world positions (3, M); each (M,).
 
     The inverse of `backproject`, whose column and row are u - 1/2 and v - 1/2.
-    Edges:   a point with z <= 0 is not in front of the camera: its z is returned as it is, and (u, v) is no position.
+    Edges:   a point with z <= 0 is not in front of the camera: z is returned unchanged, and (u, v) is meaningless.
     """
     x, y, z = camera.rotation @ points + np.asarray(camera.translation)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,9 +1,9 @@
 """The camera model: where a point in camera axes falls on the screen, and the Jacobian there (B3).
 
-This pair is all that the projection knows of a camera beside its pose. Another model takes its place if it returns
-(u, v) and the 2x3 Jacobian, and if its reverse passes on the gradients of both; its own numbers are the fields of the
-tuple that `intrinsics_of` makes. Of the same model, `camera.backproject` is the way back and `camera.scale_camera` the
-change of resolution.
+Apart from the pose, the projection depends on the camera only through this pair. Another model can replace it: its
+forward pass returns (u, v) and the 2x3 Jacobian, its reverse propagates the gradients of both, and `intrinsics_of`
+returns its parameters. `camera.backproject` is the inverse of the same model; `camera.scale_camera` changes its
+resolution.
 """
 
 from typing import NamedTuple
@@ -16,19 +16,19 @@ from endotsr.splatting.settings import RasterSettings
 
 
 class Pinhole(NamedTuple):
-    """Numbers of the pinhole model, all of the dtype of the Gaussians."""
+    """Parameters of the pinhole model, all in the dtype of the Gaussians."""
 
     fx: float  # px
     fy: float
     cx: float  # px from the left edge of column 0
     cy: float
-    limit_x: float  # L_x: beyond this |x/z| the Jacobian is that of the limit; infinite: no clamp
+    limit_x: float  # L_x: the Jacobian is evaluated at |x/z| <= L_x; infinite: no clamp
     limit_y: float
     clamp_factor: float  # of the clamped term of dJ/dz: 1; 2 in `legacy`
 
 
 def intrinsics_of(camera: Camera, settings: RasterSettings, dtype: np.dtype) -> Pinhole:
-    """What `pinhole` takes beside the point."""
+    """The parameters of `pinhole` for a camera."""
     clamp, real = settings.jacobian_clamp, np.dtype(dtype).type
     return Pinhole(
         real(camera.fx),
@@ -57,7 +57,7 @@ def pinhole(x, y, z, lens):
 
 @jit_formula
 def pinhole_reverse(x, y, z, lens, d_u, d_v, d_z, d_jacobian):
-    """Gradient of (x, y, z), from those of u, v, J and, through the depth image, z."""
+    """Gradient of (x, y, z), from the gradients of u, v, J and, through the depth image, z."""
     one, two, zero = type(z)(1), type(z)(2), type(z)(0)
     d_j00, _, d_j02, _, d_j11, d_j12 = d_jacobian
     inverse_z = one / z
@@ -65,7 +65,7 @@ def pinhole_reverse(x, y, z, lens, d_u, d_v, d_z, d_jacobian):
     raw_x, raw_y = x * inverse_z, y * inverse_z
     slope_x = min(max(raw_x, -lens.limit_x), lens.limit_x)
     slope_y = min(max(raw_y, -lens.limit_y), lens.limit_y)
-    # J02 = -fx clip(x/z) / z: free, it depends on x and twice on z; clamped, only once on z
+    # J02 = -fx clip(x/z) / z varies as x/z^2 if unclamped, as 1/z if clamped
     free_x, free_y = abs(raw_x) <= lens.limit_x, abs(raw_y) <= lens.limit_y
     power_x = two if free_x else lens.clamp_factor
     power_y = two if free_y else lens.clamp_factor

@@ -1,12 +1,12 @@
 """Front-to-back compositing of colour, depth and opacity: the definition, for every setting (B5).
 
-Per pixel, nearest first: alpha_i = min(alpha_max, opacity exp(-q/2)); an alpha below the cutoff contributes
-nothing; the pixel is finished before T falls below the stop. colour = sum c_i alpha_i T_i + T background,
+Per pixel, nearest first: alpha_i = min(alpha_max, opacity exp(-q/2)). An alpha below the cutoff contributes nothing,
+and the pixel is finished before T falls below the stop. colour = sum c_i alpha_i T_i + T background,
 depth = sum z_i alpha_i T_i, opacity = sum alpha_i T_i.
 
-The reverse pass keeps T_i and walks back to front with R_i = alpha_i c_i + (1 - alpha_i) R_{i+1}: no
-division by T or 1 - alpha, so it is exact for alpha = 1 and behind opaque stacks. `fast.blocks` computes the
-same for the `paper` preset, many pixels at a time.
+The reverse pass stores T_i and iterates back to front with R_i = alpha_i c_i + (1 - alpha_i) R_{i+1}. It never divides
+by T or 1 - alpha, so it is exact for alpha = 1 and behind opaque stacks. `fast.blocks` computes the same for the
+`paper` preset, many pixels at a time.
 """
 
 from typing import NamedTuple
@@ -57,7 +57,7 @@ class Composite(NamedTuple):
 
 
 class CompositeSaved(NamedTuple):
-    """What the reverse pass needs."""
+    """Inputs and final transmittance, for the reverse pass."""
 
     records: FloatArray
     lists: TileLists
@@ -127,7 +127,7 @@ def _composite(
 
 
 def _pixel_reverse(records, ranks, hit, kept, pixel, rest, sums):
-    """From the last blended pair of a pixel to the first: what each adds to the sums of its pair.
+    """Add the gradients of the blended pairs of a pixel to their sums, from last to first.
 
     hit, kept   pairs that were blended, nearest first; alpha, T, e, dy and the alpha that passes the clamp
     pixel       dL/d(red, green, blue, depth, opacity)
@@ -253,5 +253,5 @@ def composite_reverse(
 
 
 def background_gradient(d_colour: FloatArray, transmittance: FloatArray) -> FloatArray:
-    """dL/dbackground (3,): sum over the pixels of dL/dcolour times the final T."""
+    """dL/dbackground (3,): sum over pixels of dL/dcolour times the final T."""
     return np.einsum("chw,hw->c", d_colour, transmittance)

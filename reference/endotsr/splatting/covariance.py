@@ -1,7 +1,7 @@
 """Quaternion and log-scale to a covariance in factored form (specification B2).
 
-Sigma = (R S)(R S)^T with R the rotation of the normalised quaternion and S = diag(exp(log_scale)). The
-projection works on R and S themselves: the determinant of a needle seen at an angle is lost once Sigma is formed.
+Sigma = (R S)(R S)^T with R the rotation of the normalised quaternion and S = diag(exp(log_scale)). The projection
+uses R and S directly: forming Sigma would lose the determinant of a needle seen at an angle.
 """
 
 import math
@@ -17,10 +17,10 @@ from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import local_array
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
-ROTATION, GRADIENTS = 9 * GROUP, 7 * GROUP  # numbers that the results of a group take
-SHORTEST_QUATERNION = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
+ROTATION, GRADIENTS = 9 * GROUP, 7 * GROUP  # sizes of the results of a group
+SHORTEST_QUATERNION = 1e-20  # bounds 1/|q| in the gradient, which would overflow in float32
 
-_U64 = np.uint64  # no index may count from the end
+_U64 = np.uint64  # unsigned: no index wraps around
 
 
 class Shape(NamedTuple):
@@ -31,7 +31,7 @@ class Shape(NamedTuple):
 
 
 class CovarianceSaved(NamedTuple):
-    """What the reverse pass needs: the inputs, and the semi-axes, so that no exponential is taken twice."""
+    """The inputs, and the semi-axes, which the reverse pass need not recompute."""
 
     quaternion: FloatArray
     log_scale: FloatArray
@@ -52,7 +52,7 @@ class CovarianceGrads(NamedTuple):
 def unit_quaternion(w, x, y, z):
     """The normalised quaternion and 1/norm; (1, 0, 0, 0) and 0 for the zero quaternion.
 
-    Dividing by the largest entry first keeps the squares inside the exponent range for norms of 1e-300 to 1e300.
+    The largest entry is divided out first, so the squares do not overflow or underflow for norms of 1e-300 to 1e300.
     """
     real = type(w)
     zero, one = real(0), real(1)
@@ -67,7 +67,7 @@ def unit_quaternion(w, x, y, z):
 
 @jit_formula
 def unit_quaternion_reverse(w, x, y, z, inverse_norm, d_unit):
-    """Gradient of the raw quaternion: the part along the unit one is removed, the rest divided by the norm."""
+    """Gradient of the raw quaternion: the component along it is removed, the rest divided by the norm."""
     d_w, d_x, d_y, d_z = d_unit
     along = d_w * w + d_x * x + d_y * y + d_z * z
     return (
@@ -128,7 +128,7 @@ def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
             w, x, y, z, _ = unit_quaternion(*column(quaternion, 4, start + item))
             keep(results, item, rotation_of(w, x, y, z))
         write_group(results, start, count, rotation)
-        for k in range(3):  # a loop of its own: the exponential is not vector code
+        for k in range(3):  # a separate loop: the exponential does not vectorise
             for item in range(count):
                 i = _U64(start + item)
                 scale[k, i] = semi_axis(log_scale[k, i])
@@ -178,7 +178,7 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
 
 
 def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrads:
-    """Gradients of quaternion and log-scale from those of rotation (all nine entries independent) and scale."""
+    """Gradients of quaternion and log-scale, from dL/drotation (all nine entries independent) and dL/dscale."""
     n = saved.quaternion.shape[1]
     d_out = np.empty((7, n), saved.quaternion.dtype)
     parallel_for(_reverse_kernel, n, *saved, d_shape.rotation.reshape(9, n), d_shape.scale, d_out)
@@ -186,12 +186,12 @@ def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrad
 
 
 def covariance_degenerate(quaternion: FloatArray, log_scale: FloatArray) -> tuple[int, int]:
-    """How many quaternions are zero and how many log-scales are clipped."""
+    """Number of zero quaternions and number of clipped log-scales."""
     zero = int(np.sum(~np.any(quaternion != 0, axis=0)))
     return zero, int(np.sum(np.abs(log_scale) > LOG_SCALE_LIMIT))
 
 
 def covariance_matrix(shape: Shape) -> FloatArray:
-    """Sigma itself, (3, 3, N), scene units squared; for oracles and exports, not used by the rasteriser."""
+    """Sigma (3, 3, N), scene units squared; for oracles and exports, not used by the rasteriser."""
     factor = shape.rotation * shape.scale
     return np.einsum("ikn,jkn->ijn", factor, factor)

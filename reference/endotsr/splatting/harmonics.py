@@ -1,7 +1,7 @@
 """Colour from real spherical harmonics of degree 0 to 3, with the gradient through the view direction (B4).
 
 colour = max(0, 1/2 + sum_k Y_k(direction) h_k), direction from the camera centre to the (deformed) Gaussian.
-A colour residual is added to the degree-0 coefficient before the sum: with zero residual nothing changes, bit by bit.
+A colour residual is added to the degree-0 coefficient before the sum; a zero residual leaves the colour bitwise equal.
 """
 
 from typing import NamedTuple
@@ -18,14 +18,14 @@ from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import local_array
 from endotsr.splatting.harmonics_formulas import direction, direction_reverse, harmonic_basis, harmonic_basis_reverse
 
-_U64 = np.uint64  # no index may count from the end
+_U64 = np.uint64  # unsigned: no index wraps around
 
-DIRECTIONS_PER_SUM = 512  # Gaussians whose gradients with respect to the camera centre are added up together
-DIRECTION, BASIS, POSITION = 4 * GROUP, 15 * GROUP, 3 * GROUP  # numbers that these take for a group
+DIRECTIONS_PER_SUM = 512  # Gaussians per partial sum of the gradient with respect to the camera centre
+DIRECTION, BASIS, POSITION = 4 * GROUP, 15 * GROUP, 3 * GROUP  # sizes for a group
 
 
 class HarmonicsSaved(NamedTuple):
-    """Inputs of the forward pass and which channels were clamped at zero."""
+    """Inputs of the forward pass and a flag for every channel clamped at zero."""
 
     harmonics: FloatArray
     residual: FloatArray | None
@@ -44,8 +44,8 @@ class HarmonicsGrads(NamedTuple):
     d_centre: FloatArray  # (3,) camera centre
 
 
-# The number of coefficients is known at run time only: the formulas fill rows of a group, one for each Y_k, and the sum
-# over k is a loop over the group for each of them.
+# The number of coefficients is known only at run time. The formulas therefore fill one row of a group per Y_k, and the
+# sum over k is one loop over the group per row.
 
 
 def _fill_basis(position, centre, start, count, directions, basis):
@@ -72,7 +72,7 @@ def _colour_channel(harmonics, residual, channel, start, count, terms, basis, su
 
 
 def _colour_channel_reverse(harmonics, channel, start, count, terms, basis, d_sums, d_harmonics, d_residual, d_basis):
-    """Gradients of coefficients and residual of one channel; adds to that of Y_1 ... Y_15."""
+    """Gradients of coefficients and residual of one channel; adds to the gradient of Y_1 ... Y_15."""
     y00, zero = d_sums.dtype.type(Y00), d_sums.dtype.type(0)
     for item in range(count):
         d_harmonics[0, channel, _U64(start + item)] = y00 * d_sums[_U64(item)]
@@ -113,7 +113,7 @@ def _colour(first, stop, harmonics, residual, position, centre, degree, colour, 
 def _colour_reverse(
     first, stop, harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_residual, d_position
 ):
-    """A clamped channel sends no gradient; degree 0 sends none to the position."""
+    """A clamped channel has gradient zero; at degree 0 so has the position."""
     zero, terms = position.dtype.type(0), (degree + 1) * (degree + 1)
     directions, basis = local_array(DIRECTION, position), local_array(BASIS, position)
     d_basis, d_sums = local_array(BASIS, position), local_array(GROUP, position)

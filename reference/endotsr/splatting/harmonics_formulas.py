@@ -1,6 +1,6 @@
 """Spherical harmonics of one Gaussian: the formulas of specification B4, each above its reverse.
 
-Scalars in, tuples out; `harmonics` carries them to all Gaussians. Y_0 is the constant Y00.
+Scalars in, tuples out; `harmonics` applies them to all Gaussians. Y_0 is the constant Y00.
 """
 
 import math
@@ -25,7 +25,7 @@ def direction(position, centre):
 
 @jit_formula
 def direction_reverse(x, y, z, inverse, d_direction):
-    """Gradient of the position, from that of n: the part along n is removed, the rest divided by the distance."""
+    """Gradient of the position, from dL/dn: the component along n is removed, the rest divided by the distance."""
     g_x, g_y, g_z = d_direction
     along = g_x * x + g_y * y + g_z * z
     return (g_x - along * x) * inverse, (g_y - along * y) * inverse, (g_z - along * z) * inverse
@@ -60,7 +60,7 @@ def harmonic_basis(x, y, z):
 
 @jit_formula
 def harmonic_basis_reverse(degree, x, y, z, d_basis):
-    """Gradients of x, y, z, taken as independent, from those of Y_1 ... Y_15 up to the active degree, 1 to 3."""
+    """Gradients of independent x, y, z, from the gradients of Y_1 ... Y_15 up to the active degree, 1 to 3."""
     real = type(x)
     c1, c2a, c2b, c2c = real(C1), real(C2A), real(C2B), real(C2C)
     c3a, c3b, c3c, c3d, c3e = real(C3A), real(C3B), real(C3C), real(C3D), real(C3E)

@@ -1,9 +1,9 @@
 """Perspective (EWA) projection of Gaussians: screen mean, 2-D covariance and its determinant, view depth (B3).
 
 With T = J W R (J the Jacobian of the projection at the centre, W the camera rotation) and S the semi-axes,
-the screen covariance is (T S)(T S)^T + low_pass I = [[a, b], [b, c]]. Its determinant is formed as a sum of
-non-negative terms, low_pass^2 + low_pass |T S|^2 + sum_{k<l} (s_k s_l (t_k x t_l))^2, because a c - b^2
-loses every digit for a needle seen at an angle.
+the screen covariance is (T S)(T S)^T + low_pass I = [[a, b], [b, c]]. Its determinant is computed as a sum of
+non-negative terms, low_pass^2 + low_pass |T S|^2 + sum_{k<l} (s_k s_l (t_k x t_l))^2, because a c - b^2 loses
+every digit for a needle seen at an angle.
 """
 
 from typing import NamedTuple
@@ -27,10 +27,10 @@ from endotsr.splatting.projection_kernels import (
 )
 from endotsr.splatting.settings import RasterSettings
 
-POSES_PER_SUM = 256  # Gaussians whose pose gradients are added up together
+POSES_PER_SUM = 256  # Gaussians per partial sum of the pose gradient
 
-# px. A projected semi-axis beyond this is clipped (zero gradient to it): its square and the determinant stay finite.
-# A centre farther out is not drawn.
+# px. A longer projected semi-axis is clipped, with zero gradient: its square and the determinant stay finite.
+# A Gaussian with a centre farther out is not drawn.
 AXIS_LIMIT = {np.dtype(np.float32): 1e8, np.dtype(np.float64): 1e60}
 
 
@@ -66,7 +66,7 @@ def footprint(projected: Projected) -> FloatArray:
 
 
 class ProjectionGrads(NamedTuple):
-    """Gradients of the projection. `d_camera` is None unless it was asked for."""
+    """Gradients of the projection. `d_camera` is None unless requested."""
 
     d_position: FloatArray  # (3, N)
     d_rotation: FloatArray  # (3, 3, N)
@@ -86,8 +86,8 @@ def projection_forward(
     returns   Projected; Gaussians with z <= near are invisible and all their entries are zero
 
     Reverse: `projection_reverse`, through the mean, the Jacobian, the rotation and the pose.
-    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient; a centre
-             farther out than that, and a Gaussian with a number that is not finite, are invisible.
+    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient. A Gaussian
+             with its centre farther out or with a non-finite number is invisible.
     Oracle:  `endotsr.definition.projection`; determinant against mpmath.
     """
     dtype = position.dtype
@@ -110,10 +110,10 @@ def projection_reverse(
     *,
     pose_gradient: bool = False,
 ) -> ProjectionGrads:
-    """Gradients with respect to position, rotation, scale and, when asked for, the camera pose.
+    """Gradients with respect to position, rotation, scale and, on request, the camera pose.
 
     d_mean2d        (2, N) dL/d(u, v), per px
-    d_covariance2d  (3, N) dL/d(a, b, c), b counted once; the determinant's share is already inside (det = a c - b^2)
+    d_covariance2d  (3, N) dL/d(a, b, c), b counted once; includes the path through det = a c - b^2
     d_depth         (N,)   dL/dz through the depth image
     """
     seen = saved.projected.visible
@@ -136,7 +136,7 @@ def projection_reverse_footprint(
 ) -> ProjectionGrads:
     """As `projection_reverse`, from the gradients (3, N) with respect to A, m, r of `footprint`.
 
-    The render takes this way: in gradients of a, b, c the length of a needle is lost, by (length / width)^2 roundings.
+    The render uses this function: gradients of a, b, c lose the length of a needle, by (length / width)^2 roundings.
     """
     n, dtype = saved.position.shape[1], saved.position.dtype
     d_out = np.empty((WITH_POSE if pose_gradient else WITHOUT_POSE, n), dtype)

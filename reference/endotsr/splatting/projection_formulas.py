@@ -1,7 +1,7 @@
 """The projection of one Gaussian: the formulas of specification B3, each above its reverse.
 
-Scalars and tuples of scalars in, tuples out; a matrix is the tuple of its rows. `projection_kernels` carries them to
-all Gaussians. Selects take the place of branches, so that the loop over a group is vector code.
+Scalars and tuples of scalars in, tuples out; a matrix is the tuple of its rows. `projection_kernels` applies them to
+all Gaussians. Selects replace branches, so the loop over a group vectorises.
 """
 
 import math
@@ -14,14 +14,14 @@ from endotsr.splatting.camera_model import pinhole, pinhole_reverse
 
 
 class WorldToCamera(NamedTuple):
-    """World to camera axes, each number of the dtype of the Gaussians."""
+    """World to camera axes, in the dtype of the Gaussians."""
 
     rotation: tuple[Any, ...]  # W, 9 numbers
     translation: tuple[Any, ...]  # d, 3 numbers
 
 
 class Rules(NamedTuple):
-    """Constants of the projection, of the dtype of the Gaussians."""
+    """Constants of the projection, in the dtype of the Gaussians."""
 
     low_pass: np.floating  # epsilon, px^2
     near: np.floating  # scene units
@@ -54,7 +54,7 @@ def to_view_reverse(pose, d_x, d_y, d_z):
 
 @jit_formula
 def pose_reverse(position, d_w, d_x, d_y, d_z):
-    """Gradients of W and d: `d_w` reaches W through J W, the rest both through the centre in camera axes."""
+    """Gradients of W and d: `d_w` comes through J W, the other terms through the centre in camera axes."""
     p0, p1, p2 = position
     return (
         d_w[0] + d_x * p0, d_w[1] + d_x * p1, d_w[2] + d_x * p2,
@@ -95,15 +95,15 @@ def product_reverse(a, b, d_product):
 
 @jit_formula
 def clipped_axis(t0, t1, scale, limit):
-    """S_k, or what `limit` px leaves of it, and whether it is free of that limit; (t0, t1) is column k of T."""
+    """S_k clipped to `limit` px on the screen, and whether it is unclipped; (t0, t1) is column k of T."""
     length = abs(t0) + abs(t1)
-    free = not scale * length > limit  # so written that a scale of NaN stays NaN
+    free = not scale * length > limit  # written so that a NaN scale stays NaN
     return scale if free else limit / length, free
 
 
 @jit_formula
 def clipped_axes(t, scale, limit):
-    """The three semi-axes, and which of them are free."""
+    """The three semi-axes, and which of them are unclipped."""
     s0, free0 = clipped_axis(t[0], t[3], scale[0], limit)
     s1, free1 = clipped_axis(t[1], t[4], scale[1], limit)
     s2, free2 = clipped_axis(t[2], t[5], scale[2], limit)
@@ -142,7 +142,7 @@ def axis_reverse(t0, t1, s, e, m, g_a, g_m, g_r, free):
 
 @jit_formula
 def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
-    """Gradients of T and S, from those of A, m, r of the footprint."""
+    """Gradients of T and S, from the gradients of A, m, r of the footprint."""
     t00, t01, t02, t10, t11, t12 = t
     s0, s1, s2 = s
     free0, free1, free2 = free
@@ -152,7 +152,7 @@ def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
     m, r, precision = b / c, one / c, c / determinant
     g_a = two * precision * precision * d_precision
     g_m, g_r = r * d_slope, two * r * r * d_inverse_c
-    # e = t0 - m t1 without cancellation: along a needle it is small, and it is all that the length feels
+    # e = t0 - m t1 without cancellation: along a needle it is small, and the gradient of the length depends on it alone
     x01, x12, x20 = t00 * t11 - t01 * t10, t01 * t12 - t02 * t11, t02 * t10 - t00 * t12
     w0, w1, w2 = (t10 * s0) * s0, (t11 * s1) * s1, (t12 * s2) * s2
     e0 = r * (low_pass * t00 + w1 * x01 - w2 * x20)
@@ -166,14 +166,14 @@ def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
 
 @jit_formula
 def project_one(position, rotation, scale, lens, pose, rules):
-    """Whether the Gaussian is drawn, and (u, v, a, b, c, det, z); of one that is not drawn the numbers mean nothing."""
+    """Whether the Gaussian is drawn, and (u, v, a, b, c, det, z), meaningless if it is not drawn."""
     x, y, z = to_view(position, pose)
     in_front = z > rules.near
     u, v, jacobian = pinhole(x, y, z if in_front else type(z)(1), lens)
     t = product(product(jacobian, pose.rotation), rotation)
     s, _ = clipped_axes(t, scale, rules.axis_limit)
     a, b, c, det = screen_covariance(t, s, rules.low_pass)
-    # a centre out of range, or any NaN or infinity: not drawn, so that no index is made of such a number
+    # a centre out of range, or any NaN or infinity: not drawn, because such numbers must not become indices
     in_range = (abs(u) <= rules.axis_limit) & (abs(v) <= rules.axis_limit)
     return in_front & in_range & math.isfinite(det + z), (u, v, a, b, c, det, z)
 
@@ -182,7 +182,7 @@ def project_one(position, rotation, scale, lens, pose, rules):
 def project_one_reverse(
     position, rotation, scale, lens, pose, rules, drawn, determinant, d_mean, d_footprint, d_depth
 ):  # fmt: skip
-    """Gradients of position (3), scale (3), rotation (9) and pose (9 + 3); meaningless for one that is not drawn."""
+    """Gradients of position (3), scale (3), rotation (9) and pose (9 + 3); meaningless if the Gaussian is not drawn."""
     one = type(determinant)(1)
     x, y, z = to_view(position, pose)
     z, determinant = (z if drawn else one), (determinant if drawn else one)

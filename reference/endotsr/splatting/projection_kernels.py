@@ -1,6 +1,6 @@
-"""Kernels of the projection, forward and reverse: the formulas of one Gaussian for all, a group at a time (`groups`).
+"""Kernels of the projection, forward and reverse: the formulas of one Gaussian, applied to all in groups (`groups`).
 
-A Gaussian that is not drawn is computed with harmless numbers (z = 1, determinant 1) and then set to zero.
+A Gaussian that is not drawn is computed with harmless numbers (z = 1, determinant 1), and its results are set to zero.
 """
 
 from typing import NamedTuple
@@ -17,14 +17,14 @@ PROJECTED = 8  # results: mean 2, covariance 3, determinant, depth, whether it i
 WITHOUT_POSE, WITH_POSE = 15, 27  # gradients of position 3, scale 3, rotation 9; and of the pose 9 + 3
 RESULTS, GRADIENTS = PROJECTED * GROUP, WITH_POSE * GROUP
 
-_U64 = np.uint64  # no index may count from the end
+_U64 = np.uint64  # unsigned: no index wraps around
 
 
 class ScreenGrads(NamedTuple):
-    """Gradients of the loss with respect to what the projection puts on the screen."""
+    """Gradients of the loss with respect to the projected Gaussians."""
 
     d_mean2d: FloatArray  # (2, N)
-    d_footprint: FloatArray  # (3, N) by A, m, r
+    d_footprint: FloatArray  # (3, N) with respect to A, m, r
     d_depth: FloatArray  # (N,)
 
 
@@ -46,7 +46,7 @@ def _project(first, stop, position, rotation, scale, lens, pose, rules, out, vis
 
 
 def _project_reverse(first, stop, position, rotation, scale, lens, pose, rules, visible, determinant, d_screen, d_out):
-    """`d_out` (15, N): gradients of position, scale, rotation; (27, N): and the terms of that of the pose."""
+    """`d_out` (15, N): gradients of position, scale, rotation; (27, N): also the terms of the pose gradient."""
     d_mean2d, d_footprint, d_depth = d_screen
     results = local_array(GRADIENTS, position)
     for start in range(first, stop, GROUP):

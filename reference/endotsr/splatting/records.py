@@ -1,8 +1,8 @@
-"""The records that compositing reads and writes for each Gaussian, packed in depth order.
+"""The records of Gaussians and of their gradients for compositing, packed in depth order.
 
-The exponent of a Gaussian on the screen is -q/2 with q = r dy^2 + A (dx - m dy)^2, A = c/det, m = b/c,
-r = 1/c: a sum of squares, so that q >= 0 always and a needle keeps its digits (B5). One record of 11 numbers
-per Gaussian occupies one or two cache lines (float64: two or three). Its gradient record has 10 numbers.
+The exponent of a Gaussian on the screen is -q/2 with q = r dy^2 + A (dx - m dy)^2, A = c/det, m = b/c, r = 1/c.
+This sum of squares is never negative and stays accurate for needles (B5). A record of 11 numbers occupies one or two
+cache lines (float64: two or three). A gradient record has 10 numbers.
 """
 
 from typing import NamedTuple
@@ -85,10 +85,10 @@ def pack_records(
 
 
 class FootprintGrads(NamedTuple):
-    """Gradients of the drawn Gaussians; zero where unseen."""
+    """Gradients of the drawn Gaussians; zero for all others."""
 
     d_mean2d: FloatArray  # (2, N)
-    d_footprint: FloatArray  # (3, N) by A, m, r
+    d_footprint: FloatArray  # (3, N) with respect to A, m, r
     d_logit: FloatArray  # (N,)
     d_colour: FloatArray  # (3, N)
     d_depth: FloatArray  # (N,)
@@ -98,7 +98,7 @@ def _gather(
     first, stop,
     order, records, pair_starts, slots, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth, out,
 ):  # fmt: skip
-    """Add the pair gradients of each Gaussian in tile order and turn the sums into gradients of its parameters."""
+    """Add the pair gradients of each Gaussian in tile order and convert the sums to gradients of its parameters."""
     d_mean2d, d_footprint, d_logit, d_colour, d_depth = out
     real = records.dtype.type
     half, one, zero, largest = real(0.5), real(1), real(0), real(700)
@@ -107,7 +107,7 @@ def _gather(
         for j in range(GRADIENT):
             total[j] = zero
         for p in range(pair_starts[k], pair_starts[k + 1]):
-            if p + GRADIENTS_AHEAD < slots.size:  # tile order is random here: without it, each row is a cache miss
+            if p + GRADIENTS_AHEAD < slots.size:  # the rows are in random order: each would be a cache miss
                 prefetch(pair_gradients, slots[p + GRADIENTS_AHEAD])
             row = pair_gradients[slots[p]]
             for j in range(GRADIENT):
@@ -142,7 +142,7 @@ def gather_footprint_gradients(
     conic_epsilon: float,
     keep_depth: bool,
 ) -> FootprintGrads:
-    """As `gather_gradients`, but by A, m, r of the footprint (3, N) instead of covariance2d."""
+    """As `gather_gradients`, but with respect to A, m, r of the footprint (3, N) instead of covariance2d."""
     n, dtype = determinant.size, records.dtype
     out = FootprintGrads(*(np.zeros(shape, dtype) for shape in ((2, n), (3, n), n, (3, n), n)))
     parallel_for(
@@ -164,7 +164,7 @@ def gather_gradients(
     conic_epsilon: float,
     keep_depth: bool,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Gradients of mean2d (2, N), covariance2d (3, N), logit (N,), colour (3, N), depth (N,); zero where unseen."""
+    """Gradients of mean2d (2, N), covariance2d (3, N), logit (N,), colour (3, N), depth (N,); zero if not drawn."""
     d_mean2d, d_footprint, d_logit, d_colour, d_depth = gather_footprint_gradients(
         order, records, lists, pair_gradients, determinant, opacity_logit,
         conic_epsilon=conic_epsilon, keep_depth=keep_depth,

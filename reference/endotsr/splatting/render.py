@@ -1,7 +1,7 @@
 """One view of the Gaussians at one time: all splatting stages composed, forward and reverse.
 
-Input: deformed raw parameters and a camera. Output: colour, depth, opacity and, in reverse, gradients with respect
-to every parameter and, on request, the background and the camera pose. This module does not depend on time.
+In: deformed raw parameters and a camera. Out: colour, depth, opacity and, in reverse, gradients with respect to every
+parameter and, on request, the background and the camera pose. This module does not depend on time.
 """
 
 from collections.abc import Callable, Mapping
@@ -77,7 +77,7 @@ class RenderGrads(NamedTuple):
 
 
 def check_finite(arrays: Mapping[str, FloatArray | None]) -> None:
-    """Check that all numbers are finite, before any kernel runs. Raises: ValueError naming array and index."""
+    """Check before any kernel that all numbers are finite. Raises: ValueError with array and index."""
     for name, array in arrays.items():
         if array is None or np.isfinite(array).all():
             continue
@@ -91,7 +91,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def choose_compositor(settings: RasterSettings, compositor: Compositor) -> Compositor:
-    """Resolve `auto`: the fast path where it supports the settings. Raises: ValueError for `blocks` elsewhere."""
+    """Resolve `auto`: the fast path if it supports the settings. Raises: ValueError for `blocks` if it does not."""
     if compositor == "auto":
         return "blocks" if compositing_blocks.supports(settings) else "definition"
     if compositor == "blocks" and not compositing_blocks.supports(settings):
@@ -117,7 +117,7 @@ def render_forward(
     settings    a preset of `settings.PRESETS`, or other values of its fields
     degree      active degree of the harmonics, 0..3
     background  (3,) colour, default black
-    timer       told of the stages "projection" (B2-B4), "binning" and "blend forward"
+    timer       measures the stages "projection" (B2-B4), "binning" and "blend forward"
     returns     RenderOut in the dtype of scene.position
 
     Reverse: `render_reverse`.
@@ -158,7 +158,7 @@ def render_reverse(
     """Gradients of a loss with respect to every input of the view.
 
     d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
-    timer      told of the stages "blend reverse", "binning" and "projection"
+    timer      measures the stages "blend reverse", "binning" and "projection"
     """
     composite = saved.composite
     with timer.stage("blend reverse"):
@@ -201,7 +201,7 @@ def _composite_reverse(
     d_opacity: FloatArray | None,
     saved: compositing.CompositeSaved | compositing_blocks.BlocksSaved,
 ) -> FloatArray:
-    """Gradients of every pair by the reverse pass of the compositor that made `saved`."""
+    """Gradients of every pair, by the reverse pass of the compositor of `saved`."""
     if isinstance(saved, compositing_blocks.BlocksSaved):
         return compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, saved)
     d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
@@ -209,7 +209,7 @@ def _composite_reverse(
 
 
 def _gather(pairs: FloatArray, saved: RenderSaved) -> tuple[FloatArray, ...]:
-    """Gradients of the pairs added up by Gaussian: by mean, footprint, opacity logit, colour and depth."""
+    """Sums of the pair gradients per Gaussian, with respect to mean, footprint, opacity logit, colour and depth."""
     composite, deviations = saved.composite, saved.settings.deviations
     return gather_footprint_gradients(
         saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
@@ -219,7 +219,7 @@ def _gather(pairs: FloatArray, saved: RenderSaved) -> tuple[FloatArray, ...]:
 
 
 def _pose_gradient(projection: CameraGrads | None, d_centre: FloatArray, camera: Camera) -> CameraGrads:
-    """Add the part that reaches the pose through the view direction: centre = -rotation^T translation."""
+    """Add the pose gradient through the view direction: centre = -rotation^T translation."""
     assert projection is not None
     translation = np.asarray(camera.translation, d_centre.dtype)
     rotation = np.asarray(camera.rotation, d_centre.dtype)

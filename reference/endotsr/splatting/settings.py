@@ -1,4 +1,4 @@
-"""Settings of the rasteriser: three named presets; every field can also be set on its own."""
+"""Settings of the rasteriser: three named presets; every field can also be set individually."""
 
 from typing import Literal, NamedTuple
 
@@ -8,17 +8,17 @@ Support = Literal["everywhere", "ellipse", "three_sigma_tiles"]
 class LegacyDeviations(NamedTuple):
     """Deviations of the released CUDA code from the exact gradient, each with its own switch (all off = exact)."""
 
-    drop_depth_to_z: bool = False  # the depth image sends no gradient to z
-    pass_clamped_alpha: bool = False  # the alpha clamp lets the gradient through
+    drop_depth_to_z: bool = False  # no gradient from the depth image to z
+    pass_clamped_alpha: bool = False  # gradient passes through the alpha clamp
     double_clamp_term: bool = False  # factor 2 instead of 1 in d(Jacobian)/dz where the off-axis clamp is active
     conic_epsilon: bool = False  # 1/(det^2 + 1e-7) instead of 1/det^2
 
 
 class RasterSettings(NamedTuple):
-    """Support, thresholds and near plane of the rasteriser. The specification has a table of the presets."""
+    """Support, thresholds and near plane of the rasteriser. The specification tabulates the presets."""
 
     alpha_cutoff: float = 1.0 / 255.0  # a smaller alpha contributes nothing; 0 = no cutoff
-    transmittance_stop: float = 1e-4  # stop before T falls below; 0 = never
+    transmittance_stop: float = 1e-4  # stop before T falls below this; 0 = never
     alpha_max: float = 0.99  # clamp of alpha; 1 = none
     support: Support = "ellipse"
     jacobian_clamp: float = 1.3  # times tan(fov/2); 0 = none

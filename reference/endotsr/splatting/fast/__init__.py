@@ -1,1 +1,1 @@
-"""The fast path of compositing: it computes the sums of `splatting.compositing` for many pixels at a time."""
+"""The fast path of compositing: the sums of `splatting.compositing`, many pixels at a time."""

@@ -1,19 +1,18 @@
 """The fast path of compositing: the same sums as `compositing`, a block of pixels at a time.
 
-It is used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). It is fast because, in
-order of gain:
+It applies if the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). Its optimisations, in order
+of gain:
 
-* A Gaussian visits only the blocks that its ellipse alpha >= cutoff touches. A block is 4x4 pixels (4x2 where a vector
-  has eight lanes): small Gaussians fill it better than sixteen pixels of one row. The span of each row is widened
-  beyond rounding, and every lane tests alpha >= cutoff itself, so no pixel is missed and no superfluous one is blended.
-* The blocks of a tile that a Gaussian visits are the bits of a word, and one loop runs over all of them. Loops over
-  rows of blocks would mispredict a branch at the end of every row.
-* The lane loop is vector code: the pixels of a block stand side by side in flat planes (`compositing_tiles`), never
-  across two cache lines, and the sums of a loop are local arrays in registers (`vectors`), which need no guards and no
-  reloads.
+* A Gaussian visits only the blocks that intersect its ellipse alpha >= cutoff. A block is 4x4 pixels (4x2 with
+  eight-lane vectors), which small Gaussians fill better than sixteen pixels of one row. The span of each row is widened
+  beyond rounding and every lane tests alpha >= cutoff, so no pixel is missed and no superfluous pixel is blended.
+* The visited blocks of a tile are the bits of a word, and one loop runs over all of them. Nested loops over rows of
+  blocks would mispredict a branch at the end of every row.
+* The lane loop is vector code. The pixels of a block are contiguous in flat planes (`tiles`) and within one cache
+  line. The sums of a loop are local arrays in registers (`vectors`), without guards and reloads.
 * Terms that depend only on the lane and on the row of blocks are computed once per Gaussian (`_lane_tables`).
-* Records are prefetched some pairs ahead: depth order is random in memory, and each would be a cache miss.
-* log2(opacity) and log2(e) are folded into the exponent: alpha is a bare 2^x.
+* Records are prefetched a few pairs ahead: depth order is random in memory, and each would be a cache miss.
+* log2(opacity) and log2(e) are folded into the exponent: alpha is a single 2^x.
 * The sign of T, or T = 0, marks a finished pixel: the lane loop has selects and no branches.
 * The reverse pass replays front to back: the contribution behind a pair is <g, image> minus the running sum, one
   number per pixel, without stored lists. It divides by 1 - alpha >= 1 - alpha_max; tests/splatting bound the error of
@@ -78,15 +77,15 @@ from endotsr.splatting.settings import RasterSettings
 WORD_ROWS = 64 // BLOCKS_ACROSS  # rows of blocks whose visits are the bits of one word
 E, CENTRE_LINE, DY = 0, 64, 128  # offsets of the three tables of `_lane_tables`, for at most WORD_ROWS rows of blocks
 TABLES = 192
-ROUND_UP = 0.999  # to the next column; less than 1, so that no column is lost to rounding
-BATCH = 32  # pairs between two tests of whether the whole tile is finished
+ROUND_UP = 0.999  # to the next column; below 1, so rounding loses no column
+BATCH = 32  # pairs between two tests for a finished tile
 RECORDS_AHEAD = 8  # pairs between the prefetch of a record and its use
 
 _U64 = np.uint64
 
 
 class BlocksSaved(NamedTuple):
-    """What the reverse pass needs."""
+    """Inputs and images, for the reverse pass."""
 
     records: FloatArray
     lists: TileLists
@@ -107,12 +106,12 @@ def supports(settings: RasterSettings) -> bool:
 def _visits(record, top, left, log2_cutoff):
     """The blocks of a tile to visit, as bits of two words: BLOCKS_ACROSS r + c for block c of row r of the word.
 
-    With blocks of four rows the second word stays empty. All rows of the tile at once (vector code).
+    With blocks of four rows the second word is empty. All rows of the tile are computed at once (vector code).
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
-    beyond rounding, so that no pixel with alpha >= cutoff is missed; a superfluous block has no effect. Where a huge
-    footprint just reaches a row, the reach is a difference of nearly equal numbers: `faintest` allows for its rounding.
-    A row below the cutoff on its centre line has no pixel above it, rounding included, because the rest of the exponent
-    is subtracted from the same number.
+    beyond rounding: no pixel with alpha >= cutoff is missed, and a superfluous block has no effect. If a huge footprint
+    just reaches a row, the reach is a difference of nearly equal numbers; `faintest` allows for its rounding.
+    A row below the cutoff on its centre line has no pixel above the cutoff, rounding included, because the rest of the
+    exponent is subtracted from the same number.
     """
     real = record.dtype.type
     half, one, zero = real(0.5), real(1), real(0)
@@ -143,7 +142,7 @@ def _visits(record, top, left, log2_cutoff):
 def _lane_tables(record, top, left, word, tables):
     """e = dx - m dy, log2 alpha at e = 0, and dy of each lane, for the first block of each row of blocks of a word.
 
-    dy is computed as in `_visits`: where m is large, a rounding error of dy amounts to many pixels.
+    dy is computed as in `_visits`: for large m, a rounding error of dy corresponds to many pixels.
     """
     real = record.dtype.type
     half = real(0.5)
@@ -172,7 +171,7 @@ _visit_kernel = jit_inline(_visit)
 
 
 def _record(records, ranks, p, end):
-    """The record of pair p, with a prefetch of that of a later pair: depth order is random in memory."""
+    """The record of pair p; prefetches the record of a later pair."""
     if p + RECORDS_AHEAD < end:
         prefetch(records, ranks[p + RECORDS_AHEAD])
     return records[_U64(ranks[p])]
@@ -239,7 +238,7 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
 
 
 def _blend_block_reverse(buffer, sums, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max):
-    """Replay one Gaussian over the pixels of one block; T becomes 0 where a pixel is finished."""
+    """Replay one Gaussian over the pixels of one block; T becomes 0 at finished pixels."""
     real = buffer.dtype.type
     zero, one = real(0), real(1)
     red, green, blue, depth = record[RED], record[GREEN], record[BLUE], record[DEPTH]
@@ -287,7 +286,7 @@ def _new_sums(like):
 
 
 class PictureGrads(NamedTuple):
-    """Gradients of the loss with respect to what compositing draws."""
+    """Gradients of the loss with respect to the composited images."""
 
     d_colour: FloatArray  # (3, H, W)
     d_depth: FloatArray  # (H, W)
@@ -348,8 +347,8 @@ def composite_blocks_forward(
 ) -> tuple[Composite, BlocksSaved]:
     """As `composite_forward`, on tiles of 64x16 pixels; the opacity image is 1 - T (equal to the sum to rounding).
 
-    Edges: within one rounding of the cutoff or the stop the two paths may decide differently; the difference is
-           then at most T alpha |c - behind|, see tests/splatting.
+    Edges: within one rounding of the cutoff or the stop, the two paths may decide differently. The difference is then
+           at most T alpha |c - behind|, see tests/splatting.
     """
     dtype = records.dtype
     out = empty_composite(width, height, dtype)

@@ -1,9 +1,9 @@
-"""The tiles of the fast path: a tile of the image as planes of one flat buffer, and the transfer in and out of it.
+"""The tiles of the fast path: the planes of an image tile in one flat buffer, and transfers to and from the images.
 
-The planes of a tile (T, red, ...) lie in one buffer at constant offsets. They are indexed with unsigned integers, which
-need no alias or wrap-around checks, so the loops over pixels become vector code. In a plane the pixels of a block, as
-many as a vector has lanes, lie side by side, row after row; blocks follow one another along a row of blocks.
-A Gaussian across an edge is visited twice, so a tile is wide; with wider tiles the threads would have too few of them.
+The planes of a tile (T, red, ...) have constant offsets in one buffer. Unsigned indices need no alias or wrap-around
+checks, so the loops over pixels vectorise. In a plane, the pixels of a block (one per vector lane) are contiguous, row
+by row; so are the blocks of a row of blocks. A Gaussian across a tile edge is visited twice, which favours wide
+tiles; with still wider tiles there would be too few for the threads.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ _U64 = np.uint64
 
 
 def _block_height(like):
-    """Rows of a block: 4, or 2 where a vector has eight lanes."""
+    """Rows of a block: 4, or 2 if a vector has eight lanes."""
     return lanes(like) // BLOCK_WIDTH
 
 
@@ -42,7 +42,7 @@ place = jit_inline(_place)
 
 
 def _finished(buffer):
-    """Whether no pixel of the tile can take another pair: every T is zero or marked negative."""
+    """Whether every pixel of the tile is finished: each T is zero or marked negative."""
     zero = buffer.dtype.type(0)
     alive = np.int32(0)
     for j in range(PIXELS):
@@ -67,7 +67,7 @@ clear = jit_inline(_clear)
 
 
 def _write_tile(buffer, top, left, background, colour, depth, opacity, transmittance):
-    """Write the finished tile to the images; the background shows through: colour + T background."""
+    """Write the finished tile to the images, with the background: colour + T background."""
     one = buffer.dtype.type(1)
     red, green, blue = background[0], background[1], background[2]
     for y in range(min(TILE_HEIGHT, depth.shape[0] - top)):
