@@ -1,16 +1,15 @@
 """Density control, equation (B11): add Gaussians where the screen gradient is large, remove those that are faint.
 
-In: Gaussians and accumulated screen gradients. Out: new Gaussians, every array gathered by one index, and the gather
-plan, by which the caller gathers every other array that has one column per Gaussian. This module is independent of
+In: Gaussians and accumulated screen gradients. Out: new Gaussians, all arrays gathered by one index, and the gather
+plan, with which the caller gathers its own arrays with one column per Gaussian. This module is independent of
 optimiser, renderer and iteration number.
 
-Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that survives and whose mean screen
-gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
-`dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
-removed. With `growth = "budget"` the Gaussians with the largest gradients are taken instead of those above the
-threshold: the room below `maximum`, after pruning, divided by the densifications that remain. Scales are canonical, not
-deformed. Children inherit every other array. Optimiser moments start at zero for clones and children (`GatherPlan`).
-Clones are not split in the same call.
+Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. A survivor whose mean screen gradient (NDC units)
+reaches `gradient_threshold` is cloned if its largest semi-axis is at most `dense_fraction` x extent. Otherwise it is
+split: two children, sampled from the parent and 1.6 times smaller, replace it. `growth = "budget"` selects the
+Gaussians with the largest gradients instead; their number is the room below `maximum` after pruning, divided by the
+remaining densifications. Scales are canonical, not deformed. Children inherit every other array. Optimiser moments
+start at zero for clones and children (`GatherPlan`). Clones are not split in the same call.
 """
 
 from collections.abc import Sequence
@@ -29,11 +28,11 @@ from endotsr.splatting.camera import Camera, camera_centre
 CHILDREN = 2  # of a split Gaussian
 SHRINK = 0.8 * CHILDREN  # the children's semi-axes are 1/1.6 of the parent's
 CAMERA_MARGIN = 1.1  # of the extent measured from cameras
-LARGEST_LOG_SCALE = 40.0  # beyond it a semi-axis is cut off before it is exponentiated
+LARGEST_LOG_SCALE = 40.0  # log-scales are clipped to it before exponentiation
 
 
 class DensityStatistics(NamedTuple):
-    """Screen gradients accumulated since the last densification; changed in place."""
+    """Screen gradients accumulated since the last densification; updated in place."""
 
     gradient_sum: NDArray[np.float64]  # (N,) sum of gradient norms, loss per NDC unit
     visits: NDArray[np.int64]  # (N,) number of views in which the Gaussian was visible
@@ -43,7 +42,7 @@ class GatherPlan(NamedTuple):
     """Origin of the M new Gaussians: survivors first, then the fresh ones (clones and children)."""
 
     source: IndexArray  # (M,) index among the old Gaussians: itself, or the parent
-    survivors: int  # first fresh column; all later ones are fresh too
+    survivors: int  # first fresh column; all later columns are fresh
 
 
 class Densified(NamedTuple):
@@ -68,7 +67,7 @@ def gather_statistics(
     """Add one view: norm of (g_u W/2, g_v H/2) for every visible Gaussian, in place.
 
     d_mean   (2, N) gradient with respect to the projected centre, loss per pixel
-    visible  (N,) bool; the others gain neither gradient nor visit
+    visible  (N,) bool; the entries of the others are unchanged
     """
     if d_mean.shape != (2, visible.size) or visible.shape != statistics.visits.shape:
         raise ValueError(f"statistics of {statistics.visits.size}, got {d_mean.shape} gradients, {visible.shape} flags")
@@ -80,8 +79,8 @@ def gather_statistics(
 def scene_extent(config: DensityConfig, cameras: Sequence[Camera]) -> float:
     """The extent that separates clones from splits, scene units.
 
-    A number is used as it is. `cameras`: 1.1 x the largest distance of a camera from the mean of all cameras.
-    Raises: InputError for `cameras` if all cameras coincide; extent 0 would split everything and clone nothing.
+    A number is used unchanged. `cameras`: 1.1 x the largest distance of a camera from the mean of all cameras.
+    Raises: InputError for `cameras` if all cameras coincide: extent 0 would split everything and clone nothing.
     """
     if config.extent != "cameras":
         return float(config.extent)
@@ -103,12 +102,13 @@ def densify(
     """Clone, split and prune in one gather; the inputs are not changed.
 
     extent   scene units, see `scene_extent`
-    remaining  densifications from this one to the last, by which a budget is divided
-    returns  survivors in their old order, then clones, then first children, then second children, the last three
-             in the order of their parents; the plan of this order; statistics of zeros
+    remaining  number of densifications from this one to the last; divides a budget
+    returns  survivors in their old order, then clones, first children and second children, each in the order of
+             their parents; the plan of this order; statistics of zeros
 
-    Edges: never visited -> gradient 0, and a budget passes it over; N = 0 and pruning down to 0 are allowed; when
-           `maximum` leaves no room for all, the candidates with the largest gradients are taken first (ties by index).
+    Edges: an unvisited Gaussian has gradient 0 and is never selected by a budget. N = 0 and pruning down to 0 are
+           allowed. If `maximum` leaves too little room, the candidates with the largest gradients are selected (ties
+           by index).
     Draws: one `rng.standard_normal((2, 3, S))` for S split parents, none if S = 0.
     """
     alive, clone, split = _choose(gaussians, statistics, config, extent, remaining)
@@ -147,7 +147,7 @@ def _choose(
 
 
 def _fainter_than(logit: FloatArray, opacity: float) -> NDArray[np.bool_]:
-    """Whether sigmoid(logit) < opacity, decided on the logit so that nothing overflows."""
+    """Whether sigmoid(logit) < opacity; comparing logits avoids overflow."""
     if opacity <= 0.0:
         return np.zeros(logit.shape, bool)
     bound = np.log(opacity) - np.log1p(-opacity) if opacity < 1.0 else np.inf

@@ -1,7 +1,7 @@
-"""The Gaussians that are fitted, as a structure of arrays. The Gaussian index is the LAST axis of every array.
+"""The fitted Gaussians, as a structure of arrays. The Gaussian index is the LAST axis of every array.
 
-Index-last storage makes every hot loop run over contiguous memory and lets one rule (gather along the
-last axis) clone, split, prune and permute every array, its optimiser moments included.
+With this layout, every hot loop runs over contiguous memory. One rule, a gather along the last axis, clones, splits,
+prunes and permutes every array and its optimiser moments.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ DEFORMATION_CHANNELS = 10
 
 
 class Gaussians(NamedTuple):
-    """Raw (pre-activation) parameters of N Gaussians. A component that is off is None and costs no memory or time."""
+    """Raw (pre-activation) parameters of N Gaussians. Arrays of a disabled component are None."""
 
     position: FloatArray  # (3, N)  canonical centre mu, scene units
     quaternion: FloatArray  # (4, N)  w, x, y, z; normalised in the forward pass

@@ -1,9 +1,9 @@
 """Initialisation, equation (B12): Gaussians on back-projected training pixels.
 
-From the first training frame, `first_frame_points` pixels that are tissue and have depth. From every other training
-frame k (every second frame of clips beyond 150 frames), up to int(other_frame_points / n) such pixels that were
-not seen in the first frame or whose depth moved by more than `motion_threshold`. Held-out frames are never read.
-Pixels of different frames are compared at equal image position, as the published rule does.
+The first training frame contributes `first_frame_points` tissue pixels with depth. Every other training frame k (every
+second frame of clips beyond 150 frames) contributes up to int(other_frame_points / n) such pixels that are unseen in
+the first frame or whose depth has changed by more than `motion_threshold`. Held-out frames are never read. Pixels of
+different frames are compared at equal image positions, following the published rule.
 
 In: a `Sequence`. Out: `Gaussians`. This module is independent of the optimiser.
 """
@@ -42,10 +42,10 @@ def initialise(
 
     returns  positions on the pixels' rays at prior depth, colour of the pixel, opacity 0.1, unit quaternion,
              isotropic scale = root mean squared distance to the three nearest points; FDM weights 0;
-             motion coefficients of the tracks (B15) if the settings say so
+             motion coefficients of the tracks (B15) if configured
 
-    Edges:  fewer pixels than requested -> all of them; fewer than four points -> the mean over the existing
-            neighbours; one point or duplicates -> the floor of the squared distance.
+    Edges:  fewer pixels than requested -> all pixels; fewer than four points -> mean over the existing neighbours;
+            one point or duplicates -> the floor of the squared distance.
     Raises: InputError if no training pixel is tissue with depth.
     Draws:  one `rng.choice` without replacement per visited frame that has more pixels than requested.
     """
@@ -59,7 +59,7 @@ def gaussians_of(
     model: ModelConfig,
     dtype: DTypeLike = np.float32,
 ) -> Gaussians:
-    """Gaussians on points of the training frames, with the motion of the points if the settings say so (B15)."""
+    """Gaussians on points of the training frames, with the tracked motion of the points (B15) if configured."""
     gaussians = gaussians_at(points.position, points.colour, model, dtype)
     if config.motion == "none" or not model.spectral_motion:
         return gaussians
@@ -75,7 +75,7 @@ class TrainingPoints(NamedTuple):
 
     position: FloatArray  # (3, N) scene units, world axes
     colour: FloatArray  # (3, N) display units [0, 1]
-    start: NDArray[np.intp]  # (N,) place of the pixel's frame in `train_index`
+    start: NDArray[np.intp]  # (N,) position of the pixel's frame in `train_index`
 
 
 def training_points(sequence: Sequence, config: InitialisationConfig, rng: np.random.Generator) -> TrainingPoints:
@@ -154,7 +154,7 @@ def squared_neighbour_distance(position: FloatArray) -> FloatArray:
     others = min(NEIGHBOURS, len(points) - 1)
     if others < 1:
         return np.zeros(len(points))
-    # The nearest of k + 1 is the point itself or a duplicate of it: distance 0 either way.
+    # The nearest of k + 1 is the point itself or a duplicate: distance 0 in both cases.
     distance = KDTree(points).query(points, k=others + 1)[0][:, 1:]
     return (distance**2).mean(axis=1)
 
@@ -162,7 +162,7 @@ def squared_neighbour_distance(position: FloatArray) -> FloatArray:
 def activate_residuals(gaussians: Gaussians, count: int, appearance: bool, spectral_motion: bool) -> Gaussians:
     """The same Gaussians with zero residual coefficients (3, 2 count, N) for the components that are on.
 
-    Zero coefficients render the same picture bit by bit. Arrays that exist already are kept.
+    With zero coefficients the render is bitwise unchanged. Existing arrays are kept.
     """
     shape = (3, 2 * count, gaussians.count)
     dtype = gaussians.position.dtype

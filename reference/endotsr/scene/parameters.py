@@ -1,12 +1,11 @@
-"""Parameters that are not per Gaussian: one value for each training frame.
+"""Parameters with one value per training frame instead of one per Gaussian.
 
-The frame is the LAST axis of every array, as the Gaussian is in `Gaussians`. Density control never touches these
-arrays; optimiser and checkpoint hold them by field name, beside those of the Gaussians. A parameter that is
-switched off is None, and a model without any has no `FrameParameters` at all. (A parameter of the whole sequence
-is a field without the frame axis.)
+The frame is the LAST axis of every array, as the Gaussian is in `Gaussians`. Density control never changes these
+arrays; optimiser and checkpoint store them by field name, together with the arrays of the Gaussians. A disabled
+parameter is None; a model without any has no `FrameParameters`. (A parameter of the whole sequence would be a field
+without the frame axis.)
 
-A new parameter needs a field here, a setting and a rate (`learning_rates`), and a forward and a reverse pass where it
-acts.
+A new parameter needs a field here, a setting, a learning rate (`learning_rates`), and its forward and reverse pass.
 """
 
 from typing import NamedTuple
@@ -17,18 +16,18 @@ from numpy.typing import DTypeLike, NDArray
 from endotsr.config import ModelConfig
 from endotsr.kernels.arrays import FloatArray
 
-CHANNELS = 3  # of colours; rotation vectors and translations have as many entries
+CHANNELS = 3  # colour channels; rotation vectors and translations have 3 entries too
 
 
 class Exposure(NamedTuple):
-    """Exposure of one frame or of one moment, equation (B13)."""
+    """Exposure of one frame or at one time, equation (B13)."""
 
     log_gain: FloatArray  # (3,) natural logarithm of the gain
     bias: FloatArray  # (3,) display units
 
 
 class Pose(NamedTuple):
-    """Correction of the camera pose of one frame or of one moment, equation (B16)."""
+    """Correction of the camera pose of one frame or at one time, equation (B16)."""
 
     rotation: FloatArray  # (3,) rotation vector, rad, camera axes
     translation: FloatArray  # (3,) scene units, camera axes
@@ -45,7 +44,7 @@ class FrameParameters(NamedTuple):
 
 
 def frame_parameters(model: ModelConfig, train_times: FloatArray, dtype: DTypeLike) -> FrameParameters | None:
-    """Parameters at the start of training: every one is the identity. None if the model has no such parameter.
+    """Parameters at the start of training, all the identity. None if the model has no such parameter.
 
     train_times  (n,) normalised times of the training frames, ascending
     """
@@ -59,22 +58,22 @@ def frame_parameters(model: ModelConfig, train_times: FloatArray, dtype: DTypeLi
 
 
 def trained(frames: FrameParameters | None) -> dict[str, FloatArray]:
-    """The arrays that are trained, by field name, in field order; none without `frames`."""
+    """The trained arrays by field name, in field order; empty without `frames`."""
     named = {} if frames is None else frames._asdict()
     return {name: a for name, a in named.items() if name != "times" and a is not None}
 
 
 def exposure_of(frames: FrameParameters | None, k: int) -> Exposure | None:
-    """Exposure of training frame k (a position among the training frames), copied; None if the model has none."""
+    """A copy of the exposure of training frame k (position among the training frames); None if the model has none."""
     if frames is None or frames.exposure_log_gain is None or frames.exposure_bias is None:
         return None
     return Exposure(frames.exposure_log_gain[:, k].copy(), frames.exposure_bias[:, k].copy())
 
 
 def exposure_at(frames: FrameParameters | None, t: float) -> Exposure | None:
-    """Exposure at any time: linear in t between the two neighbouring training frames, constant beyond the ends.
+    """Exposure at any time: linear in t between neighbouring training frames, constant beyond the ends.
 
-    At the time of a training frame this is the exposure of that frame. None if the model has none.
+    None if the model has none.
     """
     if frames is None or frames.exposure_log_gain is None or frames.exposure_bias is None:
         return None
@@ -82,7 +81,7 @@ def exposure_at(frames: FrameParameters | None, t: float) -> Exposure | None:
 
 
 def pose_at(frames: FrameParameters | None, t: float) -> Pose | None:
-    """Correction of the pose at any time: both vectors are linear in t between two training frames, as `exposure_at`.
+    """Correction of the pose at any time: both vectors are interpolated as in `exposure_at`.
 
     None if the model has none.
     """
@@ -97,12 +96,12 @@ def _at(frames: FrameParameters, t: float, array: FloatArray) -> FloatArray:
 
 
 def exposure_gradients(frames: FrameParameters, k: int, exposure: Exposure) -> dict[str, FloatArray]:
-    """Gradients of all exposures from those of frame k: zero in every other column."""
+    """Gradients of all exposures, from the gradients of frame k: zero in every other column."""
     return _in_columns(frames, "exposure", exposure, {k: 1.0})
 
 
 def pose_gradients(frames: FrameParameters, t: float, pose: Pose) -> dict[str, FloatArray]:
-    """Gradients of all poses from those of the correction at time t: the transpose of `pose_at`."""
+    """Gradients of all poses, from the gradients of the correction at time t: the adjoint of `pose_at`."""
     last = frames.times.size - 1
     left = int(np.clip(np.searchsorted(frames.times, t, side="right") - 1, 0, last))
     right = min(left + 1, last)
@@ -113,7 +112,7 @@ def pose_gradients(frames: FrameParameters, t: float, pose: Pose) -> dict[str, F
 def _in_columns(
     frames: FrameParameters, group: str, vectors: Exposure | Pose, weights: dict[int, float]
 ) -> dict[str, FloatArray]:
-    """For every array (3, n) of a group one that holds its vector (3,), weighted, in some columns, and 0 elsewhere."""
+    """For every array (3, n) of a group, zeros with its vector (3,), weighted, in some columns."""
     found = {}
     for name, vector in vectors._asdict().items():
         array = found[f"{group}_{name}"] = np.zeros_like(getattr(frames, f"{group}_{name}"))

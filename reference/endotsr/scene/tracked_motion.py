@@ -1,16 +1,16 @@
-"""Initial translation residual from tracked motion: Gaussians that follow the tissue from the first iteration (B15).
+"""Initial translation residual from tracked motion (B15): Gaussians follow the tissue from the first iteration.
 
 For a point with positions X(t_i) at the training times, canonical position mu and coefficients C solve
 
     min  sum_i a_i |mu + C phi(t_i) - X(t_i)|^2 + sum_f (RIDGE rho_f + LEAST_RIDGE) |C_f|^2
 
-with the atoms phi of equation (1), the Matern weights rho of equation (4), and a_i = 1 where the point was followed,
-UNFOLLOWED where its position is that of the points around it.
+with the atoms phi of equation (1) and the Matern weights rho of equation (4). The weight a_i is 1 if the point is
+tracked, and UNFOLLOWED if its position is interpolated from the surrounding points.
 
-The atoms are fixed functions of time. The FDM cannot carry such a motion: its centres and widths are learned, and with
-large weights one step of a centre moves a Gaussian by a pixel.
+The atoms are fixed functions of time. The FDM cannot represent such a motion: its centres and widths are learned, and
+with large weights one optimiser step of a centre moves a Gaussian by a pixel.
 
-In: Gaussians and their tracks. Out: the Gaussians with other positions and motion coefficients. Knows no sequence.
+In: Gaussians and their tracks. Out: the Gaussians with new positions and motion coefficients.
 """
 
 import numpy as np
@@ -40,7 +40,7 @@ def with_tracked_motion(
     position   (n, 3, N) scene units; followed (n, N)
     omega      (F,) frequencies, cycles per sequence; rho (F,) their Matern weights
 
-    Edges:  a point that does not move has coefficients 0, to rounding, and stays where it is.
+    Edges:  a static point has coefficients 0, to rounding, and keeps its position.
     """
     atoms = np.stack([dictionary_forward(float(t), omega)[0] for t in times])
     design = np.concatenate([np.ones((len(times), 1)), atoms], axis=1)  # (n, 1 + 2F)

@@ -1,8 +1,9 @@
 """The common workload: N Gaussians on a wavy, tissue-like surface, seen at 640x512 by one camera, focal length 570 px.
 
-Mean projected sigma 3.6, 2.4 and 1.7 px at 20 000, 60 000 and 150 000 Gaussians (flat discs, mostly facing the
-camera), 55 % of them nearly opaque (0.6 to 0.98), the rest faint (0.03 to 0.5); 4 % of the picture lies beyond
-each border. Every draw is seeded, so the same arguments give the same arrays. Scene units are arbitrary, about 4 deep.
+The Gaussians are flat discs, most of which face the camera. The mean projected sigma is 3.6, 2.4 and 1.7 px at 20 000,
+60 000 and 150 000 Gaussians. 55 % are nearly opaque (0.6 to 0.98), the rest faint (0.03 to 0.5). The surface extends
+beyond each image border by 4 % of the image. All draws are seeded: equal arguments give equal arrays. Scene units are
+arbitrary; the depth is about 4.
 """
 
 import numpy as np
@@ -15,27 +16,27 @@ from endotsr.splatting.camera import Camera
 
 WIDTH, HEIGHT, FOCAL = 640, 512, 570.0
 SIGMA_PIXELS = {20_000: 3.6, 60_000: 2.4, 150_000: 1.7}
-BORDER = 0.04  # fraction of the picture beyond each border that holds Gaussians too
+BORDER = 0.04  # fraction of the image by which the surface extends beyond each border
 OPAQUE_FRACTION = 0.55
 FRAMES = 9  # default number of frames of the sequence: frame 1 is held out
 
 
 def camera(width: int = WIDTH, height: int = HEIGHT) -> Camera:
-    """The one camera, at the origin, looking along z; the focal length follows the width."""
+    """The camera, at the origin, looking along z; the focal length is proportional to the width."""
     focal = FOCAL * width / WIDTH
     return Camera(np.eye(3), np.zeros(3), focal, focal, width / 2, height / 2, width, height)
 
 
 def surface(column: FloatArray, row: FloatArray) -> FloatArray:
-    """Depth of the surface at picture positions given in pixels of the 640x512 picture."""
+    """Depth of the surface at image positions, in pixels of the 640x512 image."""
     fine = 0.15 * np.sin((column + 2 * row) / 29.0)
     return 4.0 + 0.35 * np.sin(column / 61.0) * np.cos(row / 47.0) + fine
 
 
 def gaussians(count: int, config: Config, seed: int = 7, size: float = 1.0) -> Gaussians:
-    """The scene, with the time bases and residuals that `config.model` has, in `config.training.precision`.
+    """The scene, with the time bases and residuals of `config.model`, in `config.training.precision`.
 
-    size  factor on the semi-axes: more or fewer pixels under the same Gaussians
+    size  factor on the semi-axes, which changes the pixels per Gaussian
     """
     rng = np.random.default_rng(seed)
     column = rng.uniform(-BORDER * WIDTH, (1 + BORDER) * WIDTH, count)
@@ -72,7 +73,7 @@ def _facing(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def temporal(rng: np.random.Generator, count: int, config: Config, sigma: float) -> dict[str, FloatArray]:
-    """Small time-dependent parameters: every Gaussian moves a little, so no branch is skipped."""
+    """Small time-dependent parameters: every Gaussian moves, so no branch is skipped."""
     model, made = config.model, {}
     dtype = np.dtype(config.training.precision)
     if model.deformation:
@@ -91,9 +92,9 @@ def temporal(rng: np.random.Generator, count: int, config: Config, sigma: float)
 def _normal(
     rng: np.random.Generator, sigma: float, shape: tuple[int, ...], dtype: np.dtype, middle: FloatArray | None = None
 ) -> FloatArray:
-    """Normal numbers about `middle` (one per index of the second axis), a row at a time.
+    """Normal numbers about `middle` (one per index of the second axis).
 
-    Drawing by rows avoids a float64 copy of the whole array, so that peak memory is that of the training.
+    Drawing row by row avoids a float64 copy of the whole array, which would exceed the peak memory of a training.
     """
     out = np.empty(shape, dtype)
     for block in out:
