@@ -65,7 +65,7 @@ def test_it_ends_when_the_fit_is_as_near_as_the_frames(sequence, monkeypatch):
     monkeypatch.setattr(coarse_start, "fit_error", lambda *_: next(errors))
     state, sizes, said = run(sequence, settings(iterations=4 * CHECK_EVERY))
     assert sizes == [(0, 32), (3 * CHECK_EVERY, 64)] and not state.coarse
-    assert said[0].startswith("coarse start: frames of half size") and said[-1].endswith(f"iteration {3 * CHECK_EVERY}")
+    assert said[0].startswith("coarse start: half-size frames") and said[-1].endswith(f"iteration {3 * CHECK_EVERY}")
 
 
 def test_it_ends_with_the_growth_at_the_latest(sequence, monkeypatch):

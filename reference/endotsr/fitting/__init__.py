@@ -1,1 +1,1 @@
-"""Adam, schedules, the training loop and checkpoints. No module here reads a file format of sequences."""
+"""Adam, schedules, the training loop and checkpoints, independent of the file formats of sequences."""

@@ -1,14 +1,14 @@
-"""Adam, equation (B10): elementwise, in place, the same bits for any number of threads.
+"""Adam, equation (B10): elementwise, in place, bitwise equal for any number of threads.
 
     m <- beta1 m + (1 - beta1) g            v <- beta2 v + (1 - beta2) g^2
     p <- p - rate (m / (1 - beta1^k)) / (sqrt(v / (1 - beta2^k)) + epsilon)
 
-k counts the steps of one array, so arrays that are created during a run start with k = 0 and zero moments.
+k counts the steps of one array: an array created during a run starts with k = 0 and zero moments.
 In: parameters and gradients by name, and one rate per name (or one per part of the leading axis). This module
 is independent of schedules and Gaussians.
 
-Two consequences. A zero gradient still moves a parameter by its momentum. With epsilon 1e-15 a gradient that is pure
-rounding noise moves a parameter by up to a full rate, which is why gradients are summed in a fixed order.
+Two consequences: a zero gradient still moves a parameter by its momentum. With epsilon 1e-15, a gradient of pure
+rounding noise moves a parameter by up to the full rate; gradients are therefore summed in a fixed order.
 """
 
 from collections.abc import Iterable, Mapping
@@ -34,7 +34,7 @@ SMALLEST_MOMENT = (
 
 @dataclass
 class AdamState:
-    """Moments and step counters by array name; arrays are changed in place."""
+    """Moments and step counters by array name; arrays are updated in place."""
 
     first: dict[str, FloatArray] = field(default_factory=dict)  # m, shape of the parameter
     second: dict[str, FloatArray] = field(default_factory=dict)  # v, shape of the parameter
@@ -55,12 +55,12 @@ def add_array(state: AdamState, name: str, array: FloatArray) -> None:
 
 
 def regather(state: AdamState, names: Iterable[str], source: NDArray[np.intp], kept: int) -> None:
-    """Moments of arrays whose columns were gathered: new column i is old column source[i], or zero from `kept` on.
+    """Gather the moments of arrays whose columns were gathered: column i becomes source[i], or zero from `kept` on.
 
-    names    the arrays that were gathered; the moments of the others, and all step counters, stay as they are
+    names    the gathered arrays; the moments of the others, and all step counters, are unchanged
     source   (M,) and `kept`: see `gather_columns`
 
-    The moments change in place, so that old and new ones are not held in memory together.
+    The moments are regathered in place, so old and new moments are never in memory together.
     """
 
     def moved(group: dict[str, FloatArray], name: str) -> None:
@@ -78,7 +78,7 @@ def adam_update(
     beta2: float,
     epsilon: float,
 ) -> None:
-    """One step of every array named in `gradients`; the others keep values, moments and step counter."""
+    """One step of every array named in `gradients`; all other arrays are unchanged."""
     for name, gradient in gradients.items():
         parameter, first, second = parameters[name], state.first[name], state.second[name]
         state.step[name] += 1
@@ -114,13 +114,13 @@ def adam_step(
 ) -> None:
     """One Adam step in place.
 
-    parameter, gradient, first, second   one shape, one dtype, C-contiguous; all but the gradient are changed
+    parameter, gradient, first, second   one shape, one dtype, C-contiguous; all but the gradient are updated
     step                                 1 at the first step of this array
-    learning_rate, beta1, beta2, epsilon scalars; the bias corrections are formed in float64
+    learning_rate, beta1, beta2, epsilon scalars; the bias corrections are computed in float64
 
-    Edges:  empty arrays pass; gradient and moments 0 -> the parameter keeps its bits. A first moment below
-            SMALLEST_MOMENT becomes 0 (it would decay into subnormal numbers, which are slow, and moves nothing).
-    Raises: ValueError on unequal shapes or dtypes, arrays that are not contiguous, step < 1.
+    Edges:  empty arrays are allowed; with gradient and moments 0, the parameter is bitwise unchanged. A first moment
+            below SMALLEST_MOMENT becomes 0: subnormal numbers are slow and have no effect.
+    Raises: ValueError for unequal shapes or dtypes, non-contiguous arrays, or step < 1.
     Oracle: `endotsr.definition.adam`; tests/oracle/adam.py.
     """
     check_layout(parameter, {"parameter": parameter, "gradient": gradient, "first": first, "second": second})
@@ -131,11 +131,11 @@ def adam_step(
 
 
 def check_layout(like: FloatArray, arrays: Mapping[str, FloatArray]) -> None:
-    """Check shape, dtype and layout, since otherwise a step could fail half way or change a copy.
+    """Check shape, dtype and layout; otherwise a step could fail midway or update a copy.
 
     like   array with the expected shape and dtype
 
-    Raises: ValueError naming the first of `arrays` with another shape or dtype, or that is not C-contiguous.
+    Raises: ValueError with the name of the first array that has another shape or dtype or is not C-contiguous.
     """
     for name, a in arrays.items():
         if a.shape != like.shape or a.dtype != like.dtype or not a.flags.c_contiguous:
@@ -151,7 +151,7 @@ def step_factors(step: int, learning_rate: float, beta1: float, beta2: float) ->
 
 
 def _adam_row(parameter, gradient, first, second, rate, root, beta1, beta2, epsilon):
-    """One piece of a row; scalars are float64 and rounded once, here, to the dtype of the arrays."""
+    """One piece of a row; scalars are float64 and rounded here, once, to the dtype of the arrays."""
     real = parameter.dtype.type
     keep1, keep2, new1, new2 = real(beta1), real(beta2), real(1.0 - beta1), real(1.0 - beta2)
     rate, root, epsilon = real(rate), real(root), real(epsilon)

@@ -1,7 +1,7 @@
-"""What the renders at the times between the training frames (B14) are compared with, made once and kept.
+"""Targets of the renders at times between training frames (B14), computed once and cached.
 
-In: a sequence and a time between two of its training frames. Out: the targets of its losses and its camera. All
-times of a gap are made at the first visit, because they need the same two flows. This module computes no loss.
+In: a sequence and a time between two of its training frames. Out: the targets of its losses and its camera. The first
+visit of a gap computes the targets of all its times, which need the same two flows. This module computes no loss.
 """
 
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ from endotsr.splatting.camera import Camera
 
 
 class Stored(NamedTuple):
-    """The targets of one time in whole numbers and bits: 8.5 bytes per pixel instead of 20. What is off is None."""
+    """The targets of one time as integers and bits, 8.5 instead of 20 bytes per pixel; disabled parts are None."""
 
     image: Array  # (3, H, W) uint16, steps of 1 / STEPS
     mask: PackedMask
@@ -59,7 +59,7 @@ class BridgedTargets:
         return targets_of(stored_target(made.image, STEPS, mask, precision), depth, supports, self.config), made.camera
 
     def _made(self, wanted: BridgedTime) -> dict[BridgedTime, Stored]:
-        """All times of the gap in which `wanted` lies."""
+        """The targets of all times of the gap that contains `wanted`."""
         earlier, later, _ = wanted
         config, precision, found = self.config, self.config.training.precision, {}
         flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)

@@ -1,13 +1,13 @@
-"""Checkpoints: the whole state of a training in one file, so that a resumed run equals an uninterrupted one bit by bit.
+"""Checkpoints: the complete state of a training in one file; a resumed run is bitwise equal to an uninterrupted one.
 
 The file is an uncompressed npz without pickle: a JSON header (as bytes) and one entry per array,
 `gaussians.<field>`, `first.<field>`, `second.<field>`, `statistics.<field>`, and `frames.<field>` if the model has
-parameters of frames. The header lists dtype, shape and SHA-256 of every array, so that a missing, foreign or damaged
-entry is reported by name.
+frame parameters. The header lists dtype, shape and SHA-256 of every array. Missing, foreign and damaged entries are
+therefore reported by name.
 
-A new file is written beside the old one and replaces it by one rename; the old one keeps its content under a second
-name (`previous_of`). At any moment there is a whole checkpoint, and after the second one there are two: if the latest
-cannot be read, `load_latest` takes the one before it. Files of every earlier version are read (`READERS`).
+A new file is written under a temporary name and replaces the old one by one rename. The old file is kept under a
+second name (`previous_of`). A complete checkpoint exists at any time after the first, and two after the second. If the
+latest is unreadable, `load_latest` reads its predecessor. All earlier versions of the format are read (`READERS`).
 """
 
 import contextlib
@@ -44,7 +44,7 @@ TRAINED = {*Gaussians._fields, *FrameParameters._fields} - {"times"}
 
 
 class DamagedCheckpoint(InputError):
-    """A file that is no whole checkpoint, or whose numbers no training can have written."""
+    """A file that is not a complete checkpoint, or that has numbers no training can write."""
 
 
 class Checkpoint(NamedTuple):
@@ -56,11 +56,11 @@ class Checkpoint(NamedTuple):
     rng_state: RngState  # of the bit generator, see `restore_rng`
     statistics: DensityStatistics
     header: CheckpointHeader  # entries of the caller: configuration, history
-    frames: FrameParameters | None = None  # None if the model has no parameters of frames
+    frames: FrameParameters | None = None  # None if the model has no frame parameters
 
 
 def previous_of(path: Path) -> Path:
-    """Where the checkpoint before the one at `path` is kept: `checkpoint.previous.npz` beside `checkpoint.npz`."""
+    """Path of the predecessor of the checkpoint at `path`: `checkpoint.previous.npz` for `checkpoint.npz`."""
     return path.with_name(f"{path.stem}.previous{path.suffix}")
 
 
@@ -74,10 +74,10 @@ def save_checkpoint(
     header: CheckpointHeader,
     frames: FrameParameters | None = None,
 ) -> None:
-    """Write atomically; `rng_state` is `rng.bit_generator.state`, `header` any JSON-able dictionary.
+    """Write atomically; `rng_state` is `rng.bit_generator.state`, `header` any JSON-serialisable dictionary.
 
-    A checkpoint that is there already becomes the previous one, and the previous one is removed.
-    Raises: OSError if it cannot be written (a full disk); both earlier files are then intact and nothing else is left.
+    An existing checkpoint becomes the previous one; the former previous one is removed.
+    Raises: OSError if writing fails (a full disk); both earlier files are then intact and no other file remains.
     """
     path = Path(path)
     entries = _entries(gaussians, adam, statistics, frames)
@@ -100,7 +100,7 @@ def save_checkpoint(
         _keep_previous(path)
         rename(temporary, path)
     except BaseException as error:
-        with contextlib.suppress(OSError):  # of a folder that has vanished
+        with contextlib.suppress(OSError):  # the folder no longer exists
             temporary.unlink(missing_ok=True)
         if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
             error.filename = str(path)
@@ -114,24 +114,24 @@ def digest(array: NDArray) -> str:
 
 
 def _keep_previous(path: Path) -> None:
-    """Give the checkpoint at `path` its second name. The first name stays until the new file takes it."""
+    """Link the checkpoint at `path` to its second name; the new file then replaces the first name."""
     previous = previous_of(path)
     spare = previous.with_name(f".{previous.name}.{secrets.token_hex(4)}.part")
     if not path.is_file():
         return
     try:
         os.link(path, spare)
-    except OSError:  # a file system without hard links: for a moment the file has its second name only
+    except OSError:  # without hard links, the file briefly has only its second name
         rename(path, previous)
         return
     try:
         rename(spare, previous)
     finally:
-        spare.unlink(missing_ok=True)  # it remains where both names are of one file already
+        spare.unlink(missing_ok=True)  # a rename onto a link to the same file leaves it
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the new names survive a power failure, where the system can."""
+    """Make the new names survive a power failure if the system supports it."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -154,9 +154,9 @@ def _entries(
 
 
 def load_latest(path: Path) -> tuple[Checkpoint, str]:
-    """The checkpoint at `path`, or the one before it if this one is damaged; and a line that says so, or "".
+    """The checkpoint at `path`, or its predecessor if it is damaged; and a message about that, or "".
 
-    Raises: InputError of the checkpoint at `path` if there is no other; of a version that is not known in any case.
+    Raises: InputError of the checkpoint at `path` if there is no predecessor, and for an unknown version.
     """
     previous = previous_of(path)
     if not path.exists() and previous.is_file():  # stopped where the file system has no hard links
@@ -174,9 +174,9 @@ def load_latest(path: Path) -> tuple[Checkpoint, str]:
 def load_checkpoint(path: Path) -> Checkpoint:
     """Read and check a checkpoint.
 
-    Raises: DamagedCheckpoint naming the file and the key: not a checkpoint, a missing or foreign entry, dtype, shape
-            or content other than the header says, object arrays, damaged or truncated data, numbers that are not
-            finite or out of range. InputError for a version that is not known.
+    Raises: DamagedCheckpoint with file and key: not a checkpoint, a missing or foreign entry, a dtype, shape or content
+            that differs from the header, object arrays, damaged or truncated data, non-finite or out-of-range numbers.
+            InputError for an unknown version.
     """
     path = Path(path)
     try:
@@ -193,7 +193,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
 
 
 class _OtherVersion(InputError):
-    """A version that this program does not read."""
+    """A version unknown to this program."""
 
 
 def _read(path: Path, file: NpzFile, key: str) -> NDArray:
@@ -223,7 +223,7 @@ def _read_header(path: Path, file: NpzFile) -> Description:
 
 
 def _of_version_1(description: Description) -> Description:
-    """Version 1 has no SHA-256 of the arrays; None stands for one that is not known."""
+    """Version 1 has no SHA-256 of the arrays; None marks an unknown digest."""
     listed = {k: [*v, None] if isinstance(v, list) else v for k, v in description["arrays"].items()}
     return {**description, "arrays": listed}
 
@@ -233,7 +233,7 @@ def _of_version_2(description: Description) -> Description:
 
 
 READERS: dict[int, Callable[[Description], Description]] = {1: _of_version_1, VERSION: _of_version_2}
-"""Version -> the header of that version in the form of the present one."""
+"""Version -> converter of its header to the present version."""
 
 
 def _read_entries(path: Path, file: NpzFile, listed: dict[str, list]) -> dict[str, NDArray]:

@@ -1,7 +1,7 @@
-"""The numbers of a checkpoint are checked like any input: a file may have been damaged, edited or made up.
+"""Validation of the numbers of a checkpoint, which may be damaged, edited or forged.
 
-In: the arrays as they were read. Out: nothing, or ValueError with the name of the array and what is allowed. The limits
-hold for every state that a training can reach; the message never depends on the values alone.
+In: the arrays read from the file. Out: nothing, or ValueError with the name of the array and the allowed values. Every
+state that a training can reach is within the limits.
 """
 
 from collections.abc import Iterator
@@ -16,8 +16,8 @@ from endotsr.scene.parameters import CHANNELS, FrameParameters, trained
 
 PRECISIONS = ("float32", "float64")
 HARMONICS = (1, 4, 9, 16)  # (degree + 1)^2
-SMALLEST_LOG_SCALE, LARGEST_LOG_SCALE = -1000.0, 88.0  # the exponential of the larger one still is a float32
-# The axes before the last: a number is a length, a letter stands for the same length wherever it occurs.
+SMALLEST_LOG_SCALE, LARGEST_LOG_SCALE = -1000.0, 88.0  # exp(88) is still finite in float32
+# The axes before the last: a number is a length, a letter is one unknown length common to all its axes.
 SHAPES: dict[str, tuple[int | str, ...]] = {
     "position": (3,),
     "quaternion": (4,),
@@ -45,8 +45,8 @@ TOGETHER = (
 def check_shapes(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
     """Check axes, precision and lengths. Raises ValueError.
 
-    Every array has the axes of `SHAPES` and one column for each Gaussian, or for each training frame; its moments have
-    its shape. All are of one precision. The arrays of a line of `TOGETHER` are there together or not at all.
+    Every array has the axes of `SHAPES` and one column per Gaussian or training frame; its moments have its shape. All
+    have one precision. The arrays of a line of `TOGETHER` are all present or all absent.
     """
     named = arrays(gaussians) | trained(frames)
     lengths: dict[str, int] = {}
@@ -69,7 +69,7 @@ def check_shapes(gaussians: Gaussians, adam: AdamState, frames: FrameParameters 
 
 
 def _check_axes(name: str, array: NDArray, lengths: dict[str, int]) -> None:
-    """Compare the axes with `SHAPES`; the length of a letter is remembered in `lengths`."""
+    """Compare the axes with `SHAPES`; `lengths` records the length of each letter."""
     expected = SHAPES[name]
     if array.ndim != len(expected) + 1:
         raise ValueError(f"{name}: {array.ndim} axes; allowed: {len(expected) + 1}")
@@ -79,7 +79,7 @@ def _check_axes(name: str, array: NDArray, lengths: dict[str, int]) -> None:
 
 
 def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
-    """Raise ValueError if an array or a moment has not one column for each Gaussian, or for each training frame."""
+    """Raise ValueError unless every array and moment has one column per Gaussian or training frame."""
     for what, named, count in (
         ("Gaussians", arrays(gaussians), gaussians.count),
         ("training frames", trained(frames), 0 if frames is None else frames.times.size),
@@ -96,9 +96,9 @@ def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters
 def check_numbers(
     gaussians: Gaussians, adam: AdamState, statistics: DensityStatistics, frames: FrameParameters | None = None
 ) -> None:
-    """Check the values of arrays that have passed `check_shapes`. Raises ValueError naming array and index.
+    """Check the values of arrays that have passed `check_shapes`. Raises ValueError with array and index.
 
-    All are finite. Log-scales lie in [-1000, 88], second moments and statistics are not negative, and the times of the
+    All are finite. Log-scales are in [-1000, 88], second moments and statistics are nonnegative, and the times of the
     training frames ascend within [0, 1].
     """
     for label, array, low, high in _limits(gaussians, adam, statistics, frames):

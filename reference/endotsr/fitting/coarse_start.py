@@ -1,10 +1,10 @@
-"""The coarse start of a training (specification B17): frames of half size until their fit is as near as they are.
+"""The coarse start of a training (specification B17): half-size frames until the fit error is below the missing detail.
 
     e(i) = mean_k L1(render of frame k at half size)         d = mean_k mean |P_1(frame k)|  over its valid pixels
 
-P_1 is the finest band of equation (5): what the frames of half size lack. The training goes on with the full frames
-from the first check with e(i) < d on, and from `density.until` at the latest. Comes in: a state and the sequence;
-goes out: whether the next iteration is compared with the full frames. This module changes no parameter.
+P_1 is the finest band of equation (5), the detail missing from half-size frames. Training switches to the full frames
+after the first check with e(i) < d, at the latest at `density.until`. In: a state and the sequence. Out: whether the
+next iteration uses the full frames. This module changes no parameter.
 """
 
 from typing import NamedTuple
@@ -23,14 +23,14 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.smaller import halved
 
 CHECK_EVERY = 50  # iterations between two checks
-CHECKED_FRAMES = 8  # training frames, evenly spaced, that a check renders
+CHECKED_FRAMES = 8  # evenly spaced training frames rendered by a check
 
 
 class CoarseStart(NamedTuple):
     """Constants of a coarse start."""
 
-    constants: TrainingConstants  # of the frames of half size
-    frames: NDArray[np.intp]  # that a check renders
+    constants: TrainingConstants  # of the half-size frames
+    frames: NDArray[np.intp]  # rendered by a check
     lacking: float  # d, display units
 
 
@@ -70,7 +70,8 @@ def fit_error(state: TrainingState, constants: TrainingConstants, frames: NDArra
 def lacking(sequence: Sequence, frames: NDArray[np.intp]) -> float:
     """d: the mean magnitude of the finest Laplacian band of some frames over its valid pixels, display units.
 
-    Edges: a frame without a valid pixel does not count; 0 without any, and the coarse start then ends late.
+    Edges: a frame without a valid pixel is excluded; 0 if none has one, and the coarse start then ends at the latest
+           iteration.
     """
     found = []
     for index in map(int, frames):

@@ -1,11 +1,11 @@
 """A cold start on two cores: two processes compile the kernels of a training at the same time.
 
-Compilation holds one lock for the whole process, so threads cannot divide it. While this process compiles the forward
-and reverse pass of rendering, a second one compiles losses and optimiser. Both store their code in the kernel cache,
-from which the other loads it. The second process then compiles the terms that the schedule switches on later. No
-result depends on this: a kernel that is missing at its first call is compiled at that call.
+A process-wide lock serialises compilation, so threads do not help. While this process compiles the forward and reverse
+pass of rendering, a second one compiles losses and optimiser. Each loads the other's code from the kernel cache. The
+second process then compiles the terms that the schedule activates later. No result depends on this: a kernel missing
+at its first call is compiled then.
 
-As a module (`python -m endotsr.fitting.compile_ahead`) this is the second process; settings come as JSON on its input.
+`python -m endotsr.fitting.compile_ahead` runs the second process, with settings as JSON on standard input.
 """
 
 import os
@@ -21,29 +21,29 @@ from endotsr.config import Config
 from endotsr.kernels.machine import compiled_for, usable_cores
 
 READY = "ready for the first iteration"
-_helpers: list[subprocess.Popen] = []  # kept until this process ends, which does not wait for their last kernels
+_helpers: list[subprocess.Popen] = []  # referenced until this process ends, which does not wait for them
 
 
 def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: None) -> bool:
-    """Compile the kernels of a training with these settings, on two cores, if the kernel cache does not hold them yet.
+    """Compile the kernels of a training with these settings on two cores, unless the kernel cache has them.
 
-    say      called with a line for the user when something is compiled
-    returns  whether anything was compiled. With one core, or with the JIT off, nothing is.
+    say      receives a message for the user if something is compiled
+    returns  whether anything was compiled; never with one core or with the JIT off
     """
     import numba
 
     if numba.config.DISABLE_JIT or usable_cores() < 2 or done_before(config).exists():  # type: ignore[attr-defined]
         return False
-    say("compiling for this machine, once; this takes about half a minute")
+    say("compiling for this machine, once; this takes about 30 seconds")
     helper = _second(config)
     rehearse_picture(*_small(config))
     if helper is not None and helper.stdout is not None:
-        helper.stdout.readline()  # READY, or the end of a process that failed
+        helper.stdout.readline()  # READY, or end of file if the process failed
     return True
 
 
 def _second(config: Config) -> subprocess.Popen | None:
-    """The second process; None if the system refuses one. A kernel that fails there fails again here when called."""
+    """The second process; None if it cannot be started. A kernel that fails there fails again here when called."""
     import numba
 
     environment = os.environ | {"NUMBA_CACHE_DIR": numba.config.CACHE_DIR}  # type: ignore[attr-defined]
@@ -65,7 +65,7 @@ def _second(config: Config) -> subprocess.Popen | None:
 
 
 def done_before(config: Config) -> Path:
-    """The file that marks all kernels of this source and these components as compiled for this processor."""
+    """Marker file: all kernels of this source and these components are compiled for this processor."""
     import numba
 
     from endotsr.kernels.jit import kernel_source_hash
@@ -77,7 +77,7 @@ def done_before(config: Config) -> Path:
 
 
 def rehearse(config: Config) -> None:
-    """Compile or load every kernel of a training with these settings in this process, so that timings exclude it."""
+    """Compile or load every kernel of a training with these settings in this process, before any timing."""
     constants, state = _small(config)
     rehearse_picture(constants, state)
     rehearse_losses(constants, everything=True)
@@ -111,7 +111,7 @@ def rehearse_picture(constants: Any, state: Any) -> None:
 
 
 def rehearse_losses(constants: Any, everything: bool) -> None:
-    """Targets, losses and optimiser; with `everything` also the terms that the schedule switches on later."""
+    """Targets, losses and optimiser; with `everything` also the terms that the schedule activates later."""
     import numpy as np
 
     from endotsr.fitting.objective import LossWeights, image_loss
@@ -124,7 +124,7 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
     weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
     seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no loss term is zero, so every kernel runs
     image_loss(seen, constants.targets_of(0), weights, config.loss)
-    if config.training.bridge_fraction > 0:  # the pictures between the frames are stored in finer steps
+    if config.training.bridge_fraction > 0:  # bridged images are stored in finer steps
         stored_target(np.zeros(frame.image.shape, np.uint16), 1, frame.mask, config.training.precision)
 
 
@@ -188,7 +188,7 @@ def rehearse_densification(constants: Any, state: Any) -> None:
 
 
 def _second_process() -> None:
-    """Compile everything but rendering; print READY when the kernels of the first iteration are compiled."""
+    """Compile everything but rendering; print READY after the kernels of the first iteration."""
     from endotsr.kernels.threads import use_threads
 
     config = msgspec.json.decode(sys.stdin.buffer.read(), type=Config)

@@ -1,8 +1,8 @@
-"""Numbers that are not finite stop a training before they reach a parameter; a loss that rises is reported early.
+"""Divergence checks: a non-finite number stops a training before any parameter update; a rising loss gives a warning.
 
-In: gradients and losses of an iteration. Out: `Diverged`, an exception that names iteration, frame and term, and lines
-of advice. Nothing here changes a number of the training, and the cost is below 0.5 % of an iteration: the sums of
-squares of eleven numbers per Gaussian, and every hundred iterations the distances of the centres.
+In: gradients and losses of an iteration. Out: the exception `Diverged` with iteration, frame and term, and warnings
+with advice. The checks change no number of the training and cost less than 0.5 % of an iteration: sums of squares of
+eleven numbers per Gaussian, and every hundred iterations the distances of the centres.
 """
 
 import math
@@ -15,7 +15,7 @@ from endotsr.fitting.records import LogEntry, RngState
 from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
 
-WINDOW = 100  # iterations of a mean of the loss, and between two looks at the centres
+WINDOW = 100  # iterations of a mean of the loss, and between two checks of the centres
 RISE = 3.0  # times the lowest mean so far
 FAR_OFF = 10.0  # times the radius of the scene at the start
 FAR_OFF_FRACTION = 0.01  # of the Gaussians
@@ -27,18 +27,18 @@ ADVICE = (
 
 
 class Diverged(FloatingPointError):
-    """An iteration whose loss or gradient is not finite. No parameter was changed by it."""
+    """An iteration with a non-finite loss or gradient. It has changed no parameter."""
 
     def __init__(self, iteration: int, frame: int, term: str, found: str, rng_state: RngState) -> None:
         super().__init__(f"iteration {iteration}, frame {frame}: {term} is {found}")
         self.iteration, self.frame, self.term = iteration, frame, term
-        self.rng_state = rng_state  # before the iteration: with it the iteration can be repeated
+        self.rng_state = rng_state  # before the iteration, to repeat it
 
 
 def not_finite(gradients: Mapping[str, FloatArray | None]) -> tuple[str, str] | None:
-    """Name, index and value of the first number that is not finite, as ("d_position[1, 7]", "nan"); None if all are.
+    """Name, index and value of the first non-finite number, as ("d_position[1, 7]", "nan"); None if there is none.
 
-    The sum of squares of an array is not finite if one of its numbers is not, and costs a tenth of a search.
+    The sum of squares of an array is non-finite if one of its numbers is, and costs 10 % of a search.
     """
     for name, array in gradients.items():
         if array is None or not array.size:
@@ -53,7 +53,7 @@ def not_finite(gradients: Mapping[str, FloatArray | None]) -> tuple[str, str] | 
 
 
 class DivergenceWatch:
-    """Looks at a training from outside and says once of each kind that it may be diverging."""
+    """Monitors a training and returns one warning per sign of divergence."""
 
     def __init__(self, gaussians: Gaussians) -> None:
         self._centre, self._radius = _extent(gaussians)
@@ -62,7 +62,7 @@ class DivergenceWatch:
         self._said: set[str] = set()
 
     def see(self, entry: LogEntry, gaussians: Gaussians) -> str:
-        """The line to say after the iteration of this log entry; empty if there is none."""
+        """The warning after the iteration of this log entry, or an empty string."""
         self._recent.append(entry.get(WATCHED_TERM, entry["loss"]))
         if entry["iteration"] % WINDOW or len(self._recent) < WINDOW:
             return ""
@@ -84,7 +84,7 @@ class DivergenceWatch:
         return new
 
     def _far_off(self, gaussians: Gaussians) -> float:
-        """Fraction of the centres that lie FAR_OFF radii or more from the centre of the scene, along an axis."""
+        """Fraction of the centres that are at least FAR_OFF radii from the centre of the scene along an axis."""
         if not gaussians.count:
             return 0.0
         away = np.abs(gaussians.position - self._centre[:, None]).max(axis=0)

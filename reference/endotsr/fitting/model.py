@@ -3,8 +3,8 @@
     mu(t) = mu + psi_mu(t) + C phi(t)       q(t) = q + psi_q(t)       s(t) = s + psi_s(t)
     h_0(t) = h_0 + beta tanh(A phi_bar(t)) / Y00
 
-A component whose arrays are None is not evaluated and gets no gradient array. In: `Gaussians` and a time. Out: the
-`Scene` that the rasteriser takes, or gradients by field name.
+A component with arrays None is not evaluated and has no gradient array. In: `Gaussians` and a time. Out: the `Scene`
+for the rasteriser, or gradients by field name.
 """
 
 from collections.abc import Iterable
@@ -48,7 +48,7 @@ class Spectral(NamedTuple):
 
 
 class SceneSaved(NamedTuple):
-    """Saved tuples of the components that were evaluated."""
+    """Saved tuples of the evaluated components."""
 
     deformation: DeformationSaved | None
     appearance: AppearanceSaved | None
@@ -56,25 +56,25 @@ class SceneSaved(NamedTuple):
 
 
 class OffsetsAhead(NamedTuple):
-    """Offsets of the FDM at a later time, computed when its arrays were updated. Valid until the next update."""
+    """Offsets of the FDM at a later time, computed with the update of its arrays. Valid until the next update."""
 
-    fdm_weight: FloatArray  # the array itself, whose identity shows whether the Gaussians are still the same
+    fdm_weight: FloatArray  # the array itself: its identity shows whether the Gaussians have changed
     t: float  # normalised time
     offsets: FloatArray  # (10, N)
 
 
 class SceneGrads(NamedTuple):
-    """Gradients with respect to the raw parameters; `d_offsets` is what the FDM's reverse pass takes."""
+    """Gradients with respect to the raw parameters; `d_offsets` is the input of the FDM's reverse pass."""
 
     by_field: dict[str, FloatArray]  # every field but the three of the FDM
     d_offsets: FloatArray | None  # (10, N)
 
 
 def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spectral:
-    """Frequencies, atom statistics over the TRAINING times only, and Matern weights; computed in float64
-    and rounded once, where they meet the coefficients.
+    """Frequencies, atom statistics over the TRAINING times only, and Matern weights.
 
     train_times  (n,) normalised times of the training frames
+    returns      float64; rounded once, when combined with the coefficients
     """
     omega = frequencies(model.frequencies, model.frequency_min, model.frequency_max, np.float64)
     statistics = atom_statistics(np.asarray(train_times, np.float64), omega)
@@ -82,7 +82,7 @@ def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spec
 
 
 def raster_settings(config: Config) -> RasterSettings:
-    """The rasteriser preset of a configuration with its near plane and every value that is set individually."""
+    """The rasteriser preset of a configuration, with its near plane and all individually set values."""
     raster = config.raster
     given = {name: getattr(raster, name) for name in ("alpha_cutoff", "transmittance_stop", "alpha_max")}
     own = {name: value for name, value in given.items() if value != "preset"}
@@ -99,10 +99,10 @@ def scene_at(
 ) -> tuple[Scene, SceneSaved]:
     """The Gaussians at time t (normalised; any value is allowed, [0, 1] is the sequence).
 
-    ahead   of `optimise`; used instead of a forward pass of the FDM if it is for these Gaussians and this time
+    ahead   of `optimise`; replaces the forward pass of the FDM if it matches the Gaussians and the time
     timer   records the stages "FDM" and "Fourier"
 
-    Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
+    Edges: with zero coefficients, a component leaves the scene bitwise unchanged (x + 0 = x).
     """
     ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = parallel_calls(
         timed(timer, "FDM", lambda: _deformed(gaussians, model, t, ahead)),
@@ -133,7 +133,7 @@ def _deformed(
 
 
 def _translation(gaussians: Gaussians, spectral: Spectral, t: float) -> tuple[FloatArray | None, MotionSaved | None]:
-    """C phi(t), if there is a spectral motion."""
+    """C phi(t), or None without component S."""
     coefficients = gaussians.motion_coefficients
     if coefficients is None:
         return None, None
@@ -144,7 +144,7 @@ def _translation(gaussians: Gaussians, spectral: Spectral, t: float) -> tuple[Fl
 def _residual(
     gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float
 ) -> tuple[FloatArray | None, AppearanceSaved | None]:
-    """The bounded colour residual, if there is one."""
+    """The bounded colour residual, or None without component A."""
     coefficients = gaussians.appearance_coefficients
     if coefficients is None:
         return None, None
@@ -153,9 +153,9 @@ def _residual(
 
 
 def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool = True) -> SceneGrads:
-    """Gradients with respect to the raw parameters from those of the deformed scene (all additions are pre-activation).
+    """Gradients with respect to the raw parameters, from the gradients of the deformed scene.
 
-    coefficients   False leaves the gradients of the Fourier coefficients to `coefficients_adam_step`
+    coefficients   False omits the Fourier coefficients, for `coefficients_adam_step`
     """
     by_field = {name: getattr(grads, f"d_{name}") for name in ("position", "quaternion", "log_scale", "opacity_logit")}
     by_field["harmonics"] = grads.d_harmonics
@@ -173,7 +173,7 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool =
 
 
 def with_exposure(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, ExposureSaved | None]:
-    """The images with the exposure of their frame, equation (B13); without one, the images themselves."""
+    """The images with the exposure of their frame, equation (B13); unchanged without one."""
     if exposure is None:
         return rendered, None
     colour, saved = exposure_forward(rendered.colour, exposure.log_gain, exposure.bias)
@@ -181,7 +181,7 @@ def with_exposure(rendered: RenderOut, exposure: Exposure | None) -> tuple[Rende
 
 
 def with_exposure_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[FloatArray, Exposure | None]:
-    """Gradients of the rendered colours and the exposure of the frame, from those of the exposed colours."""
+    """Gradients of the rendered colours and of the exposure, from the gradients of the exposed colours."""
     if saved is None:
         return d_colour, None
     grads = exposure_reverse(d_colour, saved)
@@ -189,7 +189,7 @@ def with_exposure_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> 
 
 
 def with_pose_correction(camera: Camera, pose: Pose | None) -> tuple[Camera, PoseSaved | None]:
-    """The camera with the correction of its pose, equation (B16); without one, the camera itself."""
+    """The camera with the correction of its pose, equation (B16); unchanged without one."""
     if pose is None:
         return camera, None
     rotation, translation, saved = pose_forward(camera.rotation, camera.translation, *pose)
@@ -197,7 +197,7 @@ def with_pose_correction(camera: Camera, pose: Pose | None) -> tuple[Camera, Pos
 
 
 def with_pose_correction_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> Pose | None:
-    """Gradients of the correction, from those of the corrected pose."""
+    """Gradients of the correction, from the gradients of the corrected pose."""
     if saved is None or d_camera is None:
         return None
     grads = pose_reverse(*d_camera, saved)
@@ -205,17 +205,17 @@ def with_pose_correction_reverse(d_camera: CameraGrads | None, saved: PoseSaved 
 
 
 def corrected_cameras(frames: FrameParameters | None, cameras: list[Camera], times: Iterable[float]) -> list[Camera]:
-    """The cameras of frames at their times with the corrections of a model; those given if the model has none."""
+    """The cameras of frames with the model's corrections at their times; unchanged if the model has none."""
     return [camera_at(frames, camera, float(t)) for camera, t in zip(cameras, times, strict=True)]
 
 
 def camera_at(frames: FrameParameters | None, camera: Camera, t: float) -> Camera:
-    """A camera with the correction of a model at time t; the camera itself if the model has none."""
+    """A camera with the model's correction at time t; unchanged if the model has none."""
     return with_pose_correction(camera, pose_at(frames, t))[0]
 
 
 def with_corrected_cameras(sequence: Sequence, frames: FrameParameters | None) -> Sequence:
-    """The sequence as a model sees it: its cameras with the corrections of their poses."""
+    """The sequence with the model's corrections of its camera poses."""
     cameras = corrected_cameras(frames, sequence.cameras, sequence.times)
     same = all(one is other for one, other in zip(cameras, sequence.cameras, strict=True))
     return sequence if same else replace(sequence, cameras=cameras)
@@ -242,12 +242,11 @@ def render_at(
 ) -> RenderOut:
     """Render the trained scene at any time in [0, 1] from any camera.
 
-    frames                        parameters of the training frames; the exposure is that of time t, between two
-                                  training frames the linear blend of theirs. None = no exposure
-    appearance, spectral_motion   False leaves that component out, to see what it contributes
+    frames                        frame parameters, whose exposure is interpolated linearly to t; None = no exposure
+    appearance, spectral_motion   False omits the component, to show its contribution
     returns                       colour (3, H, W), depth (H, W), opacity (H, W)
 
-    Raises: ValueError naming array and index if the scene holds a number that is not finite.
+    Raises: ValueError with array and index if the scene has a non-finite number.
     """
     chosen = without(gaussians, appearance=appearance, spectral_motion=spectral_motion)
     scene, _ = scene_at(chosen, spectral, config.model, t)

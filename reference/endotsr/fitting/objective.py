@@ -39,7 +39,7 @@ TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothn
 
 
 class Targets(NamedTuple):
-    """Inputs of the losses for one frame, computed once and kept. A term that is off has None."""
+    """Inputs of the losses for one frame, computed once and cached; None for a disabled term."""
 
     image: FloatArray  # (3, H, W) observed, 0 outside the tissue
     mask: NDArray[np.bool_]  # (H, W) True = tissue
@@ -49,7 +49,7 @@ class Targets(NamedTuple):
 
 
 class LossWeights(NamedTuple):
-    """Weights in force at one iteration; 0 = the term is not evaluated."""
+    """Weights at one iteration; 0 = the term is not evaluated."""
 
     ssim: float
     depth: float
@@ -67,13 +67,13 @@ class ImageLoss(NamedTuple):
 
 
 def targets_of(target: SsimTarget, depth: DepthTarget | None, supports: SupportMasks | None, config: Config) -> Targets:
-    """The targets of one frame from its masked picture and what depth and pyramid are compared with."""
-    # the target of the similarity holds the one copy of the image, zero outside the tissue
+    """The targets of one frame, from its masked image, depth target and pyramid supports."""
+    # the SSIM target has the only copy of the image, zero outside tissue
     return Targets(target.image, target.mask, target if config.loss.ssim_weight > 0 else None, depth, supports)
 
 
 def optional_depth_target(depth: FloatArray, mask: NDArray[np.bool_], config: Config) -> DepthTarget | None:
-    """`depth_target`, or None where its loss is off."""
+    """`depth_target`, or None if the depth loss is disabled."""
     return depth_target(depth, mask) if config.loss.depth_weight > 0 else None
 
 
@@ -98,7 +98,7 @@ def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -
 
 
 class Term(NamedTuple):
-    """One weighted term; a gradient that the term does not have is None."""
+    """One weighted term; None for a gradient that is always zero."""
 
     value: float  # unweighted
     d_colour: FloatArray | None
@@ -138,13 +138,13 @@ def image_loss(
     *,
     timer: Timer = NO_TIMER,
 ) -> ImageLoss:
-    """All image terms of equation (6) for one view, taken at the same time and added in the order of the equation.
+    """All image terms of equation (6) for one view, computed concurrently and added in the order of the equation.
 
-    edges   (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth. A constant of
-            the loss either way: no gradient flows through it.
+    edges   (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth. Held fixed in both
+            cases: no gradient flows through the edges.
     timer   records the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
 
-    Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
+    Edges: a term with weight 0 or target None is not evaluated and not listed in `terms`.
     """
     colour, (image, mask, _, depth, supports) = rendered.colour, targets
     calls: dict[str, Callable[[], Term]] = {}
@@ -180,10 +180,10 @@ def calibrate_on(
 ) -> Calibration:
     """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
 
-    The views are rendered without the spectral components, even if the scene has them, because equation (7) is
-    defined on the base model. The parameters of `frames` belong to the base model.
+    The views are always rendered without the spectral components, because equation (7) is defined on the base model.
+    The frame parameters `frames` belong to the base model.
 
-    Raises: CalibrationError with a per-view table when no view gives a ratio.
+    Raises: CalibrationError with a table of the views if no view has a ratio.
     """
     chosen = sequence.train_index[calibration_views(len(sequence.train_index), config.loss.calibration_views)]
     views = []

@@ -1,8 +1,8 @@
-"""The targets of a frame in few bytes between its visits, and unpacked at each.
+"""Compact storage of the targets of a frame between its visits.
 
-In: masks of the tissue and depth targets. Out: what the depth loss and the pyramid compare with. A mask takes one bit a
-pixel. The depth of a frame is normalised at every visit, which is quick; that of a time between two frames (B14) is
-stored in whole numbers. This module computes no loss.
+In: tissue masks and depth targets. Out: the targets of the depth loss and of the pyramid. A mask is stored with one bit
+per pixel. The depth of a frame is normalised again at every visit, which is fast; the depth of a time between two
+frames (B14) is stored as integers. This module computes no loss.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from endotsr.equations.pyramid import Upsampling
 from endotsr.kernels.arrays import Array, BoolArray
 from endotsr.losses.depth import DepthTarget
 
-STEPS = 65535  # of a number in [0, 1]; 8-bit steps would be as large as the error of a good fit
+STEPS = 65535  # of the interval [0, 1]; 8-bit steps would be as large as the error of a good fit
 
 
 class PackedMask(NamedTuple):
@@ -26,7 +26,7 @@ class PackedMask(NamedTuple):
 
 
 class PackedDepth(NamedTuple):
-    """A normalised prior depth in whole numbers: it differs from `DepthTarget` by at most half a step of 1 / STEPS."""
+    """A normalised prior depth as integers, within half a step of 1 / STEPS of the `DepthTarget`."""
 
     levels: Array  # (H, W) uint16, steps of 1 / STEPS of the largest prior of the picture
     valid: PackedMask
@@ -34,12 +34,12 @@ class PackedDepth(NamedTuple):
 
 
 def packed_mask(mask: BoolArray) -> PackedMask:
-    """The mask in an eighth of its bytes."""
+    """The mask with one bit per pixel."""
     return PackedMask(np.packbits(mask), mask.shape)
 
 
 def unpacked_mask(packed: PackedMask) -> BoolArray:
-    """The mask again, exactly."""
+    """The mask, restored exactly."""
     height, width = packed.shape
     return np.unpackbits(packed.bits, count=height * width).view(np.bool_).reshape(packed.shape)
 
@@ -50,17 +50,17 @@ def packed_supports(mask: BoolArray, upsampling: Upsampling) -> tuple[PackedMask
 
 
 def unpacked_supports(packed: tuple[PackedMask, ...], mask: BoolArray, upsampling: Upsampling) -> SupportMasks:
-    """`support_masks` again, exactly."""
+    """The `support_masks`, restored exactly."""
     return SupportMasks(mask, tuple(unpacked_mask(valid) for valid in packed), upsampling)
 
 
 def packed_depth(target: DepthTarget) -> PackedDepth:
-    """A depth target in whole numbers."""
+    """A depth target as integers."""
     levels = np.rint(target.normalised * STEPS).astype(np.uint16)
     return PackedDepth(levels, packed_mask(target.valid), target.count)
 
 
 def unpacked_depth(packed: PackedDepth, dtype: DTypeLike) -> DepthTarget:
-    """The depth target again, to half a step."""
+    """The depth target, restored to within half a step."""
     normalised = np.multiply(packed.levels, 1 / STEPS, dtype=dtype)
     return DepthTarget(normalised, unpacked_mask(packed.valid), packed.count)

@@ -1,10 +1,10 @@
-"""What a training writes: the entry of an iteration in its log, and the header of its checkpoints."""
+"""Records written by a training: log entries and checkpoint headers."""
 
 from typing import Any, Required, TypedDict
 
 
 class LogEntry(TypedDict, total=False):
-    """One line of log.jsonl; the loss terms are unweighted, and one that took no part is missing."""
+    """One line of log.jsonl; loss terms are unweighted, and inactive terms are missing."""
 
     iteration: Required[int]  # from 1
     frame: Required[int]
@@ -21,7 +21,7 @@ class LogEntry(TypedDict, total=False):
 
 
 class RngState(TypedDict):
-    """The state of a PCG64 generator, as NumPy gives and takes it."""
+    """The state of a PCG64 generator, in NumPy's format."""
 
     bit_generator: str
     state: dict[str, int]
@@ -30,13 +30,13 @@ class RngState(TypedDict):
 
 
 class CheckpointHeader(TypedDict, total=False):
-    """What a checkpoint holds beside its arrays and counters; earlier versions hold less."""
+    """Entries of a checkpoint besides arrays and counters; earlier versions have fewer."""
 
     config: dict[str, Any]  # the settings, by section
     lambda_lap: float | None
     sequence: str | None  # fingerprint of the sequence
     coarse: bool
-    diverged: dict[str, Any]  # iteration, frame and term, in the dump of an iteration that was not finite
+    diverged: dict[str, Any]  # iteration, frame and term, in the dump of a diverged iteration
 
 
 class Description(TypedDict):
@@ -48,4 +48,4 @@ class Description(TypedDict):
     rng_state: RngState
     steps: dict[str, int]  # Adam steps, by array
     header: CheckpointHeader
-    arrays: dict[str, list]  # dtype, shape and SHA-256, by entry; None for a digest that is not known
+    arrays: dict[str, list]  # dtype, shape and SHA-256 (None if unknown), by entry

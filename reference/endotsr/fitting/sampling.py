@@ -1,7 +1,6 @@
 """Choice of the training frame and of the time of an iteration: uniform or bridged (specification, equation 6).
 
-In: the random generator, the sequence and the training settings. Out: one `View`. This module is independent of the
-Gaussians; it changes the generator only.
+In: the random generator, the sequence and the training settings. Out: one `View`. Only the generator is changed.
 """
 
 from typing import NamedTuple, cast
@@ -14,15 +13,15 @@ from endotsr.sequences.sequence import Sequence
 
 
 class BridgedTime(NamedTuple):
-    """A time between two training frames that follow one another."""
+    """A time between two consecutive training frames."""
 
     earlier: int  # frame number
     later: int  # frame number
-    fraction: float  # where the time lies between them, in (0, 1)
+    fraction: float  # position of the time between them, in (0, 1)
 
 
 class View(NamedTuple):
-    """The time that one iteration renders and the frame that the render is compared with."""
+    """The time of one iteration's render and the frame that it is compared with."""
 
     index: int  # frame number, always one of the training frames; the nearest one to a moment
     t: float  # normalised time at which the scene is rendered
@@ -30,20 +29,20 @@ class View(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A view, and the state that the generator had before it was drawn."""
+    """A view, and the state of the generator before its draw."""
 
     view: View
     rng_state: RngState
 
 
 def drawn_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> Drawn:
-    """The view of `draw_view`, with the state of the generator from which it is drawn again."""
+    """The view of `draw_view`, with the state of the generator before the draw."""
     before = cast(RngState, dict(rng.bit_generator.state))
     return Drawn(draw_view(rng, sequence, training), before)
 
 
 def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> View:
-    """A training frame, uniform with replacement; with the probability `bridge_fraction` a time between two (B14).
+    """A training frame, uniform with replacement; with probability `bridge_fraction` a time between two (B14).
 
     Draws: `rng.random()` if views are bridged, then one `rng.integers`.
     """
@@ -56,8 +55,8 @@ def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingCo
 def _draw_bridged(rng: np.random.Generator, sequence: Sequence) -> View:
     """One of the bridged times between the training frames (B14), uniform. Draws one `rng.integers`.
 
-    A gap of g frames has the 2 g - 1 times k / (2 g): a time at every frame that is missing and half-way between
-    any two frames. So every gap has its fraction of the draws by its length, and every time has one target.
+    A gap of g frames has the 2 g - 1 times k / (2 g): one at every missing frame and one midway between any two
+    frames. Longer gaps are therefore drawn more often, and every time has one target.
     """
     train = sequence.train_index
     gaps = np.diff(train)

@@ -1,7 +1,6 @@
-"""Every schedule of the training, as pure functions of (iteration, configuration).
+"""All schedules of the training, as pure functions of (iteration, configuration). Iterations count from 1.
 
-Iterations count from 1. This module has no state, so the value of any iteration can be computed at any time: a resumed
-run gets the same values.
+Without state, the values of a resumed run are the same.
 """
 
 from endotsr.config import Config
@@ -27,12 +26,12 @@ def residuals_active(iteration: int, config: Config) -> bool:
 
 
 def residuals_activate(iteration: int, config: Config) -> bool:
-    """Whether this is the first iteration with residuals, before which their arrays and moments are created."""
+    """Whether this is the first iteration with residuals; their arrays and moments are created before it."""
     return residuals_active(iteration, config) and not residuals_active(iteration - 1, config)
 
 
 def motion_active(iteration: int, config: Config) -> bool:
-    """Whether the spectral motion is trained at this iteration: tracked motion (B15) from the first one on."""
+    """Whether the spectral motion is trained at this iteration; tracked motion (B15) is from the first iteration."""
     tracked = config.model.spectral_motion and config.initialisation.motion != "none"
     return tracked or residuals_active(iteration, config)
 
@@ -40,15 +39,14 @@ def motion_active(iteration: int, config: Config) -> bool:
 def residual_decay(iteration: int, config: Config) -> float:
     """Factor on the residual rates, from 1 to `final_factor`.
 
-    With `restart_residual_schedule` the decay runs over the steps K_s .. iterations; otherwise it is that of the base
-    model.
+    With `restart_residual_schedule` the decay spans the steps K_s .. iterations; otherwise it equals the base model's.
     """
     start = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
     return exponential_decay(iteration - start, config.training.iterations - start, 1.0, config.optimiser.final_factor)
 
 
 def annealing(iteration: int, config: Config) -> float:
-    """Factor on the rates that do not decay: 1 up to `annealing_from`, then exponentially to `annealed_factor`."""
+    """Factor on the non-decaying rates: 1 up to `annealing_from`, then exponentially to `annealed_factor`."""
     o = config.optimiser
     steps = config.training.iterations - o.annealing_from
     return exponential_decay(iteration - o.annealing_from, steps, 1.0, o.annealed_factor)
@@ -57,11 +55,11 @@ def annealing(iteration: int, config: Config) -> float:
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
 
-    The rates of the spectral residuals are listed only while they are active, those of exposures and poses only if
-    the model has them.
+    Rates of the spectral residuals are listed only while these are active; rates of exposures and poses only if the
+    model has them.
 
-    position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
-    harmonics         constant up to `annealing`; degree 0 and the higher degrees have their own rate
+    position, fdm_*   decay exponentially to `final_factor` of their initial rate over the whole run
+    harmonics         constant up to `annealing`; separate rates for degree 0 and the higher degrees
     quaternion, log_scale, opacity_logit    constant up to `annealing`
     fdm_weight        the position channels have the extra `deformation_position_factor`
     exposure_*        decay like `position`
@@ -97,7 +95,7 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
 
 
 def laplacian_ramp(iteration: int, config: Config) -> float:
-    """Fraction of lambda_lap in force: 0 up to `laplacian_from`, 1 from `laplacian_full` on; 0 without component L."""
+    """Active fraction of lambda_lap: 0 up to `laplacian_from`, 1 from `laplacian_full` on; 0 without component L."""
     if not config.model.laplacian or iteration <= config.loss.laplacian_from:
         return 0.0
     if iteration >= config.loss.laplacian_full:
@@ -111,7 +109,7 @@ def smoothness_active(iteration: int, config: Config) -> bool:
 
 
 def active_degree(iteration: int, config: Config) -> int:
-    """Active harmonic degree: it rises by one at every multiple of `harmonics_interval`."""
+    """Active harmonic degree, raised by one at every multiple of `harmonics_interval`."""
     return min(config.model.harmonics_degree, iteration // config.training.harmonics_interval)
 
 
@@ -121,7 +119,7 @@ def statistics_active(iteration: int, config: Config) -> bool:
 
 
 def densifications_left(iteration: int, config: Config) -> int:
-    """Densifications from this iteration to the last one, both included; at least 1."""
+    """Number of densifications from this iteration to the last one, both included; at least 1."""
     density = config.density
     last = (density.until - 1) // density.interval
     return max(1, last - (iteration - 1) // density.interval)

@@ -1,9 +1,8 @@
 """The state of a training, and its constants.
 
-`TrainingState` holds everything that a run carries from one iteration to the next. A checkpoint holds the same, except
-for `ahead` and `drawn`, which are then computed again. Everything else (targets, atoms, rates) is a function of the
-state, the sequence and the configuration, so a resumed run equals an uninterrupted one bit by bit. This module
-computes no gradient.
+`TrainingState` has everything that changes between iterations. A checkpoint stores it without `ahead` and `drawn`,
+which are recomputed. Everything else (targets, atoms, rates) is a function of the state, the sequence and the
+configuration; a resumed run is therefore bitwise equal to an uninterrupted one. This module computes no gradient.
 """
 
 from dataclasses import dataclass
@@ -39,7 +38,7 @@ LEAST_COARSE_SIDE = 32  # pixels of a full frame; a smaller one has no coarse st
 
 @dataclass
 class TrainingState:
-    """Everything that a run carries from one iteration to the next."""
+    """Everything that changes between iterations."""
 
     gaussians: Gaussians
     adam: AdamState  # moments of the Gaussians' arrays and of the trained arrays of `frames`
@@ -47,14 +46,14 @@ class TrainingState:
     rng: np.random.Generator
     statistics: DensityStatistics
     lambda_lap: float | None  # full Laplacian weight; None until an `auto` weight is calibrated
-    frames: FrameParameters | None = None  # parameters that are not per Gaussian; None if the model has none
-    ahead: OffsetsAhead | None = None  # computed while the FDM was updated; not part of a checkpoint
+    frames: FrameParameters | None = None  # frame parameters; None if the model has none
+    ahead: OffsetsAhead | None = None  # computed with the update of the FDM; not part of a checkpoint
     coarse: bool = False  # the next iteration is compared with frames of half size
-    drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint holds the generator before it
+    drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint stores the generator before the draw
 
     @property
     def rng_state(self) -> RngState:
-        """The state of the generator before the next view is drawn."""
+        """The state of the generator before the draw of the next view."""
         return cast(RngState, dict(self.rng.bit_generator.state)) if self.drawn is None else self.drawn.rng_state
 
 
@@ -68,25 +67,25 @@ class TrainingConstants:
     extent: float
     supports: Kept[int, tuple[PackedMask, ...]]  # of the pyramid, by frame, filled at first use
     bridged: BridgedTargets  # between the frames, filled at first use
-    depth: float = 1.0  # median depth of the tissue, scene units; known where poses are corrected
+    depth: float = 1.0  # median depth of the tissue, scene units; computed only if poses are corrected
 
     def observed(self, view: View) -> tuple[Targets, Camera]:
-        """What the render of a view is compared with, and the camera that it is seen by."""
+        """The targets of a view, and its camera."""
         if view.bridged is not None:
             return self.bridged.observed(view.bridged)
         return self.targets_of(view.index), self.sequence.cameras[view.index]
 
     def column(self, view: View) -> int:
-        """The place of the compared frame among the training frames."""
+        """The position of the compared frame among the training frames."""
         return int(np.searchsorted(self.sequence.train_index, view.index))
 
     def in_scene_units(self, rates: dict[str, Rate]) -> dict[str, Rate]:
-        """The rates of `learning_rates`, with that of the translations of poses in scene units."""
+        """The rates of `learning_rates`, with the rate of pose translations in scene units."""
         given = rates.get("pose_translation")
         return rates if given is None else rates | {"pose_translation": cast(float, given) * self.depth}
 
     def targets_of(self, index: int) -> Targets:
-        """The targets of a frame. The supports of its pyramid are computed once, or again where they were dropped."""
+        """The targets of a frame. The supports of its pyramid are cached."""
         sequence, config, precision = self.sequence, self.config, self.config.training.precision
         mask, rule, supports = sequence.masks[index], config.loss.upsampling, None
         depth = optional_depth_target(sequence.depth[index].astype(precision, copy=False), mask, config)
@@ -98,7 +97,7 @@ class TrainingConstants:
 def training_constants(sequence: Sequence, config: Config) -> TrainingConstants:
     """Spectral constants and scene extent of a sequence.
 
-    A quarter of `sequence.memory` each is for the targets of the frames and for the frames in between.
+    The targets of the frames and of the times between them may each use 25 % of `sequence.memory`.
     """
     keep_freed_memory()
     limit = memory_limit(config.sequence.memory) / 4
@@ -110,7 +109,7 @@ def training_constants(sequence: Sequence, config: Config) -> TrainingConstants:
 
 
 def _depth_of_tissue(sequence: Sequence) -> float:
-    """Median over the training frames of their median depth; 1 where no depth is known."""
+    """Median over the training frames of their median depth; 1 without any depth."""
     medians = [m for i in sequence.train_index if (m := sequence.tissue_depth(int(i))) is not None]
     return float(np.median(medians)) if medians else 1.0
 
@@ -118,12 +117,12 @@ def _depth_of_tissue(sequence: Sequence) -> float:
 def new_training(sequence: Sequence, config: Config) -> TrainingState:
     """Initialise from the training frames, seeded.
 
-    Raises: InputError when the frames hold no usable pixel, or poses are to be corrected that do not change.
+    Raises: InputError if the frames have no usable pixel, or if pose correction is on and the camera does not move.
     """
     if config.model.pose_correction and sequence.static_camera:
         raise InputError(
-            "model.pose_correction = true: the camera of this sequence does not move, and a correction would take the"
-            " motion of the tissue for its own; allowed: a sequence with a pose for each frame"
+            "model.pose_correction = true: the camera of this sequence does not move, so a correction would absorb"
+            " tissue motion; allowed: a sequence with a pose for each frame"
         )
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     gaussians = initialise(sequence, config.initialisation, config.model, rng, dtype)
@@ -154,13 +153,13 @@ def fresh_state(
 
 
 def _given_weight(config: Config) -> float | None:
-    """lambda_lap of the settings; None if it is to be calibrated."""
+    """lambda_lap of the settings; None if it must be calibrated."""
     weight = config.loss.lambda_lap
     return None if weight == "auto" else float(weight)
 
 
 def check_state(state: TrainingState) -> None:
-    """Raise ValueError naming array and index if a parameter is not finite."""
+    """Raise ValueError with array and index if a parameter is not finite."""
     check_finite(arrays(state.gaussians))
     check_finite(trained(state.frames))
 
@@ -168,10 +167,10 @@ def check_state(state: TrainingState) -> None:
 def save_state(path: Path, state: TrainingState, config: Config, sequence: str | None = None) -> None:
     """Write a checkpoint, atomically.
 
-    sequence   fingerprint of the sequence, to which the checkpoint then belongs
+    sequence   fingerprint of the sequence of this checkpoint
 
-    Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (the render
-            would merely lack its Gaussian). The previous checkpoint is then intact.
+    Raises: OSError, or FloatingPointError with array and index if a parameter is not finite (a render would merely
+            omit its Gaussian). The previous checkpoint is then intact.
     """
     try:
         check_state(state)
@@ -187,7 +186,7 @@ def save_state(path: Path, state: TrainingState, config: Config, sequence: str |
 
 
 def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingState:
-    """The state as it was saved. Raises InputError for a weight or a random state that no training has."""
+    """The saved state. Raises InputError for a weight or a random state that no training has."""
     weight = checkpoint.header.get("lambda_lap")
     if weight is not None:
         number(weight, "header.lambda_lap", low=0.0)

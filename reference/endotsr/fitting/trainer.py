@@ -1,8 +1,8 @@
 """The training: one view per iteration, on the published schedule (specification, equation 6 and B10-B12).
 
-`training_step` computes what `view_gradients` (`fitting/view.py`) spells out, with the same functions. In place of the
-reverse passes of the time bases and of the Fourier coefficients it calls `optimise`, which fuses them with their Adam
-step. No result depends on the number of threads.
+`training_step` computes `view_gradients` (`fitting/view.py`) with the same functions. Only the reverse passes of the
+time bases and of the Fourier coefficients are replaced by `optimise`, which fuses them with their Adam step. No result
+depends on the number of threads.
 """
 
 import math
@@ -57,7 +57,7 @@ from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, ren
 OnIteration = Callable[[LogEntry], None]
 
 WATCHED_GRADIENTS = ("d_position", "d_log_scale", "d_quaternion", "d_opacity_logit")
-PSNR_EVERY = 10  # iterations between two training PSNRs in the log, since each costs a pass over the image
+PSNR_EVERY = 10  # iterations between two training PSNRs in the log; each costs a pass over the image
 
 
 def train(
@@ -69,13 +69,13 @@ def train(
     *,
     on_message: Callable[[str], object] = print,
 ) -> TrainingState:
-    """Run to `config.training.iterations`; the state is changed in place and returned.
+    """Run to `config.training.iterations`; the state is updated in place and returned.
 
     With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
-    That pre-training is not checkpointed: after an interruption it starts again and gives the same weight.
-    Raises: Diverged (a FloatingPointError) naming iteration, frame and term if a loss or a gradient is not finite;
-            the state is then that before the iteration, but for the density statistics. ValueError naming array and
-            index if the state holds a number that is not finite.
+    This pre-training is not checkpointed: after an interruption it restarts and gives the same weight.
+    Raises: Diverged (a FloatingPointError) with iteration, frame and term if a loss or a gradient is not finite; the
+            state is then unchanged since the previous iteration, except for the density statistics. ValueError with
+            array and index if the state has a non-finite number.
     """
     check_state(state)
     watch = DivergenceWatch(state.gaussians)
@@ -85,13 +85,12 @@ def train(
         on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
     coarse = coarse_start(sequence, config) if state.coarse else None
     if coarse:
-        so_long = "until their fit is as near to them as they are to the full frames"
-        on_message(f"coarse start: frames of half size {so_long}")
+        on_message("coarse start: half-size frames until the fit error is below the detail that they lack")
     constants = coarse.constants if coarse else training_constants(sequence, config)
     while state.iteration < config.training.iterations:
         if coarse and coarse_ends(state, coarse):
             coarse, state.coarse, constants = None, False, training_constants(sequence, config)
-            on_message(f"coarse start: the frames have their full size after iteration {state.iteration}")
+            on_message(f"coarse start: full-size frames after iteration {state.iteration}")
         entry = training_step(state, constants)
         on_iteration(entry)
         if advice := watch.see(entry, state.gaussians):
@@ -151,7 +150,7 @@ def training_step(state: TrainingState, constants: TrainingConstants, timer: Tim
 
 
 def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:
-    """The weights of the image terms in force at this iteration."""
+    """The weights of the image terms at this iteration."""
     smoothness = config.loss.smoothness_weight if smoothness_active(iteration, config) else 0.0
     laplacian = laplacian_ramp(iteration, config) * (state.lambda_lap or 0.0)
     return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, laplacian)
@@ -163,7 +162,7 @@ def _activate_residuals(state: TrainingState, config: Config) -> None:
     state.gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
     for name in ("appearance_coefficients", "motion_coefficients"):
         array = getattr(state.gaussians, name)
-        if array is not None and name not in state.adam.first:  # tracked motion has its moments from the start
+        if array is not None and name not in state.adam.first:  # tracked motion has moments from the start
             add_array(state.adam, name, array)
 
 
@@ -174,7 +173,7 @@ def _matern_penalty(gaussians: Gaussians, constants: TrainingConstants) -> float
 
 
 def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, active: bool) -> None:
-    """Add this view to the statistics of density control."""
+    """Add this view to the density statistics."""
     if active:
         gather_statistics(state.statistics, d_scene.d_mean2d, d_scene.visible, camera.width, camera.height)
 
@@ -188,9 +187,9 @@ def _optimise(
     iteration: int,
     timer: Timer,
 ) -> None:
-    """One Adam step of the Gaussians, which also draws the next view and computes the offsets at its time.
+    """One Adam step of the Gaussians; also draws the next view and computes the offsets at its time.
 
-    It is not drawn before density control, which draws random numbers first, and after the last iteration.
+    No view is drawn before density control, which must draw its random numbers first, or after the last iteration.
     """
     config, later = constants.config, None
     if iteration < config.training.iterations and not densify_now(iteration, config):
@@ -209,7 +208,7 @@ def _optimise_frames(
     d_pose: Pose | None,
     iteration: int,
 ) -> None:
-    """One Adam step of the parameters of frames: of all columns, with gradient 0 for the frames that were not seen."""
+    """One Adam step of the frame parameters: all columns, with gradient 0 for unseen frames."""
     if state.frames is None:
         return
     gradients, o = {}, constants.config.optimiser
@@ -222,7 +221,7 @@ def _optimise_frames(
 
 
 def _control_density(state: TrainingState, constants: TrainingConstants, iteration: int) -> None:
-    """Clone, split and prune. Moments are gathered too; those of clones and children, and all statistics, are zero."""
+    """Clone, split and prune; gather the moments. Clones and children have zero moments; all statistics are zeroed."""
     left = densifications_left(iteration, constants.config)
     result = densify(state.gaussians, state.statistics, constants.config.density, state.rng, constants.extent, left)
     regather(state.adam, arrays(result.gaussians), result.plan.source, result.plan.survivors)
@@ -232,7 +231,7 @@ def _control_density(state: TrainingState, constants: TrainingConstants, iterati
 def _refuse_not_finite(
     iteration: int, view: View, loss: ImageLoss, penalty: float | None, d_scene: RenderGrads, rng_state: RngState
 ) -> None:
-    """Raise `Diverged` for the first loss term or gradient that is not finite, before a parameter is changed."""
+    """Raise `Diverged` for the first non-finite loss term or gradient, before any parameter is updated."""
     terms = {**loss.terms, "matern_penalty": penalty or 0.0, "loss": loss.loss}
     broken = next(((name, str(float(v))) for name, v in terms.items() if not math.isfinite(v)), None)
     broken = broken or not_finite({name: getattr(d_scene, name) for name in WATCHED_GRADIENTS})

@@ -1,4 +1,4 @@
-"""One training view, equation (6), made of the documented pairs only: the definition of one iteration.
+"""One training view, equation (6), composed only of documented pairs: the definition of one iteration.
 
     Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
                             camera --(B16)--^
@@ -45,7 +45,7 @@ class ViewGradients(NamedTuple):
     d_exposure: Exposure | None  # gradients with respect to the exposure of this frame
     d_pose: Pose | None  # gradients with respect to the correction of its pose
     rendered: RenderOut  # the images that were compared
-    render_saved: RenderSaved  # holds the decisions of the render: order, contributors, clamps
+    render_saved: RenderSaved  # has the decisions of the render: order, contributors, clamps
 
 
 def view_gradients(
@@ -66,7 +66,7 @@ def view_gradients(
 ) -> ViewGradients:
     """Loss and gradients of one view, equation (6), with all components that `gaussians` has.
 
-    targets   of the observed frame, see `frame_targets`; `weights` are those in force at this iteration
+    targets   of the observed frame, see `frame_targets`;  weights   at this iteration
     t         normalised time; any value is allowed, [0, 1] is the sequence
     edges     (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth
     exposure  of this frame, equation (B13); None = none

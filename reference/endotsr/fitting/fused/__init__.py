@@ -1,1 +1,1 @@
-"""Fused sweeps of training: reverse pass, Adam step and next forward pass in one visit of each array."""
+"""Fused sweeps of training: reverse pass, Adam step and next forward pass in one pass over each array."""

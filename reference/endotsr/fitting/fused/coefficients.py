@@ -1,9 +1,9 @@
 """Fast path of training: the reverse pass of a Fourier residual and its Adam step in one sweep.
 
-Both residuals are sums over atoms, so the gradient of a coefficient is the outer product atom x gradient of its sum,
-(3, 2F, N) numbers made of 3 N and 2F. Here it exists for one piece of one row at a time, with the gradient of the
-Matérn penalty already added. The arithmetic is that of `spread`, `matern_penalty_reverse` and `adam_update`, in the
-same order: the results are equal bit by bit (tested).
+Both residuals are sums over atoms. The coefficient gradient (3, 2F, N) is therefore the outer product of the atoms
+(2F,) and the gradient of the sums (3, N). This module computes it for one piece of one row at a time, including the
+gradient of the Matérn penalty, and never stores it. The operations and their order are those of `spread`,
+`matern_penalty_reverse` and `adam_update`: results are bitwise equal (tested).
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from endotsr.kernels.threads import parallel_for
 
 
 class RowStep(NamedTuple):
-    """What `adam_row` needs, in float64."""
+    """Scalars of `adam_row`, in float64."""
 
     rate: float  # learning rate, divided by the bias correction of the first moment
     root: float  # inverse root of the bias correction of the second moment
@@ -46,10 +46,11 @@ def coefficients_adam_step(
     atoms      (2F,) the atoms of that sum
     shrink     (2F,) of `penalty_factors`: shrink[a] x coefficients[:, a] is added to the gradient; or None
     parameter  (3, 2F, N) the coefficients themselves
-    state      moments and steps, and
-    rates      learning rates, one number each; `name` is that of this array
+    state      moments and steps
+    rates      learning rates by name, one number each
+    name       name of this array
 
-    Raises: ValueError on shapes, dtypes or layouts that do not fit. Oracle: the three functions named above, bitwise.
+    Raises: ValueError if shapes, dtypes or layouts disagree. Oracle: the three functions named above, bitwise.
     """
     first, second, dtype = state.first[name], state.second[name], parameter.dtype
     check_layout(parameter, {name: parameter, f"first {name}": first, f"second {name}": second})
@@ -58,7 +59,7 @@ def coefficients_adam_step(
     if d_sums.shape != (axes, n) or atoms.shape != (count,) or factors.size not in (0, count):
         raise ValueError(f"{name} {parameter.shape}: got {d_sums.shape}, atoms {atoms.shape}, factors {factors.shape}")
     learning_rate = rates[name]
-    assert isinstance(learning_rate, float)  # parts of the leading axis have no meaning here
+    assert isinstance(learning_rate, float)  # rates per part of the leading axis are not supported here
     state.step[name] += 1
     rate, root = step_factors(state.step[name], learning_rate, beta1, beta2)
     inputs = (np.ascontiguousarray(d_sums, dtype), np.ascontiguousarray(atoms, dtype), factors)

@@ -1,10 +1,9 @@
 """Fast path of training: the reverse pass of the deformation, its Adam step and the next forward pass in one sweep.
 
-The gradient of the FDM is (3, 10, B, N), three quarters of all gradients, and is needed once. Here it exists
-for one piece of one row at a time, in the second-level cache. The offsets of the next iteration are computed there as
-well, from the updated numbers, so that the arrays are not read from memory a second time. The arithmetic is that of
-`deformation_reverse`, `adam_update` and `deformation_forward`, in the same order: all results are equal bit by bit
-(tested).
+The gradient of the FDM, (3, 10, B, N), is 75 % of all gradients and is used once. This module computes it for one piece
+of one row at a time, in the second-level cache. There it also computes the offsets of the next iteration from the
+updated numbers, so the arrays are read from memory only once. The operations and their order are those of
+`deformation_reverse`, `adam_update` and `deformation_forward`: results are bitwise equal (tested).
 """
 
 from typing import NamedTuple
@@ -29,7 +28,7 @@ class FdmArrays(NamedTuple):
 
 
 class StepSettings(NamedTuple):
-    """What `adam_row` needs, for each of the three arrays; numbers in float64."""
+    """Scalars of `adam_row` for each of the three arrays, in float64."""
 
     rate: FloatArray  # (3, 10) learning rate of a channel, divided by the bias correction of the first moment
     root: FloatArray  # (3,) inverse root of the bias correction of the second moment
@@ -39,10 +38,10 @@ class StepSettings(NamedTuple):
 
 
 class BasisTimes(NamedTuple):
-    """Where the time bases are evaluated, in normalised time, and their shape."""
+    """The times at which the time bases are evaluated, normalised, and the type of basis."""
 
     t: float  # of the gradient
-    t_ahead: float  # of the offsets that are computed from the updated arrays
+    t_ahead: float  # of the offsets from the updated arrays
     quartic: bool
 
 
@@ -56,17 +55,17 @@ def deformation_adam_step(
     epsilon: float,
     ahead: float | None = None,
 ) -> FloatArray | None:
-    """Update the FDM arrays held in `saved`, and their moments in `state`, in place.
+    """Update the FDM arrays of `saved`, and their moments in `state`, in place.
 
     d_offsets  (10, N) gradient of the loss with respect to the offsets
     saved      from `deformation_forward`; its weight, centre and width are the parameters themselves
     state      moments and steps under the names fdm_weight, fdm_centre, fdm_width
     rates      learning rates under the same names, one each or one per part of the ten channels
     ahead      normalised time at which the offsets of the updated arrays are computed; None = not computed
-    returns    those offsets, (10, N); None without `ahead`
+    returns    these offsets, (10, N); None without `ahead`
 
-    The gradient with respect to t is not formed.
-    Raises: ValueError naming the array whose shape, dtype or layout does not fit.
+    The gradient with respect to t is not computed.
+    Raises: ValueError with the name of an array that has the wrong shape, dtype or layout.
     Oracle: `deformation_reverse`, `adam_update`, `deformation_forward`, bitwise.
     """
     parameters = FdmArrays(saved.weight, saved.centre, saved.width)
@@ -94,7 +93,7 @@ def deformation_adam_step(
 
 
 def _step(first_task, last_task, parameters, first, second, d_offsets, settings, times, offsets):
-    """Each task owns one piece of one channel, of all nine arrays; `offsets` has no columns if none are computed."""
+    """Each task owns one piece of one channel of all nine arrays; `offsets` has no columns if not requested."""
     (weight, centre, width), (t, t_ahead, quartic) = parameters, times
     rate, root, beta1, beta2, epsilon = settings
     bases, count = weight.shape[1:]

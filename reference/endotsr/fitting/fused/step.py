@@ -1,7 +1,7 @@
-"""One Adam step of everything that is trained, from the gradients with respect to the deformed scene.
+"""One Adam step of all trained arrays, from the gradients with respect to the deformed scene.
 
-Where the gradient of an array is much larger than its factors (time bases, Fourier coefficients), the reverse pass and
-the step are one sweep, and the gradient is never stored. The sweep over the time bases also computes the offsets of
+If the gradient of an array is much larger than its factors (time bases, Fourier coefficients), one sweep computes the
+reverse pass and the step, and the gradient is never stored. The sweep over the time bases also computes the offsets of
 the next iteration.
 """
 
@@ -31,15 +31,15 @@ def optimise(
     next_time: float | None = None,
     timer: Timer = NO_TIMER,
 ) -> OffsetsAhead | None:
-    """Change the Gaussians and their moments in place.
+    """Update the Gaussians and their moments in place.
 
-    saved   of `scene_at`, for the same Gaussians
-    grads   gradients with respect to the deformed scene
-    back    of `scene_reverse(..., coefficients=False)`: gradients of the arrays that need no sweep of their own
-    rates   learning rate of every array
-    next_time  normalised time of the next iteration, if it is known
-    timer   records the stages "FDM" and "Adam"
-    returns    offsets of the FDM at that time, for `scene_at`; None if unknown, or without an FDM
+    saved      of `scene_at`, for the same Gaussians
+    grads      gradients with respect to the deformed scene
+    back       of `scene_reverse(..., coefficients=False)`: gradients of the arrays without a fused sweep
+    rates      learning rate of every array
+    next_time  normalised time of the next iteration; None if unknown
+    timer      records the stages "FDM" and "Adam"
+    returns    offsets of the FDM at that time, for `scene_at`; None without `next_time` or FDM
     """
     o = config.optimiser
     settings = (o.beta1, o.beta2, o.epsilon)
