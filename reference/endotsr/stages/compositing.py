@@ -1,4 +1,4 @@
-"""Stages that make images: compositing of screen Gaussians (B5), and the whole render (B2) to (B5)."""
+"""Image stages: compositing of screen Gaussians (B5), and the whole render (B2) to (B5)."""
 
 from typing import Any, NamedTuple
 
@@ -85,7 +85,7 @@ def _composite_trace(inputs: Inputs, settings: Settings, saved: CompositorSaved)
 
 
 def decisions(records: NDArray, raster: RasterSettings, width: int, height: int) -> dict[str, NDArray]:
-    """Which pairs contribute and which are clamped, (n, H, W), nearest first; plain NumPy."""
+    """Contributing pairs and clamped pairs, (n, H, W), nearest first; plain NumPy."""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     transmittance, live = np.ones((height, width)), np.ones((height, width), bool)
     contributes, clamped = [], []
@@ -105,7 +105,7 @@ def decisions(records: NDArray, raster: RasterSettings, width: int, height: int)
 
 
 def _composite_inputs(rng: Random) -> dict[str, NDArray]:
-    """Screen Gaussians wide enough to cover the image; one nearly opaque (beyond the alpha clamp at its centre)."""
+    """Screen Gaussians that cover the image; one is nearly opaque (beyond the alpha clamp at its centre)."""
     n = COUNT
     a, c = rng.uniform(60, 150, n), rng.uniform(60, 150, n)
     logit = rng.uniform(-2.0, 1.0, n)
@@ -159,7 +159,7 @@ HARMONICS = {f"harmonics degree {d}": slice(d * d, (d + 1) ** 2) for d in range(
 
 
 def _variants(stage: str) -> tuple[Variant, ...]:
-    """The definition with both presets, and the fast compositor where it applies."""
+    """The definition with both presets, and the fast compositor if applicable."""
     made = []
     for name, raster in (("exact", EXACT), ("paper", WIDE), ("blocks", WIDE)):
         common = {"raster": raster_dict(raster), "_compositor": "blocks" if name == "blocks" else "definition"}

@@ -1,7 +1,7 @@
 """The twin of every stage: the same inputs and outputs, computed by `endotsr.definition` in plain NumPy, in float64.
 
-`definition_stages` drives the comparison of every compiled function with its definition, the gradient check of the
-definition and the comparison of the golden values with it.
+`definition_stages` is used to compare every compiled function with its definition, to check the gradients of the
+definition, and to compare golden values with it.
 """
 
 import importlib
@@ -38,7 +38,7 @@ IMAGES = ("colour_image", "depth_image", "opacity_image")
 
 
 class Twin(NamedTuple):
-    """What replaces the functions of a stage."""
+    """Functions that replace the functions of a stage."""
 
     function: Any  # of the definition
     forward: Callable[[Inputs, Settings], tuple[Found, Any]]
@@ -47,10 +47,9 @@ class Twin(NamedTuple):
 
 
 def definition_stages() -> dict[str, Stage]:
-    """Every stage that the definition computes, by name, with its functions instead of the compiled ones.
+    """Every stage computed by the definition, by name, with its functions instead of the compiled ones.
 
-    The discrete decisions are those of the compiled stage. Variants that differ in the compiled function only are left
-    out.
+    Discrete decisions come from the compiled stage. Variants that differ only in the compiled function are omitted.
     """
     stages, made = all_stages(), {}
     for name, twin in twins().items():
@@ -66,15 +65,15 @@ def definition_stages() -> dict[str, Stage]:
 
 
 def twins() -> dict[str, Twin]:
-    """The twin of every stage that the definition computes; those that name their module are found by its name."""
+    """The twin of every stage computed by the definition."""
     stages = all_stages()
     return {n: twin_of(s) for n, s in stages.items() if n in TWINS or s.plain or isinstance(s.forward, partial)}
 
 
 def twin_of(stage: Stage) -> Twin:
-    """The twin of a stage: its functions with the module of the definition that has the name of the compiled one.
+    """The twin of a stage, with the module of the definition that has the name of the compiled module.
 
-    Raises: KeyError for a stage that names no module and is not in `TWINS`.
+    Raises: KeyError for a stage without a module that is not in `TWINS`.
     """
     package, _, name = stage.function.rpartition(".")
     if stage.name in TWINS:
@@ -92,7 +91,7 @@ def twin_of(stage: Stage) -> Twin:
 
 
 def _trace_of(stage: Stage) -> Callable[[Inputs, Settings, Any], Any]:
-    """The decisions of the compiled stage at some inputs, whatever was saved."""
+    """The decisions of the compiled stage at some inputs; ignores the saved tuple."""
     trace = stage.trace
     assert trace is not None
     return lambda inputs, settings, saved: trace(inputs, settings, stage.forward(inputs, settings)[1])
@@ -253,7 +252,7 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     config = msgspec.structs.replace(config, loss=msgspec.structs.replace(config.loss, lambda_lap=float(weight)))
     state, tape, log = train.start(gaussians), Tape(inputs["frame_order"], inputs["split_noise"]), []
     counts = [gaussians.opacity_logit.size]
-    for _ in inputs["frame_order"]:  # as many iterations as there are frames in the order
+    for _ in inputs["frame_order"]:  # one iteration per frame
         state, seen = train.iterate(state, sequence, spectral, config, tape, raster, canny_edges)
         log.append({"loss": seen.loss, **seen.terms, **_sizes(state)})
         counts.append(state.gaussians.opacity_logit.size)

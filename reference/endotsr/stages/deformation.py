@@ -1,4 +1,4 @@
-"""The stage of the flexible deformation model (B1); one variant a time basis, so that both are checked."""
+"""The stage of the flexible deformation model (B1), with one variant per time basis."""
 
 from functools import partial
 
@@ -10,7 +10,7 @@ from endotsr.stages.stage import PlainPair, Variant
 
 
 def _inputs(rng: np.random.Generator, spread: float) -> dict[str, NDArray]:
-    """Weights off zero (else centre and width have no gradient); t within `spread` widths of every centre."""
+    """Nonzero weights (otherwise centre and width have no gradient); t within `spread` widths of every centre."""
     shape = (CHANNELS, 3, 5)
     width = rng.uniform(0.05, 0.3, shape) * rng.choice([-1.0, 1.0], shape)
     t = rng.uniform(0.3, 0.7)

@@ -42,13 +42,13 @@ def _laplacian_trace(inputs: Inputs, settings: Settings, saved: tuple[Any, Any])
 
 
 def observed_image(shape: tuple[int, int, int] = IMAGE_SHAPE) -> NDArray[np.float64]:
-    """The constant observed image of the gradient checks, from a closed formula."""
+    """The fixed observed image of the gradient checks, from a closed formula."""
     c, y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
     return 0.5 + 0.3 * np.sin(0.9 * x + 0.4 * c) * np.cos(0.7 * y)
 
 
 def tissue_mask(shape: tuple[int, int] = IMAGE_SHAPE[1:]) -> NDArray[np.bool_]:
-    """Its mask: an instrument in the lower right corner, small enough that every level keeps valid pixels."""
+    """Its mask: an instrument in the lower right corner, small enough for valid pixels at every level."""
     y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
     return (y < shape[0] - 2) | (x < shape[1] - 3)
 
@@ -60,7 +60,7 @@ def _kink_distance(rendered: NDArray, masks: SupportMasks) -> float:
 
 def _variant(rule: Upsampling) -> Variant:
     def inputs(rng: np.random.Generator) -> dict[str, NDArray]:
-        """The one of 16 draws whose valid band differences are furthest from the kink of |.|."""
+        """Of 16 draws, the one with valid band differences furthest from the kink of |.|."""
         masks = support_masks(tissue_mask(), LEVELS, rule)
         draws = [observed_image() + rng.normal(0.0, 0.3, IMAGE_SHAPE) for _ in range(16)]
         return {"rendered": max(draws, key=lambda rendered: _kink_distance(rendered, masks))}
@@ -79,13 +79,13 @@ def _variant(rule: Upsampling) -> Variant:
 
 
 def _calibration(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """One row a view; the gradients come as images, so that the RMS is part of the case."""
+    """One row per view; the inputs are gradient images, so the case includes the RMS."""
     g_rgb = [module.rms(view) for view in inputs["d_photometric"]]
     g_lap = [module.rms(view) for view in inputs["d_laplacian"]]
     views = [(str(k), a, b) for k, (a, b) in enumerate(zip(g_rgb, g_lap))]
     try:
         weight, refused = module.calibrate(views, settings["gradient_ratio"]).lambda_lap, False
-    except (CalibrationError, ValueError):  # the definition knows no error of the package
+    except (CalibrationError, ValueError):  # the definition raises ValueError
         weight, refused = 0.0, True
     return {
         "g_rgb": np.array(g_rgb),

@@ -1,4 +1,4 @@
-"""Stages of the base losses (B6) to (B9). In a gradient check the observed frame, its mask and the prior are fixed."""
+"""Stages of the base losses (B6) to (B9). Gradient checks hold the observed frame, its mask and the prior fixed."""
 
 from functools import partial
 from typing import Any
@@ -15,8 +15,8 @@ from endotsr.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Vari
 Random = np.random.Generator
 
 CHANNELS, HEIGHT, WIDTH = 3, 9, 14
-FACTOR = 3.0  # total variation against squared steps: both parts of the gradient must show
-PEAK = (5, 3)  # the pixel that holds the largest rendered depth
+FACTOR = 3.0  # total variation against squared steps: both must contribute to the gradient
+PEAK = (5, 3)  # the pixel of the largest rendered depth
 
 
 def _mask() -> NDArray[np.bool_]:
@@ -86,7 +86,7 @@ def _depth_trace(inputs: Inputs, settings: Settings, saved: tuple[Any, Any]) -> 
 
 
 def _priors(dtype: np.dtype) -> dict[str, NDArray]:
-    """Priors of 40 to 60 with three holes; the largest one is not where the render has its largest."""
+    """Priors of 40 to 60 with three holes; the largest prior and the largest render are at different pixels."""
     prior = np.random.default_rng(67).uniform(40.0, 55.0, (HEIGHT, WIDTH))
     prior[0, 0], prior[3, 1], prior[6, 6] = 0.0, -1.0, np.nan
     prior[8, 13], prior[PEAK] = 60.0, 48.0
@@ -118,7 +118,7 @@ def _edges(dtype: np.dtype) -> dict[str, NDArray]:
 
 
 def _smoothness_inputs(rng: Random) -> dict[str, NDArray]:
-    """A checkerboard of 0.4 and 0.8 with noise of 0.1: no neighbours are equal, nothing is near the 0 of tissue."""
+    """A checkerboard of 0.4 and 0.8 with noise of 0.1: no equal neighbours, and no value near the 0 of tissue."""
     parity = np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) % 2
     board = 0.4 + 0.4 * parity
     return {

@@ -11,15 +11,14 @@ from endotsr.stages.stage import Settings
 WIDTH, HEIGHT = 21, 17
 COUNT = 8
 LENS = {"fx": 19.0, "fy": 23.0, "cx": 9.5, "cy": 9.0, "width": WIDTH, "height": HEIGHT}
-# Every visible Gaussian of `raw_gaussians` stays above this alpha at every pixel, or below it at every pixel: no ring
-# of the cutoff crosses the image, so differences are taken on the smooth part. The ring itself is tested in
-# tests/splatting.
+# Each visible Gaussian of `raw_gaussians` is above this alpha at all pixels or below it at all pixels. The cutoff
+# contour does not cross the image, so finite differences see a smooth function. tests/splatting test the contour.
 WIDE = PAPER._replace(alpha_cutoff=1e-4)
 AXES = {f"position {axis}": (k, slice(None)) for k, axis in enumerate("xyz")}  # blocks of a position array
 
 
 def is_near(preset: str) -> Callable[[Settings], bool]:
-    """Whether the rasteriser settings of a case are nearer to `exact` or to `paper`."""
+    """Whether the rasteriser settings of a case resemble this preset more than the other of `exact` and `paper`."""
     return lambda settings: preset == ("exact" if settings["raster"]["support"] == "everywhere" else "paper")
 
 
@@ -34,14 +33,14 @@ def pose() -> dict[str, NDArray]:
 
 
 def positions(rng: np.random.Generator, count: int = COUNT) -> NDArray:
-    """In front of the camera at well separated depths, in an order that is not the depth order."""
+    """In front of the camera at well separated depths, not in depth order."""
     z = 3.0 + 0.35 * rng.permutation(count) + rng.uniform(-0.05, 0.05, count)
     seen = np.stack([rng.uniform(-0.3, 0.3, count) * z, rng.uniform(-0.3, 0.3, count) * z, z])
     return pose()["rotation_matrix"].T @ (seen - pose()["translation"][:, None])
 
 
 def raw_gaussians(rng: np.random.Generator) -> dict[str, NDArray]:
-    """Wide overlapping Gaussians; index 0 is behind the camera, index 1 is fainter than any cutoff."""
+    """Wide overlapping Gaussians; index 0 is behind the camera, index 1 is below any cutoff."""
     position = positions(rng)
     position[:, 0] -= pose()["rotation_matrix"].T @ np.array([0.0, 0.0, 20.0])
     logit = rng.uniform(-1.5, 1.5, COUNT)

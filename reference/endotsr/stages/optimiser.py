@@ -1,7 +1,4 @@
-"""Stages around the objective: schedules (6), Adam (B10), density control (B11), initialisation (B12), training.
-
-None of them has a gradient.
-"""
+"""Stages without a gradient: schedules (6), Adam (B10), density control (B11), initialisation (B12), training."""
 
 from functools import partial
 from typing import Any
@@ -24,11 +21,11 @@ from endotsr.stages.requests import Tape, config_of, gaussians_of, initialisatio
 from endotsr.stages.stage import Found, Inputs, Settings, Stage, real_of
 
 RESIDUAL_RATES = ("appearance_coefficients", "motion_coefficients")
-CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent reads poses only
+CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent uses poses only
 
 
 def _adam(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """Steps with the gradients of the leading axis, one after the other."""
+    """Successive steps with the gradients of the leading axis."""
     parameter = inputs["parameter"].copy()
     state = AdamState({"p": np.zeros_like(parameter)}, {"p": np.zeros_like(parameter)}, {"p": 0})
     numbers = [settings[name] for name in ("beta1", "beta2", "epsilon")]
@@ -38,7 +35,7 @@ def _adam(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _rates(module: Any, iteration: int, config: Config) -> dict[str, float]:
-    """Rates by group; those of the residuals are 0 while there are none."""
+    """Rates by group; rates of absent residuals are 0."""
     rates: dict[str, Any] = dict.fromkeys(RESIDUAL_RATES, 0.0) | module.learning_rates(iteration, config)
     for name, parts in (("harmonics", ("base", "rest")), ("fdm_weight", ("position", "other"))):
         for part, (_, rate) in zip(parts, rates.pop(name)):
@@ -62,7 +59,7 @@ def _schedule(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, N
 
 
 def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """Statistics of some views, then one densification. The harmonics hold indices, the first moments ones."""
+    """Statistics of some views, then one densification. Harmonics are set to indices, first moments to 1."""
     config, count = msgspec.convert(settings["density"], DensityConfig), inputs["opacity_logit"].size
     names = ("position", "quaternion", "log_scale", "opacity_logit")
     index = np.arange(float(count))[None, None]
@@ -95,7 +92,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """Every candidate is taken, so that no random number is drawn."""
+    """Selects every candidate; no random number is drawn."""
     config = initialisation_of(settings)
     sequence, no_draw = sequence_of(inputs, settings["camera"]), None
     found = initialise(sequence, config, model_of(settings), no_draw, real_of(inputs))  # type: ignore[arg-type]
@@ -103,7 +100,7 @@ def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """Train; components A and S are activated, densification happens. `auto` calibrates on the first Gaussians."""
+    """Train, with activation of A and S and with densification. `auto` calibrates on the first Gaussians."""
     dtype = real_of({"position": inputs["position"]})
     config = config_of(settings, dtype)
     sequence = sequence_of(inputs, settings["camera"])

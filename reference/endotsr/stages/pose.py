@@ -24,7 +24,7 @@ def _reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
 
 
 def _inputs(rng: np.random.Generator, angle: float) -> dict[str, NDArray]:
-    """A rotation by `angle` rad; the given matrix is no rotation, since its nine entries are independent."""
+    """A rotation by `angle` rad; the given matrix is not a rotation: its nine entries are independent."""
     axis = rng.normal(0, 1, 3)
     return {
         "rotation": rng.normal(0, 1, (3, 3)),

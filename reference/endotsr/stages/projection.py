@@ -89,7 +89,7 @@ def _harmonics_variant(degree: int) -> Variant:
     count = (degree + 1) ** 2
 
     def inputs(rng: Random) -> dict[str, NDArray]:
-        """Colours on both sides of the clamp at zero, none near it; in degree 0 the direction has no effect."""
+        """Colours on both sides of the clamp at zero, none near it; at degree 0 the direction has no effect."""
         made = {
             "harmonics": rng.uniform(-0.2, 0.2, (count, 3, COUNT)) / count,
             "residual": rng.uniform(-0.1, 0.1, (3, COUNT)),

@@ -13,7 +13,7 @@ STAGE_MODULES = (
 def all_stages() -> dict[str, Stage]:
     """Every stage by name, in the order of the specification.
 
-    Raises: ValueError where two stages, or two of their variants, have one name.
+    Raises: ValueError if two stages, or two of their variants, have the same name.
     """
     stages: list[Stage] = []
     for module in STAGE_MODULES:

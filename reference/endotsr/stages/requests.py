@@ -1,7 +1,7 @@
-"""Readers of requests: from arrays and settings by name to the structures of the package.
+"""Conversion of requests, arrays and settings by name, to the structures of the package.
 
-A setting that begins with an underscore is not part of a case: `_compositor` chooses between the two compositors of
-the reference, whose results must agree.
+A setting with a leading underscore is not part of a case: `_compositor` selects one of the two compositors of the
+reference, whose results must agree.
 """
 
 from typing import Any
@@ -24,7 +24,7 @@ COMPOSITORS: tuple[Compositor, ...] = ("definition", "blocks")
 
 
 def raster_of(settings: Settings) -> RasterSettings:
-    """The rasteriser settings written out in a case."""
+    """The rasteriser settings of a case."""
     fields: dict[str, Any] = dict(settings["raster"])
     fields["deviations"] = LegacyDeviations(**fields["deviations"])
     return RasterSettings(**fields)
@@ -43,7 +43,7 @@ def camera_of(inputs: Inputs, settings: Settings) -> Camera:
 def compositor_of(settings: Settings) -> Compositor:
     """The compositor of a request; both give the same result up to rounding.
 
-    `blocks` only where it computes these settings.
+    `blocks` is used only if it supports these settings.
     Raises: ValueError for any other name.
     """
     asked = settings.get("_compositor", "definition")
@@ -58,12 +58,12 @@ def scene_of(inputs: Inputs) -> Scene:
 
 
 def gaussians_of(inputs: Inputs) -> Gaussians:
-    """Raw parameters of a request; a component whose arrays are missing is off."""
+    """Raw parameters of a request; a component with missing arrays is off."""
     return Gaussians(*(inputs.get(name) for name in Gaussians._fields))  # type: ignore[arg-type]
 
 
 def model_of(settings: Settings) -> ModelConfig:
-    """The model settings written out in a case."""
+    """The model settings of a case."""
     return msgspec.convert(settings["model"], ModelConfig)
 
 
@@ -80,7 +80,7 @@ def config_of(settings: Settings, dtype: np.dtype) -> Config:
 
 
 def initialisation_of(settings: Settings) -> InitialisationConfig:
-    """The settings of the initialisation written out in a case."""
+    """The settings of the initialisation of a case."""
     name = "initialisation"
     return msgspec.convert(without_former_keys({name: settings[name]}, "golden case")[name], InitialisationConfig)
 
@@ -105,15 +105,15 @@ def sequence_of(inputs: Inputs, lens: dict[str, float]) -> Sequence:
 
 
 class Tape:
-    """A substitute for the random generator of a run: frames and split noise come from the inputs, in order."""
+    """A substitute for the random generator of a run: returns frames and split noise of the inputs, in order."""
 
     def __init__(self, frames: NDArray, noise: NDArray) -> None:
         self.frames, self.noise = list(map(int, frames)), noise
-        self.bit_generator = self  # the trainer notes the state of its generator before an iteration
+        self.bit_generator = self  # the trainer records the state of its generator before an iteration
 
     @property
     def state(self) -> dict[str, list[int]]:
-        """The frames that are still to come."""
+        """The remaining frames."""
         return {"frames": list(self.frames)}
 
     def integers(self, high: int) -> int:

@@ -1,4 +1,4 @@
-"""Stages of the whole method: the moving scene, the objective (6) with every gradient, and the same twice."""
+"""Stages of the whole method: the moving scene, the objective (6) with every gradient, and its repetition."""
 
 from typing import NamedTuple
 
@@ -51,7 +51,7 @@ class ObjectiveSaved(NamedTuple):
 
 
 def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSaved]:
-    """Equation (6) of one view. Edges of the smoothness term are detected unless the request holds them."""
+    """Equation (6) of one view. Edges of the smoothness term are detected unless the request has them."""
     loss, camera = msgspec.convert(settings["loss"], LossConfig), camera_of(inputs, settings)
     assert isinstance(loss.lambda_lap, float)
     config = Config(model=model_of(settings), loss=loss)
@@ -67,7 +67,7 @@ def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSave
 
 
 def _exposure(inputs: Inputs) -> Exposure | None:
-    """The exposure of the frame, if the request holds one."""
+    """The exposure of the frame, if the request has one."""
     given = "exposure_log_gain" in inputs
     return Exposure(inputs["exposure_log_gain"], inputs["exposure_bias"]) if given else None
 
@@ -88,7 +88,7 @@ def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved)
 
 
 def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> dict[str, NDArray]:
-    """Signs of every absolute value, the depth maximum and the edges, beside the decisions of the render."""
+    """Decisions of the render, signs of every absolute value, the depth maximum and the edges."""
     (colour, depth, _), targets = saved.view.rendered, saved.targets
     assert targets.depth is not None
     difference = np.where(targets.mask, colour - targets.image, 0)
@@ -105,7 +105,7 @@ def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) 
 
 
 def _objective_inputs(rng: np.random.Generator) -> dict[str, NDArray]:
-    """Every component away from zero, so that no gradient vanishes because a coefficient is 0."""
+    """Every component nonzero, because gradients vanish at zero coefficients."""
     scene = raw_gaussians(rng)
     del scene["residual"]
     shape = (10, BASES, COUNT)
@@ -134,7 +134,7 @@ def _frame(dtype: np.dtype) -> dict[str, NDArray]:
 
 
 def _objective_blocks(inputs: Inputs) -> Blocks:
-    """Channels of the deformation, frequencies of the residuals, every other array whole."""
+    """Blocks: channels of the deformation, frequencies of the residuals, every other array whole."""
     channels = {"position": slice(0, 3), "quaternion": slice(3, 7), "log-scale": slice(7, 10)}
     parts = {f"fdm_{part}": {f"fdm {part} {name}": index for name, index in channels.items()}
              for part in ("weight", "centre", "width")}  # fmt: skip
@@ -166,7 +166,7 @@ CHECKED = {
 
 
 def _twice(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """The objective twice: the second answer must have the bits of the first."""
+    """The objective twice: the results must be bitwise equal."""
     first, second = (OBJECTIVE.compute(inputs, settings) for _ in range(2))
     return {f"{name}_1": first[name] for name in TWICE} | {f"{name}_2": second[name] for name in TWICE}, None
 

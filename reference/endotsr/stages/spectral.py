@@ -21,7 +21,7 @@ LENGTH = 0.2
 
 
 def _each_atom(name: str) -> Mapping[str, Mapping[str, object]]:
-    """One block an atom of a coefficient array."""
+    """One block per atom of a coefficient array."""
     return {name: {f"{name}[:, {a}]": np.s_[:, a : a + 1] for a in range(2 * FREQUENCIES)}}
 
 
@@ -105,7 +105,7 @@ def _matern_reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
 
 
 def _matern_inputs(rng: Random) -> dict[str, NDArray]:
-    # rho spans five decades; this scale gives all atoms equal weight, so that none is lost in the rounding of another
+    # rho spans five decades; this scale gives all atoms equal weight, so none is lost in rounding
     rho = matern.matern_weights(frequencies(FREQUENCIES, 1.0, 16.0), LENGTH)
     scale = 0.5 / np.sqrt(np.tile(rho, 2))[:, None]
     return {"motion_coefficients": scale * rng.normal(0.0, 1.0, (3, 2 * FREQUENCIES, GAUSSIANS))}

@@ -1,4 +1,4 @@
-"""A stage: a forward pass, its reverse pass, the arrays that it returns and the inputs at which it is checked.
+"""A stage: a forward pass, its reverse pass, their results, and the inputs of its checks.
 
 The names of arrays and settings are those of the golden cases. `d_NAME` is the derivative of the loss with respect to
 NAME: a cotangent where NAME is an output, a gradient where it is an input.
@@ -26,15 +26,15 @@ class Variant(NamedTuple):
     """One gradient check of a stage: settings, and inputs that are non-vacuous and away from kinks.
 
     name      of the check, unique in the registry
-    inputs    rng -> float64 arrays; every one of them is differentiable
+    inputs    rng -> float64 arrays, all differentiable
     settings  held fixed; as in a golden case
     fixed     precision -> further inputs, which are not differentiated
-    blocks    inputs -> (input name, mask or index) by block name: what is probed separately;
+    blocks    inputs -> (input name, mask or index) by block name: separately probed parts;
               None = one block per input array
-    covers    settings of a golden case -> whether that case exercises what this variant checks
-    function  dotted name of the forward function where it is not that of the stage
-    hard      inputs -> flat indices by input name: entries that are always probed one by one
-    single    "" = the variant is also compared in float32; otherwise the reason why it cannot be
+    covers    settings of a golden case -> whether this variant covers that case
+    function  dotted name of the forward function if it differs from the stage's
+    hard      inputs -> flat indices by input name: entries that are always probed individually
+    single    "" = the variant is also compared in float32; otherwise the reason for its omission
     """
 
     name: str
@@ -51,19 +51,19 @@ class Variant(NamedTuple):
 class Stage(NamedTuple):
     """One computation of the method.
 
-    name      as the golden cases name their operation
+    name      name of the operation in golden cases
     equation  label of the specification ("1" ... "7" for the paper, "B..." for the base model); "" = none
-    text      what it computes, in a few words
+    text      short description
     function  dotted name of the forward function of the package
-    forward   (inputs, settings) -> (outputs that can be differentiated, saved); as a `partial` on the module whose
-              functions it calls, that of the definition can take its place
+    forward   (inputs, settings) -> (differentiable outputs, saved); a `partial` on the module of its functions, which
+              the module of the definition can replace
     reverse   (cotangents by output name, saved) -> gradients, named `d_` and the input; None = not differentiated
     extra     (inputs, settings, saved) -> further outputs, which are not differentiated
     trace     (inputs, settings, saved) -> the discrete decisions of the forward pass (order, contributors, clamps,
-              signs); a finite difference across a change of them is refused. None = no decisions
+              signs); a finite difference across a change of them is rejected. None = no decisions
     variants  the gradient checks
-    is_loss   the one output is the loss that all derivatives are of: its cotangent is 1 unless it is given
-    plain     the pair that the stage is made of, whose twin has the same names; None = written out
+    is_loss   the only output is the differentiated loss; its cotangent defaults to 1
+    plain     the pair wrapped by the stage, whose twin has the same names; None = written out
     """
 
     name: str
@@ -79,7 +79,7 @@ class Stage(NamedTuple):
     plain: "PlainPair | None" = None
 
     def compute(self, inputs: Inputs, settings: Settings) -> Outputs:
-        """All results of a request: outputs, and gradients where the request holds every cotangent.
+        """All results of a request: outputs, and gradients if the request has every cotangent.
 
         returns  arrays by name in C order
         """
@@ -94,16 +94,16 @@ class Stage(NamedTuple):
         return tidy(found)
 
     def checks(self, settings: Settings) -> tuple[str, ...]:
-        """Names of the variants that a golden case with these settings exercises."""
+        """Names of the variants that cover a golden case with these settings."""
         return tuple(variant.name for variant in self.variants if variant.covers(settings))
 
 
 class PlainPair(NamedTuple):
-    """A forward and a reverse function that are called with inputs and settings by name, and have one output.
+    """A forward and a reverse function with inputs and settings by name, and one output.
 
     arguments   names of inputs and settings, in the order of the parameters
     output      name of the value
-    gradient    name of the one gradient where the reverse pass returns an array; "": it returns a NamedTuple of them
+    gradient    name of the gradient if the reverse pass returns one array; "": it returns a NamedTuple
     """
 
     forward: Any
@@ -113,7 +113,7 @@ class PlainPair(NamedTuple):
     gradient: str = ""
 
     def run(self, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-        """The forward pass of a request; an input without axes is a number."""
+        """The forward pass of a request; an input without axes is passed as a number."""
         given = {**settings, **{name: _number(value) for name, value in inputs.items()}}
         value, saved = self.forward(*(given.get(name) for name in self.arguments.split()))
         return {self.output: value}, saved
@@ -134,7 +134,7 @@ def _number(value: NDArray) -> Any:
 
 
 def real_of(inputs: Inputs) -> np.dtype:
-    """The precision of a request: that of its first real input, float64 without one."""
+    """The precision of a request: the dtype of its first real input, float64 without one."""
     for array in inputs.values():
         if array.dtype.kind == "f":
             return array.dtype
