@@ -1,6 +1,6 @@
 """The public gradient checker, and every variant of every stage as a forward/reverse pair.
 
-Checking a port takes one call: `check_function(forward, reverse, inputs)` returns a `PairReport`.
+One call checks a port: `check_function(forward, reverse, inputs)` returns a `PairReport`.
 """
 
 from endotsr.gradcheck.checker import DOUBLE, SINGLE, PairReport, Settings, check_function, check_pair

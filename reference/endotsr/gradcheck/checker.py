@@ -1,7 +1,7 @@
 """The gradient checker: whether a reverse pass is the derivative of its forward pass, for registered pairs and ports.
 
-The rule is relative and has no absolute floor: |fd - an| <= rtol |an| + error bar of fd. A zero gradient against a
-non-zero difference fails at any magnitude. A probe counts only if it also refuses the gradient scaled by 1 + control;
+The rule is relative, without an absolute floor: |fd - an| <= rtol |an| + error bar of fd. A zero gradient with a
+non-zero difference fails at any magnitude. A probe counts only if it rejects the gradient scaled by 1 + control;
 otherwise it is unresolved.
 """
 
@@ -22,9 +22,9 @@ class Settings(NamedTuple):
     """The criteria of agreement. All numbers are relative.
 
     rtol            allowed |fd - an| / |an| beyond the error bar of the difference
-    control         a gradient scaled by 1 + control must be refused by every probe
-    unresolved_cap  largest fraction of probes that cannot refuse it
-    refused_cap     largest fraction of probes whose ends take different decisions
+    control         every probe must reject a gradient scaled by 1 + control
+    unresolved_cap  largest fraction of probes that cannot reject it
+    refused_cap     largest fraction of probes with different decisions at their ends
     """
 
     rtol: float = 1e-7
@@ -49,7 +49,7 @@ class ProbeResult(NamedTuple):
 
 
 class BlockReport(NamedTuple):
-    """All probes of one block. `worst` is the probe with the largest relative error that was resolved or failed."""
+    """All probes of one block. `worst` has the largest relative error of the resolved and failed probes."""
 
     block: str
     gradient_norm: float
@@ -64,7 +64,7 @@ class BlockReport(NamedTuple):
 
 
 class PairReport(NamedTuple):
-    """The check of one pair. `failures` holds one sentence per reason; none = passed."""
+    """The check of one pair. `failures` has one sentence per reason; empty = passed."""
 
     name: str
     equation: str
@@ -116,9 +116,9 @@ def check_function(
     reverse   (inputs, cotangents in the form of the outputs) -> gradients by input name, each of the input's shape
     inputs    float arrays by name; float64 unless the function computes in float32 (then settings=SINGLE)
     blocks    (input name, mask or index) by block name; None = one block per input
-    trace     discrete decisions of the forward pass; a difference across a change of them is refused
-    traced    outputs and decisions of one forward pass, where a second pass for the trace would cost time
-    hard      flat indices by input name that are always probed one by one
+    trace     discrete decisions of the forward pass; a difference across a change of them is rejected
+    traced    outputs and decisions of one forward pass, which saves a second pass for the trace
+    hard      flat indices by input name that are always probed individually
     rng       draws cotangents and directions; None = seed 0
     returns   PairReport; never raises for a wrong gradient
     """
@@ -161,7 +161,7 @@ def judge(analytic: float, difference: Difference, settings: Settings = DOUBLE) 
     if analytic == 0 and difference.value == 0:
         return "zero"
     if _agrees(analytic * (1 + settings.control), difference, settings):
-        return "unresolved"  # the negative control: this probe would accept a wrong gradient too
+        return "unresolved"  # the negative control: this probe would also accept a wrong gradient
     return "passed"
 
 
@@ -211,7 +211,7 @@ def _verdicts(reports: list[BlockReport], settings: Settings) -> list[str]:
             reasons.append(f"block {report.block}: the gradient is zero: nothing is tested")
         elif report.verdict == "BLIND":
             reasons.append(
-                f"block {report.block}: blind: none of {report.probes} probes refuses a gradient scaled by "
+                f"block {report.block}: blind: none of {report.probes} probes rejects a gradient scaled by "
                 f"1 + {settings.control:g} ({report.unresolved} unresolved, {report.refused} refused)"
             )
     total = sum(r.probes for r in reports)

@@ -12,11 +12,11 @@ def run_gradcheck(
 ) -> int:
     """Check the named pairs (None or empty = all), print the table, return the exit code.
 
-    names       pair names, as the table shows them
-    seed        of the inputs, cotangents and directions; every pair draws its own stream from it
+    names       pair names, as in the table
+    seed        of the inputs, cotangents and directions; every pair has its own random stream
     json_path   file of the JSON report; None = no report
     definition  check the functions of `endotsr.definition` instead of the compiled ones, in float64 only
-    returns     0 when every check passed, else 1
+    returns     0 if every check passed, else 1
     Raises:     InputError for an unknown name, a seed below 0 or an unwritable file.
     """
     from endotsr.gradcheck.checker import check_pair

@@ -1,8 +1,8 @@
-"""Derivatives along a line, from function values alone, each with an error bar.
+"""Derivatives along a line, from function values only, each with an error bar.
 
-A `line` is a function of one number h: the outputs at x + h v, every entry already multiplied by its
-cotangent. Its sum is the scalar that is differentiated, but differences are taken entry by entry before
-summing, so that small changes are not lost in large outputs. A line may return None: this h is refused.
+A `line` is a function of one number h: the outputs at x + h v, each entry multiplied by its cotangent. The
+differentiated scalar is their sum, but differences are computed entry by entry before summing: small changes are
+not lost in large outputs. A line returns None for an h that is rejected.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,14 +16,14 @@ Line = Callable[[float], NDArray | None]
 
 RATIO = 4.0
 LADDER = tuple(1e-2 * RATIO**-k for k in range(9))  # 1e-2 ... 1.5e-7 of the block's size
-COARSE = (1e-2 * RATIO**2, 1e-2 * RATIO)  # above it, for derivatives that are lost in rounding
-SETTLED = 1e-9  # relative agreement of neighbours at which no further steps are taken
+COARSE = (1e-2 * RATIO**2, 1e-2 * RATIO)  # larger steps, for derivatives that are lost in rounding
+SETTLED = 1e-9  # relative agreement of neighbours that ends the refinement
 
 
 class Difference(NamedTuple):
     """A derivative and its error bound.
 
-    value    the derivative along the line; nan when refused
+    value    the derivative along the line; nan if refused
     error    bound on its error from the agreement of neighbouring steps and from rounding
     step     the finer step of the plateau
     refused  too few steps with a value at both ends
@@ -36,13 +36,13 @@ class Difference(NamedTuple):
 
 
 def plateau_difference(line: Line, eps: float = float(np.finfo(np.float64).eps)) -> Difference:
-    """Five-point difference where its two neighbouring steps agree best.
+    """Five-point difference at the two neighbouring steps that agree best.
 
-    line   h -> weighted outputs, or None where h must not be used; h in units of the block's size
+    line   h -> weighted outputs, or None if h must not be used; h in units of the block's size
     eps    rounding unit of the outputs
 
-    The steps decrease by a ratio of 4 until neighbours agree to 1e-9. If none do, all steps are used, coarser ones
-    too. The error bar is twice the largest of three bounds: the disagreement of the best neighbours, the noise at
+    The steps decrease by a ratio of 4 until neighbours agree to 1e-9. If none do, all steps are used, including coarser
+    ones. The error bar is twice the largest of three bounds: the disagreement of the best neighbours, the noise at
     finer steps extrapolated to the chosen one, and the rounding of the outputs.
     """
     slopes = _slopes(line, LADDER, eps)
@@ -62,13 +62,13 @@ class _Slope(NamedTuple):
 
 
 def _slopes(line: Line, steps: Sequence[float], eps: float, settle: bool = True) -> list[_Slope]:
-    """Central differences at the given steps, coarsest first, without the refused ones."""
+    """Central differences at the accepted steps, coarsest first."""
     found: list[_Slope] = []
     for step in steps:
         ahead = line(step)
         behind = None if ahead is None else line(-step)
         if ahead is None or behind is None:
-            found.clear()  # a refused step lies between: coarser steps may cross to another branch
+            found.clear()  # coarser steps may cross to another branch beyond a refused step
             continue
         rounding = eps * float(np.linalg.norm(ahead)) / step
         found.append(_Slope(step, float(np.sum(ahead - behind)) / (2 * step), rounding))
@@ -93,27 +93,27 @@ def _best(slopes: list[_Slope]) -> Difference | None:
     gaps = [abs(b - a) for a, b in pairwise(values)]  # gaps[k] belongs to step k + 2
     k = int(np.argmin(gaps))
     step = slopes[k + 2].step
-    # Truncation shrinks with the step, noise grows as 1/h: finer steps show how much noise there is here.
+    # Truncation shrinks with the step, noise grows as 1/h: finer steps bound the noise of this one.
     noise = max(gap * slopes[j + 2].step / step for j, gap in enumerate(gaps) if j >= k)
     return Difference(values[k + 1], 2 * max(noise, slopes[k + 2].rounding), step)
 
 
 class Taylor(NamedTuple):
-    """slope of log |remainder| over log h, and whether the function is linear to rounding (then slope = inf)."""
+    """Slope of log |remainder| over log h, and whether the function is linear to rounding (then slope = inf)."""
 
     slope: float
     linear: bool
 
     @property
     def passed(self) -> bool:
-        """Second order or better. A wrong first derivative leaves slope 1."""
+        """Second order or better. A wrong first derivative gives slope 1."""
         return self.linear or self.slope >= 1.9
 
 
 def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER) -> Taylor:
     """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it clearly exceeds rounding.
 
-    The remainder of a right derivative falls as h^2 or faster, that of a wrong one as h.
+    The remainder of a correct derivative falls as h^2 or faster; with a wrong derivative it falls as h.
     """
     origin = line(0.0)
     if origin is None:

@@ -1,4 +1,4 @@
-"""The float32 reverse pass against the float64 one, at the same rounded inputs and cotangents."""
+"""Comparison of the float32 and the float64 reverse pass, at the same rounded inputs and cotangents."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from endotsr.gradcheck.registry import Arrays, Pair
 
 COSINE = 1e-6  # largest 1 - cosine between the two gradients of a block
 RELATIVE = 1e-4  # largest relative L2 distance
-DRAWS = 8  # largest number of draws until both precisions take the same decisions
+DRAWS = 8  # largest number of draws until both precisions make the same decisions
 
 
 class BlockPrecision(NamedTuple):
@@ -27,7 +27,7 @@ class BlockPrecision(NamedTuple):
 
 
 class PrecisionReport(NamedTuple):
-    """The float32 check of one pair. `skipped` gives the reason when the pair declares that it cannot run."""
+    """The float32 check of one pair. `skipped` is the reason if the pair does not support it."""
 
     name: str
     blocks: tuple[BlockPrecision, ...]
@@ -43,7 +43,7 @@ class PrecisionReport(NamedTuple):
 def check_precision(pair: Pair, rng: np.random.Generator) -> PrecisionReport:
     """Compare the reverse pass in float32 and float64, block by block.
 
-    Inputs whose decisions (pair.trace) differ between the precisions are drawn again, at most 8 times.
+    Inputs with different decisions (pair.trace) in the two precisions are redrawn, at most 8 times.
     """
     if pair.single:
         return PrecisionReport(pair.name, (), (), skipped=pair.single)
@@ -53,7 +53,7 @@ def check_precision(pair: Pair, rng: np.random.Generator) -> PrecisionReport:
         if _same_decisions(pair, inputs32, inputs64):
             break
     else:
-        reason = f"float32 and float64 took different decisions at {DRAWS} of {DRAWS} inputs"
+        reason = f"float32 and float64 made different decisions at {DRAWS} of {DRAWS} inputs"
         return PrecisionReport(pair.name, (), (reason,))
     outputs = pair.forward(inputs64)
     draw = {name: rng.standard_normal(np.shape(value)).astype(np.float32) for name, value in outputs.items()}

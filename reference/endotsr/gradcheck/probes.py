@@ -1,7 +1,7 @@
 """The directions along which a gradient is probed, block by block.
 
-In a comparison of whole vectors a right large block hides a wrong small one, so every block has its own
-directions, in units of the block's own size.
+In a comparison of whole vectors, a correct large block hides a wrong small one. Every block therefore has its own
+directions, in units of the block's size.
 """
 
 from collections.abc import Mapping
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 SHORT_AXIS = 24  # an axis up to this length (frequencies, bands, channels, bases) is probed slice by slice
-LARGEST = 3  # single entries probed where the analytic gradient is largest
+LARGEST = 3  # single entries probed, those with the largest analytic gradient
 
 
 class Block(NamedTuple):
-    """A part of one input array that is probed on its own."""
+    """A separately probed part of one input array."""
 
     name: str
     input: str
@@ -23,7 +23,7 @@ class Block(NamedTuple):
 
 
 class Probe(NamedTuple):
-    """A direction, non-zero in one block (or everywhere for the joint probes). `kind` names how it was drawn."""
+    """A direction, non-zero in one block (or everywhere for joint probes). `kind` describes the direction."""
 
     block: str
     kind: str
@@ -44,7 +44,7 @@ def make_blocks(inputs: Mapping[str, NDArray], named: Mapping[str, tuple[str, ob
 
 
 def uncovered(inputs: Mapping[str, NDArray], blocks: list[Block]) -> list[str]:
-    """Inputs of which some entry lies in no block."""
+    """Inputs with an entry outside all blocks."""
     return [
         name
         for name, value in inputs.items()
@@ -55,7 +55,7 @@ def uncovered(inputs: Mapping[str, NDArray], blocks: list[Block]) -> list[str]:
 
 
 def size_of(value: NDArray, mask: NDArray[np.bool_]) -> float:
-    """The unit of step lengths: RMS of the block, of the array where the block is zero, else 1."""
+    """The unit of step lengths: RMS of the block; of the array if the block is zero; 1 if that is zero too."""
     for part in (value[mask], value):
         rms = float(np.sqrt(np.mean(np.square(part, dtype=np.float64))))
         if rms > 0:
@@ -66,7 +66,7 @@ def size_of(value: NDArray, mask: NDArray[np.bool_]) -> float:
 def block_probes(
     block: Block, value: NDArray, gradient: NDArray, hard: NDArray | None, rng: np.random.Generator
 ) -> list[Probe]:
-    """Dense directions, signs, along the gradient, every short slice, the largest entries and the hard ones."""
+    """Probes: dense directions, signs, along the gradient, every short slice, the largest and the hard entries."""
     size, shape = size_of(value, block.mask), value.shape
 
     def probe(kind: str, direction: NDArray, mask: NDArray = block.mask) -> Probe:
@@ -85,7 +85,7 @@ def block_probes(
 
 
 def joint_probes(inputs: Mapping[str, NDArray], rng: np.random.Generator) -> list[Probe]:
-    """Dense directions through all inputs at once, which detect errors that no single block shows."""
+    """Dense directions through all inputs, which detect errors that no single block shows."""
     return [
         Probe("(all)", f"dense {k}", {n: rng.standard_normal(v.shape) * _size(v) for n, v in inputs.items()})
         for k in range(2)
@@ -97,7 +97,7 @@ def _size(value: NDArray) -> float:
 
 
 def _downhill(gradient: NDArray, rng: np.random.Generator) -> NDArray:
-    """Random magnitudes with the gradient's signs, so that nothing cancels and weakly weighted slices are resolved."""
+    """Random magnitudes with the gradient's signs: nothing cancels, and weakly weighted slices are resolved."""
     coin = rng.choice([-1.0, 1.0], gradient.shape)
     return np.where(gradient == 0, coin, np.sign(gradient)) * rng.uniform(0.5, 1.5, gradient.shape)
 

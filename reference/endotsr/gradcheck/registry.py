@@ -1,7 +1,6 @@
 """Every variant of every stage as a forward/reverse pair, for the gradient checks and the tables.
 
-No pair is left unchecked: `tests/test_conventions.py` asserts that every `<stage>_forward` of the package
-is named by a pair that `all_pairs` returns.
+`tests/test_conventions.py` asserts that `all_pairs` includes every `<stage>_forward` of the package.
 """
 
 import contextlib
@@ -18,21 +17,21 @@ Arrays = Mapping[str, NDArray]
 
 
 class Pair(NamedTuple):
-    """One forward pass and its reverse pass, in the form that the checker calls.
+    """One forward pass and its reverse pass, with the signatures expected by the checker.
 
-    name      variant of a stage, or any name for a pair of one's own
+    name      variant of a stage, or any name for a custom pair
     equation  the equation label of the specification ("1" ... "7" for the paper, "B..." for the base model)
-    inputs    rng -> float64 arrays; every one of them is differentiable; non-vacuous and away from kinks
+    inputs    rng -> float64 arrays, all differentiable, non-vacuous and away from kinks
     forward   inputs -> outputs, by name; float arrays (a scalar loss is an array of shape ())
     reverse   (inputs, cotangents by output name) -> gradients by input name
-    blocks    inputs -> (input name, boolean mask or slice) by block name: what is probed separately;
+    blocks    inputs -> (input name, boolean mask or slice) by block name: separately probed parts;
               None = one block per input array
     trace     inputs -> integer arrays: the discrete decisions (order, contributors, clamps) of the forward
-              pass; a finite difference whose two ends differ in it is refused. None = no decisions
+              pass; a finite difference with different decisions at its ends is rejected. None = no decisions
     function  dotted name of the forward function, for tables
-    hard      inputs -> flat indices by input name: entries that are always probed one by one
-    single    "" = the pair also runs in float32; otherwise the reason why it cannot
-    traced    inputs -> (outputs, decisions) of one forward pass, for pairs that have a trace; None = two passes
+    hard      inputs -> flat indices by input name: entries that are always probed individually
+    single    "" = the pair also runs in float32; otherwise the reason for its omission
+    traced    inputs -> (outputs, decisions) of one forward pass, for pairs with a trace; None = two passes
     """
 
     name: str
@@ -99,7 +98,7 @@ def all_pairs() -> dict[str, Pair]:
 
 
 def definition_pairs() -> dict[str, Pair]:
-    """The same pairs with the functions of `endotsr.definition`; one where several compiled functions have one."""
+    """The same pairs with the functions of `endotsr.definition`, without duplicates."""
     from endotsr.stages.definition import definition_stages
 
     return {
@@ -108,9 +107,9 @@ def definition_pairs() -> dict[str, Pair]:
 
 
 def pair_stream(name: str, seed: int) -> np.random.Generator:
-    """The random stream of one pair: depends on its name and the seed only, not on which other pairs run.
+    """The random stream of one pair; depends only on its name and the seed.
 
-    Raises: InputError for a seed below 0, which NumPy does not take.
+    Raises: InputError for a seed below 0, which NumPy rejects.
     """
     if seed < 0:
         raise InputError(f"--seed {seed} is not allowed; allowed: an integer >= 0")
@@ -119,7 +118,7 @@ def pair_stream(name: str, seed: int) -> np.random.Generator:
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Run kernels on one thread within the block, because starting a second thread costs more than small pairs gain."""
+    """Run kernels on one thread within the block: for small pairs, a second thread costs more than it gains."""
     import numba
 
     before = numba.get_num_threads()

@@ -16,7 +16,7 @@ _RED, _RESET = "\x1b[31m", "\x1b[0m"
 
 
 def table(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] = (), colour: bool = False) -> str:
-    """Aligned plain text: a line per block, then the pair's float32 line; reasons of failures at the end."""
+    """Aligned plain text: a line per block, then the pair's float32 line; reasons for failures at the end."""
     single = {p.name: p for p in precisions}
     rows: list[tuple[str, ...]] = []
     reasons: list[str] = []
@@ -46,7 +46,7 @@ def summary(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport]
 
 
 def to_json(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport], seed: int) -> str:
-    """All entries of the table and every number behind them. Non-finite numbers are written as strings."""
+    """All entries of the table and all underlying numbers. Non-finite numbers are written as strings."""
     single = {p.name: p for p in precisions}
     pairs = []
     for report in reports:

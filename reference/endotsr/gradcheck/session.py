@@ -1,4 +1,4 @@
-"""One function under check: its inputs, outputs, cotangents and gradient, and lines through its inputs."""
+"""One checked function: its inputs, outputs, cotangents and gradient, and lines through its inputs."""
 
 from collections.abc import Callable, Mapping
 
@@ -11,7 +11,7 @@ LINEAR = 1e5  # reverse passes are linear in the cotangents up to this many roun
 
 
 class Session:
-    """Inputs, outputs, dense cotangents and gradient of one check, and the faults already found in them."""
+    """Inputs, outputs, dense cotangents and gradient of one check, and the faults found in them."""
 
     def __init__(self, forward, reverse, inputs: Arrays, trace, rng: np.random.Generator, traced=None):
         self.inputs = {name: np.array(value) for name, value in inputs.items()}
@@ -71,7 +71,7 @@ class Session:
         self.gradient = {name: value for name, value in self.gradient.items() if name in self.inputs}
 
     def _check_linear(self) -> None:
-        """Check linearity: the gradients of half of each cotangent alone must add up to half the gradient."""
+        """Check linearity: the gradients of half of each cotangent must add up to half the gradient."""
         total = {name: np.zeros(value.shape) for name, value in self.gradient.items()}
         for one in self.cotangents:
             alone = {k: v * v.dtype.type(0.5) if k == one else np.zeros_like(v) for k, v in self.cotangents.items()}
@@ -84,7 +84,7 @@ class Session:
                 self.faults.append(f"gradient of {name} is not linear in the cotangents: {gap:.1e} of {size:.1e}")
 
     def line(self, direction: Mapping[str, NDArray]) -> Callable[[float], NDArray | None]:
-        """h -> outputs times cotangents at inputs + h direction; None where the decisions differ."""
+        """h -> outputs times cotangents at inputs + h direction; None if the decisions differ."""
 
         def at(step: float) -> NDArray | None:
             moved = dict(self.inputs)
