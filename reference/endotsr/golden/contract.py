@@ -1,7 +1,7 @@
-"""The operations that a golden case may ask for.
+"""The operations of golden cases.
 
-Two belong to the contract alone and have no equation: how arrays are laid out, and the generator of the inputs. All
-others are the stages of the method.
+Two belong only to the contract and have no equation: the layout of arrays, and the generator of the inputs. All others
+are the stages of the method.
 """
 
 import numpy as np
@@ -49,5 +49,5 @@ STAGES = [
 
 
 def all_operations() -> dict[str, Stage]:
-    """Every operation by name: those of the contract alone, then the stages of the method."""
+    """Every operation by name: the two of the contract, then the stages of the method."""
     return {stage.name: stage for stage in STAGES} | all_stages()

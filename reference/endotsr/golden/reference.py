@@ -17,19 +17,19 @@ from endotsr.stages.stage import Inputs, Outputs, Stage
 
 
 def reference(operation: Stage, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
-    """The reference's own answer in one precision; compositor `blocks` uses fast compositing where it applies."""
+    """The reference's answer in one precision; compositor `blocks` uses fast compositing if applicable."""
     return operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor})
 
 
 def stored(array: NDArray) -> NDArray:
-    """The array with the dtype of the files: float64, 64-bit integers or booleans."""
+    """The array in the dtype of the files: float64, 64-bit integers or booleans."""
     if array.dtype.kind == "f":
         return np.asarray(array, np.float64)
     return array if array.dtype.kind in "bu" else array.astype(np.int64)
 
 
 def answer_requests(requests: Path, outputs: Path) -> int:
-    """The reference as a port: reads a folder of requests alone and writes outputs. Returns the number of cases."""
+    """The reference as a port: reads only a folder of requests and writes outputs. Returns the number of cases."""
     try:
         head = read_struct(requests / "requests.json", Requests)
         for name in head.cases:
@@ -52,7 +52,7 @@ def answer_all(golden: Golden, outputs: Path, precision: Precision) -> int:
 
 
 def _answer(operation: str, inputs: dict, settings: dict[str, Any], precision: str) -> Outputs:
-    """With the fast compositing where it applies: the expected values come from the other path."""
+    """The answer with fast compositing if applicable; the expected values come from the other path."""
     return reference(all_operations()[operation], inputs, settings, precision, "blocks")
 
 

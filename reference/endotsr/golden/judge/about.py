@@ -1,4 +1,4 @@
-"""What a request says of its operation and arrays beside the numbers: the page of the equation, and the axes by name.
+"""Descriptions in a request: the page of the equation, and the axes of the arrays by name.
 
 In: an equation, or the name of an array and the number of its axes. Out: a page of docs/specification, the axes.
 """
@@ -61,15 +61,15 @@ _ITERATIONS = ("rate_", "term_", "square_")
 
 
 def page_of(equation: str) -> str:
-    """The page of an equation, "" for an operation of the contract alone."""
+    """The page of an equation, "" for an operation without an equation."""
     return f"docs/specification/{PAGES[equation]}.md" if equation else ""
 
 
 def axes_of(name: str, count: int) -> str:
-    """The axes of an array by name, from the outside in; "" for a number.
+    """The axes of an array by name, outermost first; "" for a number.
 
-    The axes of `d_x`, `final_x`, `x_after` and `x_at_t` are those of `x`. "row column Gaussian" of `rotation` are the
-    two axes of the matrix; "axis axis" is such a matrix alone.
+    `d_x`, `final_x`, `x_after` and `x_at_t` have the axes of `x`. "row column Gaussian" of `rotation` are the two axes
+    of the matrix; "axis axis" is a single matrix.
     """
     if count == 0:
         return ""

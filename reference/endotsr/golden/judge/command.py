@@ -1,4 +1,4 @@
-"""Ports as commands: the requests for a port, the call of its command, and the folders of one call."""
+"""Ports as commands: requests for a port, execution of its command, and the folders of a call."""
 
 import os
 import shlex
@@ -27,9 +27,9 @@ KEPT = ("requests", "outputs", "outputs_again")  # folders of one call of `golde
 
 
 def clear_kept(root: Path) -> None:
-    """Remove what an earlier `golden run --keep` left in this folder, so that old outputs are never judged.
+    """Remove the folders of an earlier `golden run --keep`, because old outputs must not be judged.
 
-    The folders named in KEPT are removed if the requests among them are of the form that `write_requests` gives.
+    The folders in KEPT are removed if their requests have the format of `write_requests`.
     Raises: InputError if one of the names belongs to anything else; nothing is removed then.
     """
     taken = [path for path in (root / name for name in KEPT) if os.path.lexists(path)]
@@ -50,7 +50,7 @@ def clear_kept(root: Path) -> None:
 
 
 def write_requests(golden: Golden, folder: Path, precision: Precision, level: int) -> None:
-    """Write the cases without their answers: requests.json, <family>/<case>/request.json and inputs/*.npy."""
+    """Write the cases without answers: requests.json, <family>/<case>/request.json and inputs/*.npy."""
     wanted = [case for case in golden.cases if case.level <= level]
     for case in wanted:
         root = folder / case.family / case.case
@@ -83,15 +83,15 @@ def _request(case: Case, level: int) -> Request:
 
 
 def refuse_command(command: str) -> None:
-    """Raises InputError if a port's command lacks {requests} or {outputs}."""
+    """Raise InputError if a port's command lacks {requests} or {outputs}."""
     if "{requests}" not in command or "{outputs}" not in command:
         raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
 
 
 def words_of(command: str, *, backslash_escapes: bool = os.name != "nt") -> list[str]:
-    """The words of a command line, quoted as in a POSIX shell; on Windows a backslash stands in paths and is kept.
+    """The words of a command line, quoted as in a POSIX shell; on Windows a backslash is part of paths and is kept.
 
-    Raises: ValueError for a quotation mark that is not closed.
+    Raises: ValueError for an unclosed quotation mark.
     """
     lexer = shlex.shlex(command, posix=True)
     lexer.whitespace_split, lexer.commenters = True, ""
@@ -101,7 +101,7 @@ def words_of(command: str, *, backslash_escapes: bool = os.name != "nt") -> list
 
 
 def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
-    """Call the port's command once, without a shell; returns a note when it failed.
+    """Run the port's command once, without a shell; returns a note if it failed.
 
     Raises: InputError if the command lacks {requests} or {outputs}, or cannot be started.
     """

@@ -1,4 +1,4 @@
-"""Distances between arrays in units of a scale, and whether a rule allows them; also used to make the vectors."""
+"""Distances between arrays in units of a scale, and rules for them; also used to generate the vectors."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from endotsr.golden.judge.format import FLIP_BUDGET, LEVELS, Rule
 from endotsr.golden.judge.words import signs
 
-COLUMN_FLOOR = 1e-3  # of the largest magnitude: the least scale of a slice under "last"
+COLUMN_FLOOR = 1e-3  # smallest scale of a slice under "last", relative to the largest magnitude
 
 
 class Verdict(NamedTuple):
@@ -24,7 +24,7 @@ class Verdict(NamedTuple):
 
 
 def scale_of(expected: NDArray, kind: str) -> NDArray | float:
-    """The unit in which a difference is measured; 1 where everything expected is 0."""
+    """The unit of a difference; 1 if everything expected is 0."""
     size = np.abs(expected.astype(np.float64))
     largest = float(size.max()) if size.size else 0.0
     if largest == 0.0:
@@ -36,7 +36,7 @@ def scale_of(expected: NDArray, kind: str) -> NDArray | float:
 
 
 def distances(got: NDArray, expected: NDArray, kind: str) -> NDArray:
-    """|got - expected| / scale, infinite where `got` is not finite or the shape differs."""
+    """|got - expected| / scale, infinite if `got` is not finite or the shape differs."""
     if got.shape != expected.shape:
         return np.array([np.inf])
     with np.errstate(all="ignore"):
@@ -61,9 +61,9 @@ def fingerprint(name: str, array: NDArray) -> float:
 
 
 def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str, order: str = "") -> Verdict:
-    """Whether an output of the right shape and kind is allowed.
+    """The verdict on an output of the right shape and kind.
 
-    order   "iteration": the place of a refusal is the first wrong entry, otherwise the worst
+    order   "iteration": a refusal reports the first wrong entry, otherwise the worst
     """
     if rule.kind == "exact":
         unequal = np.argwhere(got != expected)
@@ -92,7 +92,7 @@ def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str, order: s
 
 
 def misses(verdicts: Iterable[tuple[int, bool]]) -> tuple[int, ...]:
-    """Numbers of outputs that did not pass, by level, from (level, passed); the least selects the answer of a port."""
+    """Numbers of failed outputs by level, from (level, passed); the smallest selects the answer of a port."""
     counts = [0] * len(LEVELS)
     for level, passed in verdicts:
         counts[level] += not passed

@@ -1,7 +1,7 @@
-"""Where a port goes wrong first, in words that need no list of mistakes.
+"""The first wrong operation of a port, described without a list of mistakes.
 
-In: the verdicts on all cases, with the relations of every refused output. Out: lines that name the first wrong
-operation with its equation and level, its direction, its outputs and cases, and the relations that hold in all of them.
+In: the verdicts on all cases, with the relations of every refused output. Out: lines with the first wrong operation,
+its equation and level, its direction, its outputs and cases, and the relations common to all of them.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ PARTS = {
     "training": ("objective", "calibration", "adam", "schedule", "density"),
     "determinism": ("objective",),
 }  # fmt: skip
-"""Operations that an operation is made of."""
-MOST_CASES = 4  # that are named
+"""Operations that an operation is composed of."""
+MOST_CASES = 4  # listed by name
 
 
 def made_of(operation: str) -> set[str]:
-    """All operations that an operation is made of, at any depth."""
+    """All operations that an operation is composed of, at any depth."""
     parts = set(PARTS.get(operation, ()))
     return parts.union(*map(made_of, parts))
 
@@ -30,7 +30,7 @@ def made_of(operation: str) -> set[str]:
 def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
     """Lines on the first operation with a refused output, by level and then in the order of the cases; [] = none.
 
-    reports   case reports of the judge, whose outputs hold their forms
+    reports   case reports of the judge, with the relations of their outputs
     """
     known = {case.name: case for case in cases}
     level, first = first_wrong(cases, reports)
@@ -58,7 +58,7 @@ def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
 
 
 def _along(paths: Sequence[Any]) -> list[str]:
-    """Where trajectories go wrong first, and what happens there in all of them."""
+    """The first wrong iteration of trajectories, and the events common to all of them there."""
     lines = [f"  {r.name}: {r.first_wrong}" for r in paths[:MOST_CASES]]
     lines += [f"  and {len(paths) - MOST_CASES} more cases, see below"] if len(paths) > MOST_CASES else []
     common = [event for event in paths[0].events if all(event in r.events for r in paths)] if len(paths) > 1 else []
@@ -66,7 +66,7 @@ def _along(paths: Sequence[Any]) -> list[str]:
 
 
 def _follows(case: Case, output: str) -> bool:
-    """Whether an output is of a trajectory: where it is first wrong says more than how it differs."""
+    """Whether an output belongs to a trajectory, whose first wrong iteration matters more than its relations."""
     return case.outputs[output].order == "iteration" or output.startswith("final_")
 
 

@@ -1,7 +1,7 @@
 """Reading and writing of untrusted .npy files: nothing is evaluated or unpickled, and sizes are checked first.
 
-A header is matched by one regular expression; the file must be a regular file of exactly the length that dtype and
-shape require. numpy.load is not used anywhere in this package.
+A header must match one regular expression. The file must be a regular file of exactly the length required by dtype and
+shape. This package never uses numpy.load.
 """
 
 import math
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 MAGIC = b"\x93NUMPY"
 LONGEST_HEADER = 4096
-LARGEST = 1 << 28  # bytes of an array that is read
+LARGEST = 1 << 28  # bytes of an array
 FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 _HEADER = re.compile(
     r"\{'descr': '([<>|=][a-zA-Z]\d{1,3})', 'fortran_order': (True|False), "
@@ -28,7 +28,7 @@ _HEADER = re.compile(
 
 
 class Refused(Exception):
-    """A file that is not a plain array; the message states the reason."""
+    """The file is not a plain array; the message gives the reason."""
 
 
 class Header(NamedTuple):
@@ -64,7 +64,7 @@ def header_of(data: bytes) -> Header:
 
 
 def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> NDArray:
-    """A little-endian, C-order array of at most `largest` bytes. Raises Refused; follows no link out of `root`."""
+    """A little-endian, C-order array of at most `largest` bytes. Raises Refused, also for a link out of `root`."""
     return _with_open(path, root, lambda handle: _read_open(handle, largest))
 
 
@@ -141,7 +141,7 @@ _SIZES = {("f", 4), ("f", 8), *((k, s) for k in "iu" for s in (1, 2, 4, 8)), ("b
 
 
 def npy_bytes(array: NDArray) -> bytes:
-    """The file of an array: version 1.0, little-endian, C order; the same bytes for the same array everywhere."""
+    """The file of an array: version 1.0, little-endian, C order; equal arrays give equal bytes on every system."""
     kind, size = array.dtype.kind, array.dtype.itemsize
     descr = f"|{kind}1" if size == 1 else f"<{kind}{size}"
     shape = "(" + ", ".join(map(str, array.shape)) + ("," if array.ndim == 1 else "") + ")"
@@ -152,6 +152,6 @@ def npy_bytes(array: NDArray) -> bytes:
 
 
 def write_npy(path: Path, array: NDArray) -> None:
-    """Write `npy_bytes`, and create missing folders."""
+    """Write `npy_bytes`; creates missing folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(npy_bytes(array))

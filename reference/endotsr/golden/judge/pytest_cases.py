@@ -1,4 +1,4 @@
-"""Ports in Python: one pytest test a case, with a file of known failures that belongs to the port."""
+"""Ports in Python: one pytest test per case, with the port's own file of known failures."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -28,9 +28,9 @@ def golden_test(
     """A parametrised test function; assign it to a name that begins with `test`.
 
     answer          (operation, inputs, settings) -> outputs by name; None skips an operation that is not ported.
-                    Inputs are in the requested precision and may be changed
-    known_failures  text file of the port, one family/case a line; a listed case must fail
-    Raises:         InputError if the golden folder cannot be used or a listed case does not exist.
+                    Inputs are in the requested precision and may be modified
+    known_failures  text file of the port, one family/case per line; a listed case must fail
+    Raises:         InputError if the golden folder is invalid or a listed case does not exist.
     """
     import pytest
 
@@ -51,7 +51,7 @@ def golden_test(
 
 
 def answered(golden: Golden, case: Case, answer: Answer, precision: Precision, level: int) -> CaseReport | None:
-    """The verdict on the answer of a port to one case; None if the operation is not ported."""
+    """The verdict on a port's answer to one case; None if the operation is not ported."""
     found = answer(case.operation, in_precision(golden.inputs(case), precision), dict(case.settings))
     if found is None:
         return None
@@ -63,7 +63,7 @@ def answered(golden: Golden, case: Case, answer: Answer, precision: Precision, l
 
 
 def explain(report: CaseReport) -> str:
-    """Title, refused outputs, the mistakes that they resemble, and the mistakes that the case was made for."""
+    """Title, refused outputs, the mistakes that they resemble, and the mistakes targeted by the case."""
     lines = [f"{report.name}: {report.title}"]
     lines += [f"  {o.name}: {o.reason} {list(o.index) or ''}" for o in report.outputs if o.status != "passed"]
     if report.looks_like:

@@ -1,9 +1,13 @@
 """From refused outputs to the mistakes that they resemble, by the fingerprints stored in each case.
 
-A known mistake was made in a copy of the reference and examined on some cases. Every output of these cases is
-evidence: it agrees (refused, with the fingerprint of the mistake), fits (refused, as expected, but the wrong output is
-no sign of this mistake alone), differs (refused, but otherwise wrong), passes (although the mistake changes it), or is
-unexplained (refused, although the mistake leaves it right).
+Each known mistake was injected into a copy of the reference and examined on some cases. Every output of these cases is
+evidence for or against it:
+
+agrees       refused, with the fingerprint of the mistake
+fits         refused, as expected, but the wrong output does not identify this mistake
+differs      refused, but wrong in another way
+passes       passed, although the mistake changes it
+unexplained  refused, although the mistake does not change it
 """
 
 import math
@@ -18,15 +22,15 @@ from endotsr.golden.judge.compare import fingerprint, largest, scale_of
 from endotsr.golden.judge.format import Case, Output, Rule, Shown
 from endotsr.golden.judge.store import Golden
 
-NEAR = 2e-3  # fraction of the way from right to wrong within which a fingerprint counts as that of a mistake
-ROUNDINGS = 4.0  # tolerances of one entry, per root of the number of entries, that a fingerprint may be off
-LIKE = 1.5  # decades within which the size of a rounding mistake is that of another port's
-NAMED = 0.5  # score from which a mistake is named
-MENTIONED = 0.4  # score from which it is listed as a partial resemblance
+NEAR = 2e-3  # allowed deviation of a fingerprint from a mistake's, relative to the difference of right and wrong
+ROUNDINGS = 4.0  # allowed deviation of a fingerprint, in tolerances of one entry times the root of their number
+LIKE = 1.5  # decades within which the sizes of two rounding mistakes count as equal
+NAMED = 0.5  # lowest score of a named mistake
+MENTIONED = 0.4  # lowest score of a partial resemblance
 
 
 class Taken(NamedTuple):
-    """An output of a port: its array, None where it could not be read or has another shape; its verdict; the answer."""
+    """An output of a port: its array, None if unreadable or of another shape; its verdict; the answer."""
 
     status: str
     got: NDArray | None
@@ -34,7 +38,7 @@ class Taken(NamedTuple):
 
 
 class Evidence(msgspec.Struct, kw_only=True):
-    """What the outputs of the examined cases say about a mistake, as lists of family/case/output."""
+    """Evidence from the outputs of the examined cases on one mistake, as lists of family/case/output."""
 
     agrees: list[str] = []
     fits: list[str] = []
@@ -46,7 +50,7 @@ class Evidence(msgspec.Struct, kw_only=True):
 
     @property
     def score(self) -> float:
-        """From 0 to 1: the part of the refusals that it explains, less if outputs pass that it would change."""
+        """From 0 to 1: the fraction of refusals that it explains, reduced if outputs pass that it would change."""
         explained = len(self.agrees) + len(self.fits)
         if not explained:
             return 0.0
@@ -71,7 +75,7 @@ class Suspect(msgspec.Struct, kw_only=True):
 
 
 def evidence_of(case: Case, taken: Mapping[str, Taken], precision: str) -> dict[str, Evidence]:
-    """Evidence of one case on every mistake that was examined on it."""
+    """Evidence of one case on every mistake examined on it."""
     found, refused = {}, any(one.status == "refused" for one in taken.values())
     for flag, mistake in case.mistakes.items():
         shown, evidence = mistake.shown(precision), Evidence()
@@ -108,7 +112,7 @@ def _kind(name: str, one: Taken, asked: Output, shown: Shown | None, precision: 
 
 
 def _changes(shown: Shown | None, rule: Rule, precision: str) -> bool | None:
-    """Whether an output is refused because of the mistake; None: too close to the tolerance to say."""
+    """Whether the mistake makes this output be refused; None: too close to the tolerance to decide."""
     if shown is None:
         return False
     tolerance = rule.float64 if precision == "float64" else rule.float32
@@ -118,7 +122,7 @@ def _changes(shown: Shown | None, rule: Rule, precision: str) -> bool | None:
 
 
 def _decades(one: Taken, asked: Output, shown: Shown) -> float:
-    """Decades between the size of a change and that of a mistake; infinite where one of them is not a number."""
+    """Decades between the size of a change and the size of a mistake; infinite if one is not a number."""
     size = 0.0 if one.got is None else largest(one.got, one.expected, asked.compare.scale)
     known = 0 < size < math.inf and shown.distance is not None
     return abs(math.log10(size / shown.distance)) if known else math.inf  # type: ignore[operator]
@@ -137,13 +141,13 @@ def _fingerprints(name: str, one: Taken, shown: Shown, rule: Rule, precision: st
     largest_unit = float(np.max(scale_of(one.expected, rule.scale or "max"))) if one.expected.size else 0.0
     allowed = max(NEAR * way, ROUNDINGS * tolerance * largest_unit * np.sqrt(one.got.size))
     near = abs(own - shown.fingerprint) <= allowed
-    if 4 * allowed > way:  # the signs cancel: right and wrong have one fingerprint, within rounding
+    if 4 * allowed > way:  # the signs cancel: right and wrong have equal fingerprints, within rounding
         return "fits" if near else "differs"
     return "agrees" if near else "differs"
 
 
 def merged(parts: Iterable[Mapping[str, Evidence]]) -> dict[str, Evidence]:
-    """The evidence of several cases on every mistake that explains a refusal in one of them."""
+    """The combined evidence of several cases on every mistake that explains a refusal in one of them."""
     parts = list(parts)
     found = {flag: Evidence() for part in parts for flag, one in part.items() if one.agrees or one.fits}
     for part in parts:

@@ -1,9 +1,9 @@
-"""How a wrong array relates to the expected one: relations that need no list of mistakes.
+"""Relations between a wrong array and the expected one, found without a list of mistakes.
 
-In: an output of a port, the expected array, the tolerance, and the other arrays of the case. Out: every relation that
-holds to the tolerance, the most telling first: a factor, a permutation, a sign, one index of an axis, a matrix, a
-clamp, a factor or a difference that is an array of the case, a constant, a region. Each is a fact about the two arrays;
-whether it is the cause is for the reader to judge.
+In: an output of a port, the expected array, the tolerance, and the other arrays of the case. Out: all relations that
+are satisfied to the tolerance, the most specific first: a factor, a permutation, a sign, one index of an axis, a
+matrix, a clamp, a factor or a difference that is an array of the case, a constant, a region. Each is a fact about the
+two arrays, not necessarily the cause.
 """
 
 import math
@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 
 from endotsr.golden.judge.compare import scale_of
 
-FITS = 4.0  # tolerances that a relation may leave
-DIFFERS = 3.0  # times that, by which the port differs where it does; otherwise no relation can be told from rounding
-SMALLEST_BOARD = 4  # rows and columns from which every second one is told from chance
-LARGEST_PERMUTED = 16  # entries of an axis that is searched for a permutation
+FITS = 4.0  # residual of a relation, in tolerances
+DIFFERS = 3.0  # smallest difference, in multiples of FITS; below it, relations are indistinguishable from rounding
+SMALLEST_BOARD = 4  # smallest number of rows and columns for a significant alternation
+LARGEST_PERMUTED = 16  # longest axis that is searched for a permutation
 KNOWN = {
     "2": 2.0, "3": 3.0, "4": 4.0, "5": 5.0, "6": 6.0, "9": 9.0, "1/2": 0.5, "1/3": 1 / 3, "1/4": 0.25, "1/5": 0.2,
     "1/6": 1 / 6, "1/9": 1 / 9, "Y00": 0.28209479177387814, "1/Y00": 1 / 0.28209479177387814, "pi": math.pi,
     "2 pi": 2 * math.pi, "1/(2 pi)": 1 / (2 * math.pi), "1/pi": 1 / math.pi, "255": 255.0, "1/255": 1 / 255,
     "ln 2": math.log(2), "1/1.1": 1 / 1.1,
 }  # fmt: skip
-"""Constants of the method by the name that a factor is given."""
+"""Constants of the method, by the name used for a factor."""
 
 
 class Relation(msgspec.Struct, frozen=True, kw_only=True):
-    """What holds between a wrong output and the expected one."""
+    """A relation between a wrong output and the expected one."""
 
     kind: str
     """the search that found it: times, zero, transposed, order, sign, matrix, clamp, axis, plus, equals, difference,
@@ -40,7 +40,7 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class OutputPair:
-    """A wrong output beside the expected one."""
+    """A wrong output and the expected one."""
 
     def __init__(self, got: NDArray, expected: NDArray, kind: str, tolerance: float) -> None:
         self.got, self.expected = (a.astype(np.float64) for a in (got, expected))
@@ -50,13 +50,13 @@ class OutputPair:
             self.wrong = ~(np.abs(self.got - self.expected) <= self.unit)
 
     def close(self, other: NDArray, factor: float = 1.0) -> bool:
-        """Whether the port's array is this one, to some tolerances."""
+        """Whether the port's array equals this one, to some tolerances."""
         with np.errstate(all="ignore"):
             return bool((np.abs(self.got - other) <= FITS * self.unit * max(1.0, abs(factor))).all())
 
     @property
     def telling(self) -> bool:
-        """Whether the difference is large enough to have a form."""
+        """Whether the difference is large enough for relations."""
         with np.errstate(all="ignore"):
             return bool((np.abs(self.got - self.expected) > DIFFERS * FITS * self.unit).any())
 
@@ -71,7 +71,7 @@ class OutputPair:
 def relations(
     got: NDArray, expected: NDArray, kind: str, tolerance: float, others: Mapping[str, NDArray]
 ) -> list[Relation]:
-    """Every relation between two arrays of one shape, the most telling first.
+    """All relations between two arrays of the same shape, the most specific first.
 
     kind, tolerance   as of the rule of the output
     others            the other arrays of the case: inputs, and what is expected of the other outputs
@@ -89,7 +89,7 @@ def relations(
 
 
 def number_text(value: float) -> str:
-    """A factor, by its name if it is a constant of the method."""
+    """A factor as text: its name if it is a constant of the method."""
     for name, known in KNOWN.items():
         for sign, text in ((1, name), (-1, f"-{name}")):
             if math.isclose(value, sign * known, rel_tol=2e-5):
@@ -122,7 +122,7 @@ def _orders(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relatio
 
 
 def _order_of(pair: OutputPair, axis: int) -> tuple[int, ...] | None:
-    """Which expected slice stands at each place of an axis; None where they are no permutation, or in order."""
+    """Index of the expected slice at each index of an axis; None if this is no permutation, or the identity."""
     rows = [np.moveaxis(a, axis, 0).reshape(a.shape[axis], -1) for a in (pair.got, pair.expected, pair.unit)]
     near = np.abs(rows[0][:, None] - rows[1][None]) <= FITS * (rows[2][:, None] + rows[2][None])
     fits = np.asarray(near.all(axis=-1))
@@ -144,7 +144,7 @@ def _signs(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation
 
 
 def _matrices(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """A 3 x 3 matrix between the two, which may be one of the pose."""
+    """A 3 x 3 matrix between the two, possibly a rotation of the pose."""
     if pair.got.shape[:1] != (3,):
         return
     got, expected = pair.got.reshape(3, -1), pair.expected.reshape(3, -1)
@@ -167,7 +167,7 @@ def _matrices(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relat
 
 
 def _clamps(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Equal, up to a bound that one of the two respects."""
+    """Equal up to a bound that only one of the two respects."""
     if pair.got.size < 2 or pair.wrong.all():
         return
     for one, other, text in ((pair.got, pair.expected, "clamped"), (pair.expected, pair.got, "not clamped")):
@@ -182,7 +182,7 @@ def _clamps(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relatio
 
 
 def _axes(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Wrong at some indices of an axis only, and what holds there."""
+    """Wrong only at some indices of an axis, with the relation there."""
     for axis, size in enumerate(pair.got.shape):
         if pair.got.ndim == 1 and size > LARGEST_PERMUTED:
             continue
@@ -205,7 +205,7 @@ def _inside(pair: OutputPair) -> str:
 
 
 def _plus(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """A constant added, to every entry or to those of one index of the first axis."""
+    """An added constant, for all entries or per index of the first axis."""
     off = pair.got - pair.expected
     if off.size < 2:
         return
@@ -230,7 +230,7 @@ TRANSFORMS = {
 
 
 def _arrays(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Another array of the case in place of the output, as a factor of it, or added to it."""
+    """Another array of the case replaces the output, multiplies it, or is added to it."""
     if pair.got.size < 2:
         return
     off = pair.got - pair.expected
@@ -258,7 +258,7 @@ def _fits_shape(factor: NDArray, pair: OutputPair) -> bool:
 
 
 def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Wrong under the mask only, on tissue only, or near the border only."""
+    """Wrong only under the mask, only on tissue, or only near the border."""
     if pair.got.ndim < 2:
         return
     wrong = np.asarray(pair.wrong.reshape(-1, *pair.wrong.shape[-2:]).any(axis=0))
@@ -276,7 +276,7 @@ def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relati
 
 
 def _parities(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Wrong on every second row or column only, or on a chessboard, as where an image is sampled by twos."""
+    """Wrong only on every second row or column, or on a chessboard, as after sampling an image by twos."""
     if pair.got.ndim < 2 or min(pair.wrong.shape[-2:]) < SMALLEST_BOARD:
         return
     wrong = np.asarray(pair.wrong.reshape(-1, *pair.wrong.shape[-2:]).any(axis=0))

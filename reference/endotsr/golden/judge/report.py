@@ -18,10 +18,10 @@ from endotsr.golden.judge.recognise import Suspect
 from endotsr.golden.judge.store import Golden
 from endotsr.golden.judge.verdict import CaseReport, OutputReport, Report
 
-MOST_LINES = 60  # refused outputs that the table prints
-MOST_NAMED = 3  # mistakes that it names
+MOST_LINES = 60  # refused outputs in the table
+MOST_NAMED = 3  # named mistakes
 MOST_PICTURES = 40
-MORE = "--all prints"  # said where something is left out
+MORE = "--all prints"  # printed if something is omitted
 UNKNOWN = "looks like none of the known mistakes"
 
 
@@ -32,7 +32,7 @@ def as_json(report: Report) -> bytes:
 
 
 def as_table(report: Report, *, everything: bool = False) -> str:
-    """The report for a terminal, the answer first: the cases that did not pass, or all of them and all that is said."""
+    """The report for a terminal, the answer first: failed cases only, or all cases with all details."""
     most = sys.maxsize if everything else MOST_LINES
     shown = [case for case in report.cases if everything or case.status not in ("passed", "not ported")]
     opening = answer(report, everything=everything)
@@ -55,7 +55,7 @@ def as_table(report: Report, *, everything: bool = False) -> str:
 
 
 def answer(report: Report, *, everything: bool = False) -> list[str]:
-    """What is wrong: how the port failed, the first wrong operation, what explains it and what it is like."""
+    """The faults: how the port failed, the first wrong operation, its explanations and resemblances."""
     return [
         *report.failures, *report.diagnosis[:1], *report.inside, *report.causes,
         *_suspects(report, everything=everything), *report.diagnosis[1:],
@@ -63,7 +63,7 @@ def answer(report: Report, *, everything: bool = False) -> list[str]:
 
 
 def _level(case: CaseReport) -> int:
-    """The lowest level that a case stands in the way of; that of the case if it passed."""
+    """The lowest level blocked by a case; the level of the case if it passed."""
     return min((o.level for o in case.outputs if o.status != "passed"), default=case.level)
 
 
@@ -72,7 +72,7 @@ def _outputs(report: Report, status: str) -> list[tuple[CaseReport, OutputReport
 
 
 def _missing(report: Report) -> list[str]:
-    """The names of missing outputs, one line per case, and below it what is there under another name."""
+    """The names of missing outputs, one line per case, followed by files with similar names."""
     lines: dict[str, list[str]] = {}
     more: dict[str, list[str]] = {}
     for case, output in _outputs(report, "missing"):
@@ -90,7 +90,7 @@ def _listed(title: str, lines: list[str], most: int) -> list[str]:
 
 
 def _suspects(report: Report, *, everything: bool) -> list[str]:
-    """The mistakes that are named, with what speaks for and against each, and otherwise the partial resemblances."""
+    """The named mistakes with the evidence for and against each, or else the partial resemblances."""
     if not any(case.status == "refused" for case in report.cases):
         return []
     named = [s for s in report.suspects if s.named]
@@ -108,7 +108,7 @@ def _suspects(report: Report, *, everything: bool) -> list[str]:
 
 
 def said(suspect: Suspect, *, everything: bool = False) -> list[str]:
-    """What speaks for a mistake, and what against it."""
+    """The evidence for and against a mistake."""
     e = suspect.evidence
     cases = len({name.rpartition("/")[0] for name in e.agrees + e.fits})
     lines = [f"for it: {len(e.agrees)} outputs agree, {len(e.fits)} more are refused as expected, in {cases} cases"]
@@ -125,7 +125,7 @@ def said(suspect: Suspect, *, everything: bool = False) -> list[str]:
 
 
 def _summary(case: CaseReport, report: Report) -> str:
-    """The status of a case, and why it is refused as far as that is known."""
+    """The status of a case, and the reason for a refusal if known."""
     if case.status in ("passed", "not ported"):
         return case.status
     why = _why(case, report) if any(o.expected is not None for o in case.outputs) else ""
@@ -156,7 +156,7 @@ def _line(output: OutputReport) -> str:
 
 
 def as_html(report: Report, golden: Golden, outputs: Path) -> str:
-    """One page: claim, answer, levels, every case; refused images with expected, got and difference."""
+    """One page: claim, answer, levels, all cases; expected, got and difference of refused images."""
     e = html.escape
     rows, pictures = [], 0
     for case in report.cases:

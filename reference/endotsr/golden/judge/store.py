@@ -1,4 +1,4 @@
-"""The folder `golden/`: finding, reading and checking it."""
+"""The folder `golden/`: its location, reader and checks."""
 
 import functools
 import hashlib
@@ -18,7 +18,7 @@ from endotsr.untrusted.files import read_bytes, read_text
 
 
 class Golden(NamedTuple):
-    """Cases whose files have the checksums of the manifest."""
+    """Cases with files verified against the checksums of the manifest."""
 
     folder: Path
     manifest: Manifest
@@ -54,12 +54,12 @@ def golden_folder(given: Path | None = None) -> Path:
     places = [given] if given else [Path(__file__).parents[4] / "golden", Path("golden")]
     for place in places:
         if (place / "VERSION").is_file():
-            return place.resolve()  # a caller may change its working folder
+            return place.resolve()  # the caller may change the working folder
     raise InputError(f"{places[-1]}: no golden folder (no file VERSION); name it with --golden")
 
 
 def read_golden(folder: Path, *, verify: bool = True) -> Golden:
-    """Manifest and cases. Raises InputError naming the file that is missing, damaged or not of this format."""
+    """Manifest and cases. Raises InputError with the name of a missing, damaged or foreign file."""
     try:
         manifest = read_struct(folder / "manifest.json", Manifest)
         version = read_text(folder / "VERSION").strip()

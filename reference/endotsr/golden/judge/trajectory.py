@@ -1,7 +1,7 @@
-"""Where a trajectory goes wrong first, in words that need no list of mistakes.
+"""The first wrong iteration of a trajectory, described without a list of mistakes.
 
-In: the first wrong iteration of every output that has one entry an iteration, and the settings of the case. Out: this
-iteration, the part of it that is wrong, what is right before that part, and what happens there or just before.
+In: the first wrong iteration of every output with one entry per iteration, and the settings of the case. Out: this
+iteration, its wrong part, the right parts before it, and the events there or just before.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,24 +14,24 @@ PARTS = (
     ("sums of the moments", "first_moments second_moments", "the gradients and the moments of Adam"),
     ("parameters", "square_", "the rates and the step"),
 )
-"""What an iteration computes, in this order: a name, how the names of its outputs begin, and where to look."""
+"""Parts of an iteration in order of computation: a name, prefixes of its outputs, and the place to look at."""
 CONTROL, CONTROL_CHANGES = "density control", 2  # and the first part that it changes at the end of an iteration
-NEAR = 2  # iterations, from an event on, in which it is named
-MOST_NAMES = 3  # outputs that are named
+NEAR = 2  # iterations, from an event on, that mention it
+MOST_NAMES = 3  # outputs listed by name
 
 
 class FirstWrong(NamedTuple):
-    """Where a trajectory goes wrong."""
+    """The first wrong iteration of a trajectory."""
 
     text: str
-    events: list[str]  # what happens at this iteration or the one before, and otherwise not
+    events: list[str]  # events at this iteration or the one before
 
 
 def first_wrong_iteration(wrong: Mapping[str, int], names: Sequence[str], settings: Mapping[str, Any]) -> FirstWrong:
-    """The first wrong iteration; no text where no output has one.
+    """The first wrong iteration; without text if there is none.
 
     wrong   the first wrong iteration by output
-    names   all outputs that have one entry an iteration, in the order of the case
+    names   all outputs with one entry per iteration, in the order of the case
     """
     if not wrong:
         return FirstWrong("", [])
@@ -50,12 +50,12 @@ def first_wrong_iteration(wrong: Mapping[str, int], names: Sequence[str], settin
 
 
 def _some(names: Iterable[str], beginnings: str) -> bool:
-    """Whether some names begin so."""
+    """Whether any name has one of these prefixes."""
     return any(name.startswith(tuple(beginnings.split())) for name in names)
 
 
 def events(config: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Iterable[int]]]:
-    """What happens at some iterations only, as "it happens at ..."; nothing for a case without a configuration."""
+    """Events with their iterations, as ("it happens at", iterations); none for a case without a configuration."""
     if not config:
         return
     model, loss, training, density = (config[part] for part in ("model", "loss", "training", "density"))

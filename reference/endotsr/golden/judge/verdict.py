@@ -1,4 +1,4 @@
-"""The judge: compares a folder of outputs with the golden cases. Every state of the folder leads to a verdict."""
+"""The judge: compares a folder of outputs with the golden cases. Every state of the folder has a verdict."""
 
 import difflib
 import os
@@ -20,12 +20,12 @@ from endotsr.golden.judge.relate import relations
 from endotsr.golden.judge.store import Golden
 from endotsr.golden.judge.trajectory import FirstWrong, first_wrong_iteration
 
-NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one per line
-INSIDE = "inside"  # in that file: the port has no arrays inside its operations to show
-LARGEST_RELATED = 20_000  # entries of an output for which relations are sought
-MISSING = "missing"  # how the reader of arrays refuses a file that is not there
-MOST_FILES = 1000  # of the folder of a case in which a missing output is looked for under another name
-RESEMBLES = 0.6  # from 0 to 1: likeness of two names
+NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations omitted by the port, one per line
+INSIDE = "inside"  # in that file: the port cannot write arrays inside its operations
+LARGEST_RELATED = 20_000  # largest number of entries of an output that is searched for relations
+MISSING = "missing"  # the array reader's reason for a missing file
+MOST_FILES = 1000  # files of a case's folder that are searched for a misnamed output
+RESEMBLES = 0.6  # smallest similarity of two names, from 0 to 1
 
 Status = Literal["passed", "refused", "missing", "not ported"]
 
@@ -107,7 +107,7 @@ def judge(
 ) -> Report:
     """Compare OUTDIR/<family>/<case>/<name>.npy with the golden cases up to a level.
 
-    again   a second folder of the same port, whose bits must be the same; without it level 5 is not complete
+    again   a second output folder of the same port, bitwise equal; without it level 5 is not complete
     only    a family, or family/case: no other case is judged, and there is no claim
     """
     golden = only_of(golden, only)
@@ -128,7 +128,7 @@ def judge(
 
 
 def only_of(golden: Golden, only: str) -> Golden:
-    """The same with the cases of one family, or one family/case. Raises InputError if there is none."""
+    """The cases of one family, or one family/case. Raises InputError if there is none."""
     cases = [case for case in golden.cases if only in ("", case.family, case.name)]
     if not cases:
         raise InputError(
@@ -138,7 +138,7 @@ def only_of(golden: Golden, only: str) -> Golden:
 
 
 def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]:
-    """Operations named in the port's file of what it leaves out, and notes on what could not be understood there."""
+    """Operations listed in the port's file NOT_PORTED, and notes on its invalid entries."""
     named, refusal = left_out(outputs)
     if refusal:
         return (), [f"{NOT_PORTED}: {refusal}; every operation is judged"]
@@ -148,7 +148,7 @@ def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]
 
 
 def left_out(outputs: Path) -> tuple[set[str], str]:
-    """The words of the port's file of what it leaves out, and why they could not be read; no file holds none."""
+    """The words of the port's file NOT_PORTED, empty without it, and the reason if it is unreadable."""
     try:
         lines = read_text(outputs / NOT_PORTED, outputs).splitlines()
     except Refused as refusal:
@@ -160,7 +160,7 @@ def conclude(
     golden: Golden, reports: list[CaseReport], precision: Precision, level: int, notes: list[str],
     without: tuple[str, ...] = (),
 ) -> Report:  # fmt: skip
-    """Levels, claim and suspects from the verdicts on all cases. A level of which nothing is left is not complete."""
+    """Levels, claim and suspects from the verdicts on all cases. An empty level is not complete."""
     counts = {k: _count(reports, k) for k in LEVELS if k <= level}
     reached = -1
     for k, (good, asked) in counts.items():
@@ -177,13 +177,13 @@ def conclude(
 
 
 def without_claim(report: Report, reasons: list[str]) -> None:
-    """Remove the claim, because a port that fails has none, even if it wrote outputs before it failed."""
+    """Remove the claim: a port that fails has none, even if it wrote outputs before."""
     report.failures += reasons
     report.level, report.claim = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}"
 
 
 def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[str, ...]) -> str:
-    """What the port may print; names what it leaves out of the levels that it claims."""
+    """The claim that the port may publish, with the operations that it omits from these levels."""
     if reached < 0:
         return "no level is complete"
     claim = f"golden {golden.short_version}, level {reached}, {precision}"
@@ -198,7 +198,7 @@ def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:
 
 
 def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, level: int = 5) -> CaseReport:
-    """The verdict on one case; nothing in `outputs` can make this raise."""
+    """The verdict on one case; never raises for any content of `outputs`."""
     folder = outputs / case.family / case.case
     taken: dict[str, NDArray | Refused] = {}
     for name, asked in case.outputs.items():
@@ -224,7 +224,7 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
 
 
 def _name_strays(folder: Path, taken: dict[str, NDArray | Refused]) -> None:
-    """Name beside a missing output the file of its folder that is no output and has a similar name."""
+    """Add to each missing output a similarly named file of its folder that is not an output."""
     missing = [name for name, got in taken.items() if isinstance(got, Refused) and str(got) == MISSING]
     try:
         files = [entry.name for entry in islice(os.scandir(folder), MOST_FILES)] if missing else []
@@ -239,7 +239,7 @@ def _name_strays(folder: Path, taken: dict[str, NDArray | Refused]) -> None:
 def _relate(
     golden: Golden, case: Case, found: list[OutputReport], seen: dict[str, Taken], precision: Precision
 ) -> None:
-    """Write the forms of the refused outputs."""
+    """Record the relations of the refused outputs."""
     refused = [(o, seen[o.name]) for o in found if o.status == "refused" and seen[o.name].got is not None]
     if not refused:
         return
@@ -276,7 +276,7 @@ def _held_against(
 
 
 def _first_wrong(case: Case, found: list[OutputReport]) -> FirstWrong:
-    """Where a trajectory goes wrong first."""
+    """The first wrong iteration of a trajectory."""
     along = [o for o in found if case.outputs[o.name].order == "iteration"]
     wrong = {o.name: o.index[0] + 1 for o in along if o.index}
     return first_wrong_iteration(wrong, [o.name for o in along], case.settings)
@@ -322,13 +322,13 @@ def _plain(value: float) -> float | None:
 
 
 def _not_repeated() -> CaseReport:
-    """Without a second run level 5 is not complete."""
+    """The report without a second run: level 5 is not complete."""
     reason = "no second run: give it with --again"
     return _again([OutputReport(name="second run", level=5, status="missing", reason=reason)])
 
 
 def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:
-    """All outputs of two runs, bit by bit."""
+    """Bitwise comparison of all outputs of two runs."""
     found = []
     for case in golden.cases:
         if case.operation in without:

@@ -1,8 +1,8 @@
-"""The written-out integer generator: splitmix64 from the FNV-1a hash of a text.
+"""The integer generator: splitmix64, seeded by the FNV-1a hash of a text.
 
-The 64-bit FNV-1a hash of the UTF-8 text is the seed. Number k (from 0) of a seed is splitmix64:
+The 64-bit FNV-1a hash of the UTF-8 text is the seed. Number k (from 0) of a seed is the splitmix64 output
 z = seed + (k + 1) 0x9E3779B97F4A7C15, z = (z ^ z >> 30) 0xBF58476D1CE4E5B9, z = (z ^ z >> 27) 0x94D049BB133111EB,
-z ^ z >> 31, all modulo 2^64. The inputs of the golden cases and the signs of fingerprints are made of these numbers.
+z ^ z >> 31, all modulo 2^64. These numbers generate the inputs of the golden cases and the signs of fingerprints.
 """
 
 import numpy as np
@@ -36,5 +36,5 @@ def unit_numbers(found: NDArray[np.uint64]) -> NDArray[np.float64]:
 
 
 def signs(seed: str, count: int) -> NDArray[np.float64]:
-    """+1 or -1 from the highest bit of the words of a seed; what the fingerprints of outputs are summed with."""
+    """+1 or -1 from the highest bit of the words of a seed: the signs in the fingerprints of outputs."""
     return 1.0 - 2.0 * (words(fnv1a(seed), count) >> np.uint64(63)).astype(np.float64)

@@ -1,5 +1,5 @@
-"""The search for a mistake that is on no list: single changes of the definition that give the outputs of a port.
+"""The search for unlisted mistakes: single changes of the definition that reproduce the outputs of a port.
 
 In: the report of the judge on refused outputs. Out: changes of one setting, one input or one place in the source of
-`endotsr.definition` with which it gives every output of the first wrong operation as the port wrote it.
+`endotsr.definition` that reproduce all of the port's outputs of the first wrong operation.
 """

@@ -1,6 +1,6 @@
 """The process of a search: `python -m endotsr.golden.search GOLDEN OUTPUTS PRECISION LEVEL OPERATION SECONDS`.
 
-Prints what it finds as JSON; ends with code 1 where there is nothing to explain.
+Prints the results as JSON; exits with code 1 if there is nothing to explain.
 """
 
 import contextlib
@@ -14,7 +14,7 @@ from endotsr.golden.judge.store import read_golden
 from endotsr.golden.search.find import explained, sentences
 from endotsr.golden.search.inside import looked
 
-MOST_MEMORY = 4 << 30  # bytes, where the system can limit them
+MOST_MEMORY = 4 << 30  # bytes, if the system supports a limit
 
 
 def main(words: list[str]) -> int:

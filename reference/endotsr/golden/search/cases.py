@@ -1,4 +1,4 @@
-"""The cases of one operation as the port answered them, and whether other answers are the same."""
+"""The cases of one operation with the port's answers, and comparisons of other answers with them."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,15 +16,15 @@ from endotsr.golden.judge.store import Golden, in_precision
 from endotsr.golden.judge.verdict import CaseReport
 from endotsr.stages.stage import Inputs, Outputs, Settings, Stage, tidy
 
-AFTER = 2  # iterations of a trajectory that are looked at from its first wrong one on
-PIECE = 1e-6  # length of a step along which a derivative is taken, in units of the input
-DERIVATIVE = 1e-4  # part by which it may be off
+AFTER = 2  # iterations of a trajectory that are compared, from its first wrong one on
+PIECE = 1e-6  # step length of a derivative, in units of the input
+DERIVATIVE = 1e-4  # its allowed relative error
 
 
 class Answered:
-    """One case: the outputs of the port, and what differences are rounding.
+    """One case: the outputs of the port, and the tolerances of rounding.
 
-    A trajectory ends soon after its first wrong iteration: what is wrong later follows from it.
+    A trajectory is cut soon after its first wrong iteration: later errors follow from it.
     """
 
     def __init__(self, golden: Golden, case: Case, report: CaseReport, outputs: Path, precision: str) -> None:
@@ -33,7 +33,7 @@ class Answered:
         self.tolerance = max((r.float64 if precision == "float64" else r.float32 for r in rules), default=0.0)
         self.inputs: Inputs = in_precision(golden.inputs(case), "float64")
         along = [name for name, asked in case.outputs.items() if asked.order == "iteration"]
-        # the first wrong entry of each output of a trajectory, and the number of its iterations that are looked at
+        # the first wrong entry of each output of a trajectory, and the number of its compared iterations
         self.wrong_from = {o.name: o.index[0] for o in report.outputs if o.index and o.name in along}
         self.length = min(self.wrong_from.values()) + AFTER if self.wrong_from else 0
         self.inputs = {name: self._short(name, array) for name, array in self.inputs.items()}
@@ -57,7 +57,7 @@ class Answered:
                 finite = np.where(np.isfinite(self.got[name]), self.got[name], 0.0)
                 kind = rule.scale or "max"
                 scale = scale_of(expected, kind)
-                if finite.any():  # what is wrong by orders of magnitude is rounded at its own size
+                if finite.any():  # an error of orders of magnitude has roundings of its own size
                     scale = np.maximum(scale, scale_of(finite, kind))
                 self.unit[name] = 0.0 if rule.kind == "exact" else FITS * tolerance * scale
         self.refused &= self.got.keys()
@@ -67,11 +67,11 @@ class Answered:
         self.gradient_names: list[str] = []
 
     def _short(self, name: str, array: NDArray) -> NDArray:
-        """An array of which the iterations that are looked at are kept, if it has one entry for each."""
+        """The compared iterations of an array with one entry per iteration; other arrays unchanged."""
         return array[: self.length] if self.length and axes_of(name, array.ndim) == "iteration" else array
 
     def begin(self, stage: Stage) -> None:
-        """Compute the right outputs, and tell those of the forward pass from gradients."""
+        """Compute the right outputs, and separate forward outputs from gradients."""
         forward, self.saved = self.forward(stage, self.inputs, self.settings)
         _lock(self.saved)
         self.right = {**forward, **self.reverse(stage, self.inputs, self.saved)}
@@ -79,14 +79,14 @@ class Answered:
         self.gradient_names = [name for name in self.got if name not in forward]
 
     def forward(self, stage: Stage, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
-        """Outputs without gradients, and what the reverse pass needs."""
+        """Outputs without gradients, and the saved tuple of the reverse pass."""
         found, saved = stage.forward(inputs, settings)
         more = {} if stage.extra is None else stage.extra(inputs, settings, saved)
         kept = {name: self._short(name, array) for name, array in tidy({**found, **more}).items()}
         return kept, (saved, tuple(found))
 
     def reverse(self, stage: Stage, inputs: Inputs, saved: Any) -> Outputs:
-        """Gradients, where the case asks for them."""
+        """Gradients, if the case requests them."""
         own, names = saved
         given = {name: inputs[f"d_{name}"] for name in names if f"d_{name}" in inputs}
         if stage.is_loss:
@@ -94,7 +94,7 @@ class Answered:
         return tidy(stage.reverse(given, own)) if stage.reverse is not None and given.keys() == set(names) else {}
 
     def same(self, found: Mapping[str, NDArray], names: Sequence[str] | set[str]) -> bool:
-        """Whether all of these outputs are those of the port."""
+        """Whether all of these outputs equal the port's."""
         return all(name in found and self._same(name, np.asarray(found[name])) for name in names)
 
     def _same(self, name: str, value: NDArray) -> bool:
@@ -104,7 +104,7 @@ class Answered:
         return self._off(name, value) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
 
     def _off(self, name: str, value: NDArray, until: int | None = None) -> int:
-        """Entries of an output that are not those of the port; of a trajectory, up to an iteration."""
+        """Number of entries of an output that differ from the port's; of a trajectory, up to an iteration."""
         got = self.got[name]
         got, value = (got, value) if until is None else (got[:until], value[:until])
         with np.errstate(all="ignore"):
@@ -112,17 +112,17 @@ class Answered:
         return int((~(near | (np.isnan(value) & np.isnan(got)))).sum())
 
     def spoiled(self, found: Mapping[str, NDArray]) -> int:
-        """Outputs that passed, or are right at the start of a trajectory, and are no longer so."""
+        """Number of outputs that passed, or were right at the start of a trajectory, and no longer are."""
         passed = sum(not self.same(found, [name]) for name in self.got if name not in self.refused)
         begun = ((name, self.wrong_from[name]) for name in self.refused if name in self.wrong_from)
         return passed + sum(self._off(name, found[name], first) > 0 for name, first in begun)
 
     def wrong(self, names: Sequence[str]) -> int:
-        """Entries of some outputs that a change has to explain."""
+        """Number of entries of some outputs that a change must explain."""
         return sum(self._off(name, self.right[name]) for name in self.refused.intersection(names))
 
     def distance(self, found: Mapping[str, NDArray], names: Sequence[str]) -> NDArray | None:
-        """Differences of real outputs from those of the port, in units of their scale; None = they have no number."""
+        """Differences of real outputs from the port's, in units of their scale; None if they are not numbers."""
         parts = []
         for name in names:
             value, got = np.asarray(found.get(name, np.nan), np.float64), self.got[name]
@@ -134,9 +134,9 @@ class Answered:
         return joined if np.isfinite(joined).all() else None
 
     def is_derivative(self, stage: Stage) -> bool | None:
-        """Whether the gradients of the port are the derivatives of the forward pass as it is now, along one line.
+        """Whether the port's gradients are the derivatives of the current forward pass, along one line.
 
-        None: it cannot be told here
+        None: undecidable here
         """
         names = [name for name in self.inputs if f"d_{name}" in self.got]
         if not names:
@@ -157,7 +157,7 @@ class Answered:
 
 
 def _lock(value: Any) -> None:
-    """Arrays that a change must not write into: what is tried next would start from others."""
+    """Make arrays read-only: a change that wrote into them would affect the next one."""
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
     elif isinstance(value, tuple | list):

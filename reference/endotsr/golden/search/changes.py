@@ -1,8 +1,8 @@
-"""Which changes of the definition are tried for one operation, and in which order: likely ones first.
+"""The changes of the definition that are tried for one operation, likely ones first.
 
-Numbers, then other texts, then other names of one expression, in the code of the operation itself before that of its
-parts; settings and inputs that are read otherwise; at the end changes of two expressions, of a part of an array, and of
-the order.
+First come numbers, then other texts, then other names of one expression, in the code of the operation before the code
+of its parts. Then come settings and inputs read differently, and at the end changes of two expressions, of a part of
+an array, and of the order.
 """
 
 import ast
@@ -25,13 +25,13 @@ from endotsr.golden.search.trial import LATEST, TELLING, Live, Trial
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.stage import Outputs, Stage
 
-SECONDS = 16.0  # of computing that a search may take
-UNKNOWN = 1  # outputs that a change of an expression spoils, where that is not known
-MOST_VALUES = 64  # of an expression, that are looked at
+SECONDS = 16.0  # computing time of a search
+UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
+MOST_VALUES = 64  # examined values of an expression
 
 
 def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float = SECONDS) -> Trial:
-    """Changes of one operation that explain what a port wrote, best first in `hits`."""
+    """Changes of one operation that explain the port's outputs, best first in `hits`."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         found = Trial(stage, answered, golden, seconds)
@@ -55,7 +55,7 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
 
 
 def _inner(operation: str, golden: Golden) -> set[str]:
-    """Functions of the definition that the parts of an operation execute; these parts are right."""
+    """Functions of the definition executed by the parts of an operation, which are right."""
     stages = definition_stages()
     parts = made_of(operation) & stages.keys()
     cases = {case.operation: case for case in golden.cases if case.operation in parts}
@@ -69,13 +69,13 @@ def _inner(operation: str, golden: Golden) -> set[str]:
 
 
 def _places(trial: Trial, places: Sequence[Statement]) -> None:
-    """Changes of some places: numbers, then other texts, then other names; of a trajectory, numbers at the end."""
+    """Changes of some places: numbers, then other texts, then other names; for a trajectory, numbers last."""
     long = any(one.length for one in trial.cases)
     live = _reached(trial, places, long)
     trial.live += live
     for texts, rank in ((_texts, 1), (_names, 2)):
         lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
-        for one in live:  # once something is found, the rest of its line is tried
+        for one in live:  # after a hit, the rest of its line is tried
             if not lines or one.spot.place.where(one.spot.node) in lines:
                 _try(trial, one, texts(one), rank)
     for one in live if long and not trial.explains else ():
@@ -84,7 +84,7 @@ def _places(trial: Trial, places: Sequence[Statement]) -> None:
 
 
 def _requests(trial: Trial) -> None:
-    """Settings and inputs that are taken otherwise; where a setting is a number, also the one that fits best."""
+    """Settings and inputs read differently; for a numeric setting, also the number that fits best."""
     for request in other_requests([one.case for one in trial.cases], trial.golden.cases):
         if trial.over:
             return
@@ -102,10 +102,10 @@ def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) 
 
 
 def _reached(trial: Trial, places: Sequence[Statement], long: bool) -> list[Live]:
-    """Spots that are reached, the most promising first.
+    """Reached spots, the most promising first.
 
-    Each is judged by the factor, term or constant with which it explains most; of a trajectory, which takes long, by
-    one computation.
+    Each is ranked by the factor, term or constant with which it explains most; for a trajectory, which is slow, by one
+    computation.
     """
     live: list[Live] = []
     for place in places:
@@ -121,9 +121,9 @@ def _reached(trial: Trial, places: Sequence[Statement], long: bool) -> list[Live
 
 
 def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) -> list[Any]:
-    """Values of an expression in the first case, None for one that is no array; a statement has True.
+    """Values of an expression in the first case, None for a value that is not an array; True for a statement.
 
-    late   if given, real values are changed a little while they are read, and how much that spoils is put here
+    late   if given, real values are perturbed while they are read, and the number of spoiled outputs is stored here
     """
     if isinstance(spot.node, ast.stmt):
         return [True]
@@ -150,7 +150,7 @@ def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) 
 
 
 def _solved(trial: Trial, spot: Spot, mode: str, values: list[Any]) -> int:
-    """Look for the number at a spot with which all is explained; returns how late other texts are tried there."""
+    """Search for the number at a spot that explains everything; returns the rank of other texts there."""
     late = LATEST
     for text, rest in with_number(spot.node, values):
         late = min(late, _number_at(trial, spot, mode, text, rest, 2 if isinstance(spot.node, ast.Constant) else 3))
@@ -158,7 +158,7 @@ def _solved(trial: Trial, spot: Spot, mode: str, values: list[Any]) -> int:
 
 
 def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank: int, words: str = "") -> int:
-    """The same for one text."""
+    """As `_solved`, for one text."""
     names, counter = spot.place.module.__dict__, trial.counter
     try:
         with written(spot, text):
@@ -182,7 +182,7 @@ def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank
                 by_name = rest == 0 and isinstance(spot.node, ast.Name | ast.Attribute)  # rather another name
                 trial.note(whole, said, spot, 1 + (trial.discrete or by_name) if plain else 3, rank)
                 break
-    except Exception:  # whatever the changed text does
+    except Exception:  # a changed text may raise anything
         return LATEST
     return spoils
 
@@ -193,7 +193,7 @@ def _texts(one: Live) -> Iterator[tuple[str, int]]:
 
 
 def _names(one: Live) -> Iterator[tuple[str, int]]:
-    """Another array or number of the function in place of one."""
+    """Names of the function in place of another name."""
     is_name = isinstance(one.spot.node, ast.Name | ast.Attribute)
     return ((name, 0) for name in (names_in(one.spot.place) if is_name else ()))
 
@@ -219,7 +219,7 @@ def _side(spot: Spot, mode: str) -> str:
 
 
 def _second(trial: Trial, places: Sequence[Statement]) -> None:
-    """Changes of more than one expression, of a part of an array and of the order, where nothing else fits."""
+    """Changes of more than one expression, of a part of an array and of the order, if nothing else fits."""
     if trial.explains or trial.wrong < TELLING:
         return
     for module in definition_modules():

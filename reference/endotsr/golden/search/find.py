@@ -1,4 +1,4 @@
-"""The search: every single change of the definition against the outputs of a port, within a number of seconds."""
+"""The search: single changes of the definition against the outputs of a port, within a time limit."""
 
 import contextlib
 import json
@@ -15,16 +15,16 @@ from endotsr.golden.search.changes import SECONDS, search
 from endotsr.golden.search.trial import WHOLE, Hit, Trial
 from endotsr.stages.definition import definition_stages
 
-START_UP = 60.0  # seconds that a process may take beside its search
-SLOWEST = 10.0  # seconds that a second of computing may take on a busy machine
-LONG = 3.0  # times the seconds that a search among trajectories takes
-MOST_LINES = 3  # of the source that are named where all explain the outputs equally
+START_UP = 60.0  # seconds of a process outside its search
+SLOWEST = 10.0  # elapsed seconds per second of computing on a busy machine
+LONG = 3.0  # factor on the time of a search among trajectories
+MOST_LINES = 3  # source lines listed if all explain the outputs equally
 
 
 def explained(golden: Golden, outputs: Path, precision: Precision, level: int, operation: str, seconds: float) -> Trial:
-    """The search for the mistake of an operation, of which an output is refused.
+    """The search for the mistake of an operation with a refused output.
 
-    Raises: InputError for one that the definition does not compute, or of which nothing that could be read is refused.
+    Raises: InputError if the definition does not compute the operation, or none of its readable outputs is refused.
     """
     stage = definition_stages().get(operation)
     cases = [case for case in golden.cases if case.operation == operation and case.level <= level]
@@ -38,14 +38,14 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
 
 
 def _order(one: Answered) -> tuple[bool, int, int, int]:
-    """Refused cases come first, short trajectories before long ones, and then those with the most to explain."""
+    """Sort key: refused cases first, short trajectories before long ones, then cases with the most to explain."""
     return not one.refused, one.length, -len(one.refused), -sum(one.got[name].size for name in one.refused)
 
 
 def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECONDS) -> None:
-    """Write into a report what a search for the mistake of its first wrong operation finds.
+    """Add to a report the results of a search for the mistake of its first wrong operation.
 
-    It runs in a process of its own: a change may ask for more memory than there is, or call a library wrongly.
+    The search runs in a separate process: a change may exhaust the memory or misuse a library.
     """
     if not report.first_wrong:
         return
@@ -62,7 +62,7 @@ def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECO
 
 
 def sentences(trial: Trial) -> list[str]:
-    """The changes that explain most, one per line of the source; nothing where changes in many functions do."""
+    """The changes that explain most, one per source line; nothing if changes in many functions do."""
     best: dict[str, Hit] = {}
     for hit in trial.hits:
         if hit.rank[:3] == trial.hits[0].rank[:3]:

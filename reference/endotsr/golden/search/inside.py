@@ -1,8 +1,8 @@
-"""Arrays inside an operation that a port may write after a refusal, and which of them is wrong first.
+"""The first wrong array inside an operation, from intermediate arrays that a port may write after a refusal.
 
-In: `<family>/<case>/inside/<name>.npy` beside the outputs of a refused case. Out: the first wrong one, in the order in
-which the definition computes them. The expected values are read from the variables of the definition while it computes
-the case, so that no vector holds them.
+In: `<family>/<case>/inside/<name>.npy`, next to the outputs of a refused case. Out: the first wrong array, in the order
+of computation of the definition. The expected values are variables of the definition while it computes the case; no
+vector stores them.
 """
 
 import contextlib
@@ -24,14 +24,14 @@ MOST_BYTES = 1 << 27
 
 
 class Inner(NamedTuple):
-    """Where the definition holds an array: at the end of a function, an expression of its variables."""
+    """Location of an array in the definition: an expression of a function's variables, at its end."""
 
     function: str
-    value: str  # `returned` is what the function returns
+    value: str  # `returned` is the return value
 
 
 def of_gaussians(layers: Sequence[Any], rows: NDArray, columns: NDArray, image: Callable[[Any], NDArray]) -> NDArray:
-    """(N, H, W) images of the layers by Gaussian, 0 for a Gaussian that is in none."""
+    """(N, H, W) images of the layers by Gaussian, 0 for a Gaussian without a layer."""
     found = np.zeros((rows.shape[1], rows.shape[0], columns.shape[0]))
     for layer in layers:
         found[layer.index] = image(layer)
@@ -100,11 +100,11 @@ INSIDE: dict[str, dict[str, Inner]] = {
     "laplacian": _inner("laplacian.laplacian_loss_forward", **_LEVELS),
     "pose": _inner("pose.pose_forward", exponential="e"),
 }
-"""Arrays by operation and name, in the order in which the definition computes them."""
+"""Arrays by operation and name, in the order of computation of the definition."""
 
 
 def values(stage: Stage, one: Answered) -> dict[str, NDArray]:
-    """The arrays of a case; one that the case does not reach is left out."""
+    """The arrays of a case; unreached arrays are omitted."""
     wanted = INSIDE.get(stage.name, {})
     functions = {_code(inner.function): inner.function for inner in wanted.values()}
     names: dict[str, Mapping[str, Any]] = {}
@@ -133,7 +133,7 @@ def _code(function: str) -> Any:
 
 
 def bisected(stage: Stage, one: Answered) -> list[str]:
-    """Sentences on the arrays that a port wrote for a case; none where it wrote none."""
+    """Sentences on the arrays that a port wrote for a case; empty if it wrote none."""
     expected, right, wrong = values(stage, one), [], []
     for name, array in expected.items():
         try:
@@ -153,7 +153,7 @@ def bisected(stage: Stage, one: Answered) -> list[str]:
 
 
 def compared(got: NDArray, array: NDArray, tolerance: float, others: Mapping[str, NDArray], name: str) -> str:
-    """How an array differs from that of the definition, "" if it does not."""
+    """The difference of an array from the definition's as text, "" if there is none."""
     if got.shape != array.shape:
         return f"shape {got.shape}; expected {array.shape}"
     rest = {key: other for key, other in others.items() if key != name}
@@ -162,7 +162,7 @@ def compared(got: NDArray, array: NDArray, tolerance: float, others: Mapping[str
 
 
 def asked(stage: Stage, one: Answered) -> str:
-    """What a port may write for a case, "" for nothing."""
+    """The arrays that a port may write for a case, "" if there are none."""
     names = values(stage, one)
     if not names:
         return ""
@@ -171,7 +171,7 @@ def asked(stage: Stage, one: Answered) -> str:
 
 
 def looked(stage: Stage, cases: Sequence[Answered]) -> tuple[list[str], str]:
-    """What the arrays of refused cases say, the first case with a wrong one first; and what to write where none is."""
+    """Sentences on the arrays of refused cases, the first wrong one first; else the arrays that a port may write."""
     refused = [one for one in cases if one.refused]
     said = [found for one in refused if (found := bisected(stage, one))]
     said.sort(key=lambda found: " wrong " not in found[0])

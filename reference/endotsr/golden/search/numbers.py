@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 
 from endotsr.golden.judge.relate import KNOWN, number_text
 
-START = 1e-4  # first step from the number that changes nothing, as a part of it
+START = 1e-4  # first relative step from the number that changes nothing
 STEPS = 6
-NOTHING = 1e-4  # a factor that may be 0, where outputs are rounded to float32
-LEFT = 0.02  # part of the first distance that must not be left
+NOTHING = 1e-4  # a smaller factor may be 0, if outputs are rounded to float32
+LEFT = 0.02  # largest accepted fraction of the first distance
 
 
 def best_number(off: Callable[[float], NDArray | None], rest: float, before: NDArray | None) -> float | None:
-    """The number at which a distance is smallest, by secants; None where it has no influence or none comes near.
+    """The number with the smallest distance, by secants; None if it has no influence or none fits.
 
-    off      number -> differences; None = not to be had
+    off      number -> differences; None = undefined
     rest     the number that changes nothing
     before   the differences there
     """
@@ -42,7 +42,7 @@ def best_number(off: Callable[[float], NDArray | None], rest: float, before: NDA
 
 
 def plain_first(number: float) -> list[tuple[float, bool]]:
-    """Numbers that are near, each with whether it is one of the method or of few digits; the number itself is last."""
+    """Nearby numbers, with a flag for constants of the method and numbers of few digits; the number itself is last."""
     if abs(number) < 1e-9:
         return [(0.0, True)]
     known = [sign * value for value in KNOWN.values() for sign in (1, -1)] + [round(number * 12) / 12]

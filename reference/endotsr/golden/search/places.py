@@ -1,4 +1,4 @@
-"""Places in the source of the definition: what a stage executes, and the running of it with one place changed."""
+"""Places in the source of the definition: the code executed by a stage, and its execution with one place changed."""
 
 import ast
 import inspect
@@ -17,7 +17,7 @@ STEP = re.compile(r"#.*?(\(\d+\.\d+\)(?:, \(\d+\.\d+\))*)")  # at the end of a l
 
 
 class Statement:
-    """A function of the definition, or a constant with the constants that are made of it."""
+    """A function of the definition, or a constant with the constants that depend on it."""
 
     def __init__(self, module: ModuleType, statement: ast.FunctionDef | ast.Assign, phases: frozenset[str]) -> None:
         self.module, self.statement, self.phases = module, statement, phases
@@ -27,11 +27,11 @@ class Statement:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is no function."""
+        """Whether it is not a function."""
         return isinstance(self.statement, ast.Assign)
 
     def compiled(self) -> Callable[[], Any]:
-        """What installs the statement as it stands now; it returns what takes it back."""
+        """A function that installs the current statement and returns a function that undoes this."""
         if isinstance(self.statement, ast.Assign):
             return self._constants(self.statement)
         name, function = self.statement.name, self.module.__dict__[self.statement.name]
@@ -80,7 +80,7 @@ class Statement:
 
 
 class Spot(NamedTuple):
-    """All expressions of one text in a place, or one of them, as (node that holds it, field, index in a list)."""
+    """All expressions of one text in a place, or one of them, as (parent node, field, index in a list)."""
 
     place: Statement
     node: ast.expr | ast.stmt
@@ -88,7 +88,7 @@ class Spot(NamedTuple):
 
     @property
     def truth(self) -> bool:
-        """Whether it stands where a condition stands."""
+        """Whether it is a condition."""
         holder, field, index = self.holders[0]
         match holder:
             case ast.Call():
@@ -102,7 +102,7 @@ class Spot(NamedTuple):
 
 @contextmanager
 def written(spot: Spot, text: str) -> Iterator[None]:
-    """The syntax tree of the place with another text at the spot. Raises SyntaxError for what is no expression."""
+    """The syntax tree of the place with another text at the spot. Raises SyntaxError if that is no expression."""
     for holder, field, index in spot.holders:
         made = ast.Pass() if isinstance(spot.node, ast.stmt) else ast.parse(text, mode="eval").body
         for node in ast.walk(made):
@@ -123,9 +123,9 @@ def _put(holder: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
 
 
 def spots(place: Statement) -> list[Spot]:
-    """Every expression that is read in a place, and its statements; what occurs several times also all at once.
+    """Every expression that is read in a place, and its statements.
 
-    All at once: in the whole place, and in each of its statements.
+    Repeated expressions are also changed together: in the whole place, and in each of its statements.
     """
     found: dict[tuple[str, int], list[Spot]] = {}
     body = place.statement.body if isinstance(place.statement, ast.FunctionDef) else [place.statement]
@@ -167,7 +167,7 @@ def _is_read(node: Any) -> bool:
 
 
 def names_in(place: Statement) -> list[str]:
-    """Names that a function reads and that are its own, and attributes by what they are read of."""
+    """Local names read by a function, and attributes with their objects."""
     if not isinstance(place.statement, ast.FunctionDef):
         return []
     own = {a.arg for a in ast.walk(place.statement.args) if isinstance(a, ast.arg)}
@@ -184,7 +184,7 @@ def names_in(place: Statement) -> list[str]:
 
 
 def executed(phases: dict[str, Callable[[], Any]]) -> list[Statement]:
-    """The places of the definition that run in some calls, by phase, and the constants of their modules."""
+    """The places of the definition executed by some calls, by phase, and the constants of their modules."""
     codes: dict[CodeType, set[str]] = {}
     for phase, call in phases.items():
 
@@ -223,7 +223,7 @@ def _targets(statement: ast.Assign) -> Sequence[str]:
 
 
 def definition_modules() -> list[ModuleType]:
-    """The modules of the definition that are loaded."""
+    """The loaded modules of the definition."""
     return [m for name, m in sorted(sys.modules.items()) if name.startswith(f"{ROOM}.") and m is not None]
 
 
@@ -231,7 +231,7 @@ _trees: dict[str, ast.Module] = {}
 
 
 def syntax(module: ModuleType) -> ast.Module:
-    """The syntax tree of a module, the same one at every call."""
+    """The syntax tree of a module, cached."""
     if module.__name__ not in _trees:
         _trees[module.__name__] = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
     return _trees[module.__name__]

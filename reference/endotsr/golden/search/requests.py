@@ -1,4 +1,4 @@
-"""Requests that are read otherwise: a setting that a port has fixed, an input in another order, unit or sign."""
+"""Misread requests: a setting fixed by a port, an input in another order, unit or sign."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import permutations
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from endotsr.golden.judge.format import Case
 from endotsr.stages.stage import Inputs, Outputs, Settings
 
-MOST_ORDERED = 4  # entries of an axis of which every order is tried
-MOST_SWAPPED = 16  # entries of an axis of which every two are exchanged
+MOST_ORDERED = 4  # longest axis with every order tried
+MOST_SWAPPED = 16  # longest axis with every pair exchanged
 
 
 class OtherReading(NamedTuple):
-    """Another reading of requests, the same for all cases."""
+    """A misreading of requests, the same for all cases."""
 
     text: str
     rank: tuple[int, int]  # as of the other changes
@@ -26,7 +26,7 @@ class OtherReading(NamedTuple):
 
 
 def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
-    """Readings of the requests of one operation, settings first."""
+    """Misreadings of the requests of one operation, settings first."""
     for path in dict.fromkeys(path for case in cases for path in leaves(case.settings)):
         yield from _settings(path, cases, all_cases)
     for name, array in cases[0].inputs.items():
@@ -43,21 +43,21 @@ def leaves(settings: Mapping[str, Any], above: tuple[str, ...] = ()) -> Iterator
 
 
 def value_at(settings: Any, path: Sequence[str]) -> Any:
-    """The value of a path; None without it."""
+    """The value of a path; None if missing."""
     for key in path:
         settings = settings.get(key) if isinstance(settings, Mapping) else None
     return settings
 
 
 def with_value(settings: Settings, path: Sequence[str], value: Any) -> Settings:
-    """The settings with another value."""
+    """The settings with another value at a path."""
     if len(path) == 1:
         return {**settings, path[0]: value}
     return {**settings, path[0]: with_value(settings[path[0]], path[1:], value)}
 
 
 def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
-    """A setting at a fixed value, and a setting changed by a rule."""
+    """A setting fixed at a value, or changed by a rule."""
     name = ".".join(path)
     seen = [value_at(case.settings, path) for case in cases]
     seen += [value_at(case.settings, p) for case in all_cases for p in leaves(case.settings) if p[-1] == path[-1]]
@@ -94,7 +94,7 @@ def _has(settings: Settings, path: Sequence[str]) -> bool:
 
 
 def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReading]:
-    """An input and its gradient, or a cotangent, in another order; an input of another sign or unit."""
+    """An input and its gradient, or a cotangent, in another order; an input with another sign or unit."""
     for axis, size in enumerate(shape):
         if 1 < size <= MOST_ORDERED:
             yield from (_ordered(name, axis, np.array(order)) for order in list(permutations(range(size)))[1:])
@@ -138,7 +138,7 @@ def _mapped(
     name: str, text: str, change: Callable[[NDArray], NDArray], back: Callable[[NDArray], NDArray],
     rank: tuple[int, int] = (0, 2),
 ) -> OtherReading:  # fmt: skip
-    """An input changed, and its gradient changed back; of a cotangent, the output."""
+    """An input changed, and its gradient changed back; for a cotangent, its output."""
     partner = name.removeprefix("d_") if name.startswith("d_") else f"d_{name}"
 
     def ask(inputs: Inputs, settings: Settings) -> tuple[Inputs, Settings]:

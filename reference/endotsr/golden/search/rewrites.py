@@ -1,7 +1,7 @@
 """Other texts for an expression of the definition, as a mistake would write it.
 
-Nothing here knows the method: a constant has another value, an operation is left out or taken for its neighbour, a
-comparison includes its end, a factor or a term is added whose size is found from the outputs.
+The rewrites are independent of the method: another value of a constant, an omitted or confused operation, a comparison
+with its end included, an added factor or term with a size found from the outputs.
 """
 
 import ast
@@ -17,7 +17,7 @@ TWINS = (
     "round floor", "round ceil", "rint floor", "rint trunc", "trunc floor", "trunc rint", "tanh arctan", "cosh sinh",
     "tile repeat", "any all", "all any", "zeros ones", "ones zeros", "sign abs", "unique sort", "minimum maximum",
 )  # fmt: skip
-"""Functions that are taken for another."""
+"""Functions confused with another."""
 OPERATORS: dict[type, str] = {
     ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l}); 2 * ({l}); 2 * ({r})",
     ast.Sub: "{l}; -({r}); ({l}) + ({r}); ({r}) - ({l})",
@@ -36,9 +36,9 @@ SWAPS = ("[1, 0, 2]", "[2, 1, 0]", "[0, 2, 1]", "[1, 2, 0]", "[2, 0, 1]")
 
 
 def rewrites(node: ast.expr | ast.stmt, values: Sequence[Any], truth: bool) -> Iterator[tuple[str, int]]:
-    """Other texts for an expression, or the leaving out of a statement, each with its rank, 0 = the most likely.
+    """Other texts for an expression, or the omission of a statement, each with its rank, 0 = the most likely.
 
-    values   that the expression had; a text that would change none of them is not made
+    values   observed values of the expression; texts that change none of them are omitted
     truth    the expression is a condition
     """
     if isinstance(node, ast.stmt):
@@ -80,7 +80,7 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
 
 
 def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
-    """What stands beside a function of one argument put into it, and the other way round: sqrt(a) + b, sqrt(a + b)."""
+    """Operands moved into or out of a function of one argument: sqrt(a) + b, sqrt(a + b)."""
     match node:
         case ast.BinOp(left=ast.Call(func=function, args=[inner], keywords=[])):
             yield ast.Call(function, [ast.BinOp(inner, node.op, node.right)], [])
@@ -89,7 +89,7 @@ def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tuple[str, float]]:
-    """Texts in which `_knob` is a number to be found, and its value where nothing is changed."""
+    """Texts with an unknown number `_knob`, and its value that changes nothing."""
     if isinstance(node, ast.Constant) and type(node.value) is int:
         yield (f"{node.value} * _knob", 1.0) if node.value else ("_knob", 0.0)
     elif isinstance(node, ast.expr) and any(np.asarray(value).dtype.kind in "fiu" for value in values):
@@ -127,7 +127,7 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
     yield from arguments
     if name == "exp":
         yield f"1 + ({arguments[0]})"
-    if name == "linspace":  # other conventions of where the samples lie
+    if name == "linspace":  # other conventions of the sample positions
         a, b, n = arguments
         yield from (f"({a}) + (({b}) - ({a})) * (np.arange({n}) + {k}) / ({n})" for k in (0, 0.5, 1))
         yield f"np.linspace({a}, {b}, ({n}) + 2)[1:-1]"

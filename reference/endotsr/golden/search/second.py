@@ -1,7 +1,7 @@
-"""Changes that are tried where no single rewrite fits.
+"""Changes that are tried if no single rewrite fits.
 
-Two numbers of one line, another order of statements, an expression of the function in place of another one or beside
-it, and a factor at one index or at one time of an expression that is computed many times.
+Two numbers of one line; another order of statements; an expression of the function that replaces another or is combined
+with it; a factor at one index of an array, or at one evaluation of an expression.
 """
 
 import ast
@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from endotsr.golden.search.places import Spot, Statement, written
 
-MOST_INDICES = 16  # along the first axis of an array that is looked at index by index
+MOST_INDICES = 16  # indices tried along the first axis of an array
 MOST_INNER = 4  # along its second axis
-LONGEST = 24  # characters of an expression that is put in another place
+LONGEST = 24  # characters of a moved expression
 BESIDE = ("({t}) * ({e})", "({t}) / ({e})", "({t}) * (1 - ({e}))", "({t}) + ({e})", "({t}) - ({e})")
 BESIDE_TRUE = ("({t}) & ({e})", "({t}) | ({e})", "({t}) & ~({e})")
 
 
 class SecondChange(NamedTuple):
-    """A change of a place, in words, and the writing of it."""
+    """A change of a place, its description, and the context that applies it."""
 
     spot: Spot
     text: str
@@ -32,7 +32,7 @@ class SecondChange(NamedTuple):
 
 
 def pairs(spots: Sequence[Spot]) -> Iterator[SecondChange]:
-    """Two numbers of one line, both with another value."""
+    """Two numbers of one line, both changed."""
     numbers = [s for s in spots if _is_number(s.node) and len(s.holders) == 1]
     for one, other in combinations(numbers, 2):
         if one.node.lineno != other.node.lineno:
@@ -61,7 +61,7 @@ def _both(one: Spot, first: str, other: Spot, second: str) -> Iterator[None]:
 
 
 def orders(place: Statement) -> Iterator[SecondChange]:
-    """A statement earlier or later in its block."""
+    """A statement moved earlier or later in its block."""
     for holder in ast.walk(place.statement):
         block = getattr(holder, "body", None)
         if not isinstance(block, list) or not isinstance(holder, ast.FunctionDef | ast.For):
@@ -84,7 +84,7 @@ def _moved(block: list[ast.stmt], at: int, to: int) -> Iterator[None]:
 
 
 def expressions(place: Statement) -> list[str]:
-    """Short expressions that a function reads."""
+    """Short expressions read by a function."""
     kinds = ast.Name | ast.Attribute | ast.Subscript | ast.Compare | ast.BinOp
     nodes = (n for n in ast.walk(place.statement) if isinstance(n, kinds))
     read = (ast.unparse(n) for n in nodes if isinstance(getattr(n, "ctx", ast.Load()), ast.Load))
@@ -92,7 +92,7 @@ def expressions(place: Statement) -> list[str]:
 
 
 def beside(spot: Spot, values: Sequence[Any], others: Sequence[str]) -> Iterator[tuple[str, int]]:
-    """Texts for a spot in which another expression of the function stands in its place or beside it."""
+    """Texts for a spot with another expression of the function, in its place or combined with it."""
     holder, field, _ = spot.holders[0]
     if isinstance(spot.node, ast.stmt | ast.Constant):
         return
@@ -110,7 +110,7 @@ def _is_real(value: Any) -> bool:
 
 
 def parts(spot: Spot, values: Sequence[Any]) -> Iterator[tuple[str, str]]:
-    """Texts in which `_knob` is a factor at one index, or at one of many times; and the words for it."""
+    """Texts with a factor `_knob` at one index or one evaluation, and their description."""
     if isinstance(spot.node, ast.stmt) or len(spot.holders) > 1 or not all(map(_is_real, values)):
         return
     text, shape = ast.unparse(spot.node), np.shape(values[0])
@@ -124,13 +124,13 @@ def parts(spot: Spot, values: Sequence[Any]) -> Iterator[tuple[str, str]]:
 
 
 class Counter:
-    """Counts how often an expression was computed, and holds the integers of its function at the time in question."""
+    """Counts the evaluations of an expression, and records the integers of its function at one of them."""
 
     def __init__(self) -> None:
         self.count, self.numbers = 0, dict[str, int]()
 
     def nth(self, value: Any, number: int, factor: float) -> Any:
-        """The value, at one of the times multiplied."""
+        """The value, multiplied at one evaluation."""
         self.count += 1
         if self.count != number + 1:
             return value
@@ -141,7 +141,7 @@ class Counter:
         return factor * value
 
     def words(self) -> str:
-        """When that was."""
+        """Description of this evaluation."""
         return " and ".join(f"{name} = {value}" for name, value in self.numbers.items()) or "only once"
 
 

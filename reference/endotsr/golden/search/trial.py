@@ -1,7 +1,7 @@
-"""One operation, the outputs of a port, and how much of them a change of the definition explains.
+"""One operation, the outputs of a port, and the extent to which a change of the definition explains them.
 
-In: the cases of the operation as the port answered them. Out: what a change explains, kept in `hits`. Which changes
-are tried is not known here (`changes.py`).
+In: the cases of the operation with the port's answers. Out: the explanations of the changes, in `hits`. `changes.py`
+selects the changes.
 """
 
 import contextlib
@@ -19,31 +19,31 @@ from endotsr.golden.search.requests import OtherReading
 from endotsr.golden.search.second import Counter
 from endotsr.stages.stage import Outputs, Stage
 
-LATEST = 1000  # a spot of which it is not known what it reaches
-ENOUGH = 40  # equal explanations after which the search ends
-TELLING = 8  # wrong entries from which any number is believed, and outputs whose gradients are wrong otherwise
+LATEST = 1000  # rank of a spot with unknown reach
+ENOUGH = 40  # equal explanations that end the search
+TELLING = 8  # smallest number of wrong entries for which any number is accepted, and of outputs for wrong gradients
 WHOLE = {
     "all": "every output",
     "derivative": "every forward output, of which the gradients of the port are the derivatives,",
     "refused": "every output of those that are refused; it would be wrong in others that pass,",
     "forward": "every forward output; the gradients of the port are wrong in another way,",
 }
-"""What a change explains, the most most."""
-Install = Callable[[], Any]  # makes a change and returns what takes it back
+"""Extents of an explanation."""
+Install = Callable[[], Any]  # applies a change and returns a function that undoes it
 
 
 class Hit(NamedTuple):
-    """A change with which the definition gives what the port wrote."""
+    """A change with which the definition reproduces the port's outputs."""
 
     text: str
     where: str  # equation and line
-    function: str  # in which the line stands
+    function: str  # of the line
     whole: str  # a key of WHOLE
     rank: tuple[int, ...]
 
 
 class Live(NamedTuple):
-    """A spot, a phase, its values, and how late it is tried: by the outputs that passed and that a change spoils."""
+    """A spot, a phase, its values, and its rank: the number of passed outputs that a change spoils."""
 
     spot: Spot
     mode: str
@@ -52,7 +52,7 @@ class Live(NamedTuple):
 
 
 class Trial:
-    """The search for one operation: its cases, of which the first has the most refused outputs, and what was found."""
+    """The search for one operation: its cases, the one with the most refused outputs first, and the hits."""
 
     def __init__(self, stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
         self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
@@ -61,13 +61,13 @@ class Trial:
         self.live: list[Live] = []
         self.counter = Counter()
         self.tried = 0
-        self.matched = False  # the change tried last gives the forward outputs of a case in which one is refused
+        self.matched = False  # the last change reproduces the forward outputs of a case with a refused one
         for one in answered:
             one.begin(stage)
         most = answered[0]
         real = [name for name in sorted(most.refused) if most.case.outputs[name].dtype == "real"]
-        self.fitted = [name for name in real if name in most.forward_names] or real  # that a number is sought by
-        # decisions are refused: other numbers may well make the same ones
+        self.fitted = [name for name in real if name in most.forward_names] or real  # outputs for fitting a number
+        # decisions are refused: other numbers may give the same decisions
         self.discrete = any(one.case.outputs[name].dtype != "real" for one in answered for name in one.refused)
         self.refusals = [one.refused for one in answered]
         self.wrong = sum(one.wrong(one.forward_names + one.gradient_names) for one in answered)
@@ -78,7 +78,7 @@ class Trial:
 
     @property
     def over(self) -> bool:
-        """Whether time is up, or enough is found."""
+        """Whether the time is over or enough has been found."""
         return time.process_time() > self.end or len(self.hits) >= ENOUGH
 
     @property
@@ -87,10 +87,10 @@ class Trial:
         return any(hit.whole in ("all", "derivative") for hit in self.hits)
 
     def fits(self, install: Install | None, mode: str, request: OtherReading | None = None) -> str:
-        """How much of all cases a change explains: a key of WHOLE, or "" for nothing."""
+        """The extent to which a change explains all cases: a key of WHOLE, or "" for nothing."""
         self.tried += 1
         self.matched = False
-        gradients: list[bool | None] = []  # of cases whose gradients are not those of the definition with the change
+        gradients: list[bool | None] = []  # of cases with gradients that differ from the changed definition's
         spoils = False  # a case that passed
         for one in self.cases:
             if spoils:
@@ -121,7 +121,7 @@ class Trial:
         return "refused" if spoils else "all"
 
     def best(self, install: Install, mode: str) -> tuple[str, str]:
-        """The same, and the phases of it: a change of both may explain more if the reverse pass does without."""
+        """As `fits`, with the best phases: a change of both may explain more without the reverse pass."""
         whole = self.fits(install, mode)
         if mode == "both" and whole != "all" and self.matched:
             alone, order = self.fits(install, "forward"), list(WHOLE)
@@ -142,7 +142,7 @@ class Trial:
             return {**found, **one.reverse(self.stage, inputs, saved)}
 
     def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
-        """Numbers to try, the plainest first, and how many outputs that passed another number spoils."""
+        """Numbers to try, the simplest first, and the number of passed outputs that another number spoils."""
         one = self.cases[0]
 
         def off(value: float) -> Any:
@@ -157,12 +157,12 @@ class Trial:
         return numbers, late if self.moves(moved) else LATEST - 1
 
     def moves(self, found: Outputs) -> bool:
-        """Whether these outputs of the first case are not those of the definition."""
+        """Whether these outputs of the first case differ from the definition's."""
         one = self.cases[0]
         return not all(np.array_equal(found[name], one.right[name]) for name in one.got)
 
     def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
-        """Keep a change that fits."""
+        """Record a change that fits."""
         enough = {"forward": self.wrong_forward, "refused": self.wrong if sum(map(bool, self.refusals)) > 1 else 0}
         if whole and enough.get(whole, TELLING) >= TELLING:
             if spot and not self.forward_refused and spot.place.phases == {"forward"}:
@@ -171,7 +171,7 @@ class Trial:
             self.hits.append(Hit(text, where, function, whole, (int(whole in enough), *rank, len(self.hits))))
 
     def modes(self, place: Statement) -> list[str]:
-        """The phases in which a change of a place can make what is refused."""
+        """The phases in which a change of a place can affect the refused outputs."""
         if len(place.phases) == 1:
             return list(place.phases)
         return ["both" if self.forward_refused else "reverse"]
