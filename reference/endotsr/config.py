@@ -1,7 +1,7 @@
-"""Every setting of a run in one typed, frozen tree; the defaults are the published schedule (preset `paper`).
+"""All settings of a run in one typed, frozen tree; the defaults are the published schedule (preset `paper`).
 
-Read from TOML with `load_config`; an unknown key or a wrong type is an `InputError` that names the key
-and the allowed values. Iterations are counted from 1. Lengths are in scene units (millimetres for EndoNeRF).
+`load_config` reads TOML; an unknown key or a wrong type raises an `InputError` with the key and the allowed values.
+Iterations count from 1. Lengths are in scene units (millimetres for EndoNeRF).
 """
 
 import math
@@ -24,11 +24,11 @@ PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
 
 
 class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A section of settings: frozen, fields by name only, unknown keys refused. The simulator's sections are too."""
+    """A section of settings, also of the simulator: frozen, fields by name only, unknown keys rejected."""
 
 
 class SequenceConfig(Section, frozen=True, kw_only=True):
-    """The frames, masks and depth that are read from a sequence folder."""
+    """Frames, masks and depth of a sequence folder."""
 
     masks: Literal["masks", "gt_masks", "none"] = "masks"
     """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only, `none`"""
@@ -51,7 +51,7 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
 
 
 class ModelConfig(Section, frozen=True, kw_only=True):
-    """Components and sizes of the model. A component that is off allocates nothing and runs nothing."""
+    """Components and sizes of the model. A disabled component costs neither memory nor time."""
 
     appearance: bool = True
     """component A: bounded Fourier colour residual, eq. (1)-(2)"""
@@ -257,7 +257,7 @@ PAPER = Config()
 
 
 def with_settings(settings: SectionType, **changes: Any) -> SectionType:
-    """The settings with other values; a dictionary changes a section: `with_settings(config, training={"seed": 3})`."""
+    """A copy with changed values; a dictionary changes a section: `with_settings(config, training={"seed": 3})`."""
     return msgspec.structs.replace(
         settings,
         **{
@@ -267,15 +267,15 @@ def with_settings(settings: SectionType, **changes: Any) -> SectionType:
     )
 
 
-# Keys of earlier versions, and the values that mean what the settings mean without them.
+# Keys of earlier versions, and the values equivalent to their absence.
 FORMER = {
     "initialisation": {"motion_flow": ("dis",)},
     "training": {"time_jitter": (0,), "bridge_target": ("flow",), "bridge_flow": ("dis",)},
 }
 
-FRAMES_OF_FULL_VISITS = 64  # training frames from which the length of a run grows with the root of their number
+FRAMES_OF_FULL_VISITS = 64  # above this number of training frames, the length of a run grows with its square root
 
-# Milestones of the schedule, by section: they stretch with the length of the run.
+# Milestones of the schedule, by section; they scale with the length of the run.
 MILESTONES = {
     "loss": ("smoothness_from", "laplacian_from", "laplacian_full"),
     "density": ("start", "until"),
@@ -299,16 +299,15 @@ def with_iterations(config: Config, iterations: int) -> Config:
 
 
 def with_fixed_length(config: Config) -> Config:
-    """The same settings with exactly `training.iterations`, whatever the number of frames."""
+    """The same settings with exactly `training.iterations`, for any number of frames."""
     return with_settings(config, training={"visits_per_frame": 0})
 
 
 def lengthened(config: Config, training_frames: int) -> Config:
-    """The settings of a run on so many training frames: its length is max(iterations, visits_per_frame x m).
+    """The settings of a run on n = `training_frames` frames, of length max(iterations, visits_per_frame x m).
 
-    m is the number of frames n up to 64, and sqrt(64 n), rounded, beyond: a frame of a longer clip shares more of its
-    tissue with its neighbours. The schedule is stretched to that length and the length is then fixed, so that a second
-    call changes nothing.
+    m is n up to 64 and sqrt(64 n), rounded, above: in longer clips, neighbouring frames share more tissue. The schedule
+    is scaled to this length, which is then fixed: a second call changes nothing.
     """
     counted = min(training_frames, round(math.sqrt(FRAMES_OF_FULL_VISITS * training_frames)))
     wanted = config.training.visits_per_frame * counted
@@ -328,7 +327,7 @@ SHARP = with_settings(with_iterations(SHARP, 3000), training={"visits_per_frame"
 QUICK = with_settings(
     with_iterations(SHARP, 1600),
     preset="quick",
-    # what a first look has time for at 640x512 pixels
+    # affordable for a first look at 640x512 pixels
     density={"growth": "budget", "maximum": 22_000},
     initialisation={"first_frame_points": 14_000, "other_frame_points": 2_000},
     training={"coarse_start": True},
@@ -354,7 +353,7 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
 
 
 def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
-    """A section from plain data, types and ranges checked. Raises InputError naming the key and what is allowed."""
+    """A section from plain data, with types and ranges checked. Raises InputError with key and allowed values."""
     _refuse_non_finite(data, where, prefix)
     try:
         found = msgspec.convert(data, kind, strict=True)
@@ -366,15 +365,15 @@ def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: s
 
 
 def load_config(path: Path) -> Config:
-    """Read a TOML file. Raises InputError naming the file, the key and what is allowed."""
+    """Read a TOML file. Raises InputError with file, key and allowed values."""
     return config_from_dict(read_toml(path), str(path))
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Settings as plain data with the changes of one source, such as a file, over those of the sources before it.
+    """Settings as plain data, with the changes of one source (such as a file) merged over the earlier sources.
 
-    A source that gives `iterations` and not `visits_per_frame` gives the length of the run, and ends the
-    `visits_per_frame` of the sources before it.
+    A source with `iterations` but without `visits_per_frame` fixes the length of the run and overrides earlier
+    `visits_per_frame`.
     """
     if "iterations" in changes and "visits_per_frame" in base:
         changes = {"visits_per_frame": 0} | changes
@@ -385,11 +384,11 @@ def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def without_former_keys(data: dict[str, Any], where: str, bridge_fraction: float = 0.0) -> dict[str, Any]:
-    """The settings without the keys of `FORMER`, which a stored run of an earlier version has.
+    """The settings without the keys of `FORMER`, which stored runs of earlier versions have.
 
-    bridge_fraction   in force where the data does not name it: without bridged times, their target has no meaning
+    bridge_fraction   default if the data has none: without bridged times, their target is irrelevant
 
-    A stored run of an earlier version holds its length beside the visits of its preset; the length is that of the run.
+    A stored run of an earlier version has both its length and the visits of its preset; the length is used.
     Raises:  InputError for a former key with another value.
     """
     out, found = dict(data), 0
@@ -403,7 +402,7 @@ def without_former_keys(data: dict[str, Any], where: str, bridge_fraction: float
             if values[key] not in allowed and not (unused and values[key] == "neighbour"):
                 raise InputError(
                     f"{where}: {section}.{key} = {values[key]!r} is not allowed: the key left with an earlier version; "
-                    f"allowed: {allowed[0]!r}, or no such key (what was trained otherwise opens in that version alone)"
+                    f"allowed: {allowed[0]!r}, or no such key (runs with other values open only in that version)"
                 )
             found += 1
     if found == sum(map(len, FORMER.values())) and "iterations" in data["training"]:
@@ -412,7 +411,7 @@ def without_former_keys(data: dict[str, Any], where: str, bridge_fraction: float
 
 
 def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") -> None:
-    """Raises InputError for a key that `struct` does not have."""
+    """Raise InputError for a key that `struct` does not have."""
     fields = {f.name: f.type for f in msgspec.structs.fields(struct)}
     for key, value in data.items():
         if key not in fields:
@@ -436,7 +435,7 @@ def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
 
 
 def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
-    """The key, its value and what is allowed, from the message `... - at `$.section.key`` of the type check."""
+    """Key, value and allowed values, from the message `... - at `$.section.key`` of the type check."""
     found = re.search(r"`\$\.([\w.]+)", message)
     place = f"{found[1]}." if found else ""
     if missing := re.search(r"missing required field `(\w+)`", message):
@@ -445,14 +444,14 @@ def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
         return message
     value: Any = data
     for name in found[1].split("."):
-        kind = next(filter(is_section, get_args(kind)), kind)  # of a section that may be left out
+        kind = next(filter(is_section, get_args(kind)), kind)  # an optional section
         kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
         value = value[name]
     return f"{prefix}{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
 
 
 def allowed_values(kind: Any) -> str:
-    """In words, what a setting of this type may be: `a number > 0`, `quartic, gaussian`, ..."""
+    """The allowed values of a type in words: `a number > 0`, `quartic, gaussian`, ..."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Literal:
         return ", ".join(map(str, arguments))
@@ -474,7 +473,7 @@ def allowed_values(kind: Any) -> str:
 
 
 def _refuse_contradictions(config: Config, where: str) -> None:
-    """Raises InputError for settings that are allowed one by one but not together."""
+    """Raise InputError for settings that are allowed individually but not in combination."""
     model, loss, (low, high) = config.model, config.loss, config.sequence.depth_percentiles
     if model.frequency_max < model.frequency_min or (
         model.frequencies > 1 and model.frequency_max == model.frequency_min
@@ -495,5 +494,5 @@ def _refuse_contradictions(config: Config, where: str) -> None:
 
 
 def config_to_toml(config: Config) -> str:
-    """The resolved configuration as TOML text that `load_config` reads back to an equal Config."""
+    """The resolved configuration as TOML text; `load_config` restores an equal Config."""
     return toml_text(msgspec.to_builtins(config))

@@ -1,4 +1,4 @@
-"""The two errors of unusable input. The command line prints them as one line and exits with code 2."""
+"""The two errors of invalid input. The command line prints them as one line and exits with code 2."""
 
 import unicodedata
 
@@ -7,14 +7,14 @@ INVISIBLE = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 def visible(text: str) -> str:
-    """Text in which no character can move the cursor or change the reading order of a terminal; others are escaped."""
+    """The text with all characters escaped that move the cursor or change the reading order of a terminal."""
     return "".join(c if unicodedata.category(c) not in INVISIBLE else f"\\u{ord(c):04x}" for c in text)
 
 
 class InputError(ValueError):
-    """Input that cannot be used. The message names the file, the frame or key, the reason and what is allowed.
+    """Invalid input. The message names the file, the frame or key, the reason and the allowed values.
 
-    Names of files and words from them may stand in the message: it is kept `visible`, line by line.
+    The message may quote file names and file contents; each of its lines is made `visible`.
     """
 
     def __init__(self, message: object = "") -> None:
@@ -22,4 +22,4 @@ class InputError(ValueError):
 
 
 class CalibrationError(InputError):
-    """Equation (7) has no solution. The message holds a table of the gradient ratios of every view."""
+    """Equation (7) has no solution. The message includes a table of the gradient ratios of all views."""
