@@ -54,8 +54,8 @@ def views_during(
     slit = surface.slit
     cut = slit is not None and is_open(slit, t + times[-1])
     sides = (1.0, -1.0) if cut else (None,)
-    moments = t + times[0], t, t + times[-1]
-    paths = [[_seen_at_nodes(surface, *at, side).material for at in zip(cameras, moments)] for side in sides]
+    instants = t + times[0], t, t + times[-1]
+    paths = [[_seen_at_nodes(surface, *at, side).material for at in zip(cameras, instants)] for side in sides]
     for u in times / times[-1]:
         weights = 0.5 * u * (u - 1), 1 - u**2, 0.5 * u * (u + 1)
         found = [spread(np.asarray(sum(w * m for w, m in zip(weights, path))), cameras[1]) for path in paths]
