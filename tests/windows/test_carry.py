@@ -145,7 +145,7 @@ def test_a_neighbour_of_another_world_is_refused(both, cold_run, tmp_path):
     elsewhere = [camera._replace(translation=camera.translation + 1.0) for camera in sequence.cameras]
     start = CarriedStart(str(cold_run / "windows" / "000"), SHIFT, SHARED, SAVED)
     assert start.state(sequence, config).iteration == 0
-    with pytest.raises(InputError, match="its origin is another one"):
+    with pytest.raises(InputError, match="its world origin differs"):
         start.state(replace(sequence, cameras=elsewhere), config)
 
 

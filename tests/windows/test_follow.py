@@ -69,7 +69,7 @@ def test_nothing_is_followed_across_a_cut(tmp_path):
     cut = open_windows(tmp_path / "run")
     found = followed(cut, centres(cut, 0, 4)[:, :5].astype(float), 4, [20, 40])
     assert np.isfinite(found[0]).all() and np.isnan(found[1]).all()
-    with pytest.raises(InputError, match="no window shows"):
+    with pytest.raises(InputError, match="no window covers"):
         followed(cut, np.zeros((3, 1)), 4, [29])
     with pytest.raises(InputError, match="allowed: windows with seams"):
         seam_errors(cut, lambda g: np.ones((40, 48), bool), lambda g, other: np.zeros((3, 40, 48)))

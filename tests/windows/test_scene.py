@@ -135,9 +135,9 @@ def test_a_time_that_no_window_shows_is_refused_with_the_reason(tmp_path):
     scene = open_windows(tmp_path / "run")
     assert len(scene.record.names) == FRAMES - 3
     scene.render(28 / FRAMES, scene.cameras[0])  # one frame behind the last of a window is its end
-    with pytest.raises(InputError, match=r"no window shows.*29:30 are left out.*000029\.png"):
+    with pytest.raises(InputError, match=r"no window covers.*29:30 are left out.*000029\.png"):
         scene.render(29.5 / FRAMES, scene.cameras[0])
-    found = measure_windows(scene, WindowFrames(scene), seams=False)
+    found = measure_windows(scene, WindowFrames(scene))
     assert not {28, 29, 30} & set(found["frames"]["held_out"]) and found["left_out"][0]["first"] == 28
 
 

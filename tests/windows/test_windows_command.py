@@ -18,7 +18,7 @@ SMALL = [
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["simulated", "--windows", "auto"], "--windows cuts a sequence folder"),
+        (["simulated", "--windows", "auto"], "--windows needs a sequence folder"),
         (["{}", "--windows", "many"], "auto, or a number of frames"),
         (["{}", "--windows", "10"], "at least 24 frames"),
         (["{}", "--windows", "auto", "--overlap", "0"], "--overlap 0"),
@@ -84,7 +84,7 @@ def test_frames_without_tissue_and_a_cut_are_one_line_each(tmp_path, capsys):
     said = capsys.readouterr().out
     for line in (
         "left out: frames 30:42: tissue on less than 1% of the pixels\n",
-        "window 001: frames 42:72, cold start, behind frame 41, which is left out\n",
+        "window 001: frames 42:72, cold start, after frame 41, which is left out\n",
         "window 002: frames 72:96, cold start, cut: the picture changes",
     ):
         assert said.count(line) == 1, said

@@ -139,7 +139,7 @@ def test_a_window_that_is_missing_is_named_and_the_others_are_shown(written):
     finally:
         lost.write_bytes(content)
     assert "001.js is missing" in said
-    assert re.search(r'id="failure" hidden', fine) and "View of the camera, nearest frame 000006" in fine
+    assert re.search(r'id="failure" hidden', fine) and "Camera view, nearest frame 000006" in fine
 
 
 @pytest.mark.slow

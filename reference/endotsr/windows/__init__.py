@@ -1,12 +1,12 @@
-"""A recording that goes on for minutes, as windows: runs of their own on overlapping parts of it.
+"""Recordings of several minutes, trained as overlapping windows. Each window is a run.
 
-survey    one pass over the recording, frame by frame      plan     windows from what the pass has found
-record    windows.json                                     make     the windows trained, in the order of their chains
-carry     the state of a neighbour as the start of a window
-scene     one scene to the outside, blended over overlaps  measure  held-out frames and seams of that scene
-follow    points of the tissue across seams                page     the page that loads the window that is played
+survey    one pass over the recording, frame by frame      plan     windows from the surveyed frames
+record    windows.json                                     make     trains the windows, chain by chain
+carry     warm start of a window from its neighbour
+scene     all windows as one scene, blended in overlaps    measure  held-out metrics and flicker at seams
+follow    tissue points tracked across seams               page     viewer page, one script file per window
 
-In: a sequence folder of any length. Out: a run folder with windows/000, windows/001, ..., each of which is a run
-folder, and windows.json. A frame of the recording is counted from 0 among the frames that `sequence.frames` selects;
-frame g of G has the time g / G. The frames, times and cycles of a window are its own.
+In: a sequence folder of any length. Out: a run folder with windows.json and windows/000, windows/001, ..., each a run
+folder. Frames of the recording count from 0 among the frames that `sequence.frames` selects; frame g of G has time
+g / G. Each window has its own frame numbers, times and Fourier cycles.
 """

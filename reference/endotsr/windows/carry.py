@@ -1,14 +1,14 @@
-"""A warm start: the state of a window from its neighbour's, carried over at a frame that both share.
+"""Warm start: the initial state of a window, carried over from its neighbour at a shared frame.
 
-The join is the shared training frame nearest the middle of the overlap, at the time t* of the neighbour and u* of this
-window. The neighbour's Gaussians are deformed to t* and become canonical here:
+The join is the shared training frame nearest the middle of the overlap. Its time is t* in the neighbour and u* in this
+window. The neighbour's Gaussians, deformed to t*, become the canonical Gaussians of this window:
 
     mu = mu_n(t*) - C phi(u*)      q = q_n(t*)      s = s_n(t*)      h_0 = h_0,n + beta tanh(A_n phi_bar(t*)) / Y00
 
-C is fitted to the tracks of the tissue that the Gaussians lie on, as in (B15), or is 0 where the settings start without
-motion. The weights of the FDM and A are 0. At the join the picture is that of the neighbour, to rounding.
+C is fitted to the tracks of the tissue at the Gaussians, as in (B15); it is 0 where the settings start without motion.
+The FDM weights and A are 0. At the join both models render the same picture up to rounding.
 
-In: the run folder of the neighbour, and the sequence of this window. Out: a training state.
+In: the neighbour's run folder and the sequence of this window. Out: a training state.
 """
 
 from dataclasses import replace
@@ -40,26 +40,26 @@ if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
     from endotsr.runs.model import Model
 
-COVERED = 0.5  # least opacity of a pixel that the carried Gaussians show; elsewhere new tissue is added
-MARGIN = 0.1  # of the picture's sides: a Gaussian farther outside of every training frame is out of sight
-CARRIED = 0.8  # of `density.maximum`: most Gaussians that are carried; the rest is left to growth
-CAMERA_TOLERANCE = 1e-3  # of the median depth: how far two windows may see one frame from different places
+COVERED = 0.5  # minimum opacity of a covered pixel; Gaussians are added at the others
+MARGIN = 0.1  # fraction of the picture's sides; Gaussians farther outside every training frame are dropped
+CARRIED = 0.8  # fraction of `density.maximum`: the most Gaussians carried; the rest is left for densification
+CAMERA_TOLERANCE = 1e-3  # fraction of the median depth: largest difference of a shared frame's camera position
 
 
 class CarriedStart(NamedTuple):
-    """The start of a window from its neighbour; a `Beginning` of a job."""
+    """The warm start of a window; a `Beginning` of a job."""
 
     folder: str  # run folder of the neighbour
     shift: int  # frame i of this window is frame i + shift of the neighbour
-    shared: int  # frames that both have, the first ones of this window
-    saved: int  # iterations that a cold start would take more
+    shared: int  # number of shared frames, the first of this window
+    saved: int  # iterations saved compared with a cold start
 
     def about(self) -> StartPart:
-        """`start` of run.json."""
+        """The entry `start` of run.json."""
         return {"carried_from": Path(self.folder).name, "shared_frames": self.shared, "iterations_saved": self.saved}
 
     def state(self, sequence: Sequence, config: Config) -> "TrainingState":
-        """The state. Raises InputError for a neighbour without a usable checkpoint, or of another world."""
+        """The state. Raises InputError if the neighbour has no usable checkpoint or another world origin."""
         from endotsr.runs.folder import open_run
         from endotsr.runs.model import load_model
 
@@ -73,35 +73,35 @@ class CarriedStart(NamedTuple):
 
 
 class Neighbour(NamedTuple):
-    """What is carried over."""
+    """A trained neighbour; `shift` and `shared` as in `CarriedStart`."""
 
     model: "Model"
     times: list[float]  # of all its frames
     shift: int
     shared: int
-    lambda_lap: float | None  # the weight of equation (7), which is not calibrated again
+    lambda_lap: float | None  # calibrated weight of equation (7), reused
 
     def join(self, sequence: Sequence) -> int:
-        """The place among the training frames of the window of the frame at which the state is carried over."""
+        """Index of the join among the training frames of the window."""
         shared = sequence.train_index[sequence.train_index < self.shared]
         if not shared.size:
-            raise InputError("windows: the overlap holds no training frame; allowed: a larger --overlap")
+            raise InputError("windows: the overlap contains no training frame; allowed: a larger --overlap")
         return int(np.abs(shared - (self.shared - 1) / 2).argmin())
 
 
 def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "TrainingState":
-    """The state with which a window begins, before its first iteration.
+    """The state of a window before its first iteration.
 
-    Gaussians that lie outside of every training frame are dropped; if more than 0.8 `density.maximum` are left, so are
-    the faintest. Where the others cover less than half of a pixel of tissue, points are drawn as at a cold start, as
-    many as the uncovered fraction asks for and `density.maximum` allows. Moments are 0. Exposures and poses are those
-    of the neighbour, constant beyond its last frame.
+    Gaussians outside every training frame are dropped. If more than 0.8 `density.maximum` remain, the least opaque are
+    dropped too. At tissue pixels with rendered opacity below 0.5, points are drawn as at a cold start. Their number is
+    proportional to the uncovered fraction and bounded by `density.maximum`. Adam's moments are 0. Exposures and poses
+    are the neighbour's, constant beyond its last frame.
     """
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     place = neighbour.join(sequence)
     gaussians = _canonical(neighbour, int(sequence.train_index[place]), config, dtype)
     frames, weight = _frame_parameters(neighbour, sequence, config, dtype), neighbour.lambda_lap
-    del neighbour  # its arrays are as large as those of this window, whose moments come now
+    del neighbour  # frees its arrays before the moments of this window are allocated
     gaussians = _gathered(gaussians, _kept(gaussians, sequence, max(1, int(CARRIED * config.density.maximum))))
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     if config.initialisation.motion != "none" and config.model.spectral_motion:
@@ -117,15 +117,15 @@ def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "
 
 
 def _refuse_other_world(sequence: Sequence, camera: Camera, folder: str) -> None:
-    """Raises InputError if the neighbour sees the first frame of the window from another place."""
+    """Raises InputError if the camera of the window's first frame differs from the neighbour's."""
     depth = sequence.tissue_depth(0) or 1.0
     if np.abs(sequence.cameras[0].translation - camera.translation).max() > CAMERA_TOLERANCE * depth:
-        raise InputError(f"{folder}: its origin is another one than that of the next window; allowed: windows that"
-                         " start cold (--chain 1), or poses near the origin")  # fmt: skip
+        raise InputError(f"{folder}: its world origin differs from the next window's; allowed: windows that start cold"
+                         " (--chain 1), or poses near the origin")  # fmt: skip
 
 
 def _canonical(neighbour: Neighbour, frame: int, config: Config, dtype: Any) -> Gaussians:
-    """The neighbour's Gaussians at the join as Gaussians that do not move."""
+    """The neighbour's Gaussians at the join, as static Gaussians."""
     model = neighbour.model
     scene, _ = scene_at(model.gaussians, model.spectral, model.config.model, neighbour.times[frame + neighbour.shift])
     harmonics = scene.harmonics.copy()
@@ -142,7 +142,7 @@ def _canonical(neighbour: Neighbour, frame: int, config: Config, dtype: Any) -> 
 
 
 def _kept(gaussians: Gaussians, sequence: Sequence, most: int) -> BoolArray:
-    """(N,) the Gaussians whose centre some training frame sees, or nearly; the `most` opaque of them."""
+    """(N,) True for the `most` opaque Gaussians among those with a centre in or near some training frame."""
     seen = np.zeros(gaussians.count, bool)
     for camera in {id(c): c for c in (sequence.cameras[i] for i in sequence.train_index)}.values():
         u, v, depth = project(camera, gaussians.position)
@@ -162,7 +162,7 @@ def _gathered(gaussians: Gaussians, kept: BoolArray) -> Gaussians:
 
 
 def _with_motion(gaussians: Gaussians, sequence: Sequence, place: int, spectral: Spectral) -> Gaussians:
-    """The Gaussians with motion coefficients that follow the tissue they lie on, at rest at the join."""
+    """The Gaussians with motion coefficients fitted to the tissue tracks; the displacement at the join is 0."""
     frame = int(sequence.train_index[place])
     surface = _surface(gaussians.position.astype(np.float64), sequence, frame)
     tracks = follow(sequence, np.full(gaussians.count, place, np.intp), surface)
@@ -176,7 +176,7 @@ def _with_motion(gaussians: Gaussians, sequence: Sequence, place: int, spectral:
 
 
 def _surface(position: FloatArray, sequence: Sequence, frame: int) -> FloatArray:
-    """(3, N) the tissue that a frame shows where each Gaussian is; the Gaussian itself where it shows none."""
+    """(3, N) tissue point at the projection of each Gaussian in a frame; the Gaussian's centre where there is none."""
     camera, mask, depth = sequence.cameras[frame], sequence.masks[frame], sequence.depth[frame]
     u, v, z = project(camera, position)
     with np.errstate(invalid="ignore"):
@@ -196,7 +196,7 @@ def _new_tissue(
     rng: np.random.Generator,
     dtype: Any,
 ) -> Gaussians | None:
-    """Gaussians where the carried ones cover no tissue; None if they cover all of it."""
+    """New Gaussians at tissue that the carried ones do not cover; None if all of it is covered."""
     missing = np.zeros_like(sequence.masks)
     for i in sequence.train_index:
         scene, _ = scene_at(gaussians, spectral, config.model, float(sequence.times[i]))
@@ -217,13 +217,13 @@ def _new_tissue(
 
 
 def _joined(first: Gaussians, second: Gaussians) -> Gaussians:
-    """The Gaussians of both, which have the same arrays."""
+    """The Gaussians of both sets, which have the same arrays."""
     other = arrays(second)
     return first._replace(**{k: np.concatenate([a, other[k]], axis=-1) for k, a in arrays(first).items()})
 
 
 def _frame_parameters(neighbour: Neighbour, sequence: Sequence, config: Config, dtype: Any) -> FrameParameters | None:
-    """Exposures and poses of the training frames of the window, from those of the neighbour."""
+    """Exposures and poses of the window's training frames, interpolated from the neighbour's."""
     found = frame_parameters(config.model, sequence.times[sequence.train_index], dtype)
     known = neighbour.model.frames
     if found is None or known is None:

@@ -1,14 +1,13 @@
-"""Points of the tissue, followed through a recording and across its seams (B18d).
+"""Tissue points tracked through a recording and across its seams (B18d).
 
-A point X at frame g of a window moves with the Gaussians around it:
+A point X at frame g of a window moves with the nearest Gaussians:
 
     X(g') = X + sum_j w_j (mu_j(g') - mu_j(g)) / sum_j w_j,    w_j = o_j exp(-|X - mu_j(g)|^2 / (2 r^2)),
 
-over the 128 nearest Gaussians, with opacity o_j and their root mean square distance r. The seam of two windows is the
-frame in the middle of their overlap; there a point that has arrived is matched anew, with the Gaussians of the other
-window.
+over the 128 nearest Gaussians, with opacity o_j and root mean square distance r. The seam of two windows is the middle
+frame of their overlap. At a seam, the nearest Gaussians of the next window are selected anew.
 
-In: the scene of the windows, points in its world and their frame. Out: their positions at other frames.
+In: the scene of the windows, points in world coordinates and their frame. Out: their positions at other frames.
 """
 
 from collections.abc import Callable, Iterable
@@ -18,7 +17,7 @@ import numpy as np
 from endotsr.kernels.arrays import FloatArray
 from endotsr.windows.scene import WindowedScene
 
-NEAREST = 128  # Gaussians that move a point; the error of one is of the order of the motion (B18)
+NEAREST = 128  # Gaussians averaged; the error of a single one is as large as the motion (B18)
 
 
 def seam(scene: WindowedScene, k: int) -> int | None:
@@ -30,10 +29,10 @@ def seam(scene: WindowedScene, k: int) -> int | None:
 
 
 def followed(scene: WindowedScene, points: FloatArray, frame: int, frames: Iterable[int]) -> FloatArray:
-    """Positions (F, 3, P) of points (3, P) of frame `frame` at other frames; scene units, world axes.
+    """Positions (F, 3, P) at `frames` of points (3, P) given at `frame`; scene units, world axes.
 
-    Edges:  beyond a cut, or frames that are left out, a position is NaN.
-    Raises: InputError for a frame that no window shows.
+    Edges:  a position is NaN beyond a cut or a gap of left-out frames.
+    Raises: InputError for a frame outside every window.
     """
     chosen = list(frames)
     for g in (frame, *chosen):
@@ -49,7 +48,7 @@ def followed(scene: WindowedScene, points: FloatArray, frame: int, frames: Itera
 def _walked(
     scene: WindowedScene, points: FloatArray, frame: int, wanted: list[tuple[int, int]], step: int
 ) -> Iterable[tuple[int, FloatArray]]:
-    """Positions in one direction of time; `wanted` holds step x frame, ascending, and the place of each frame."""
+    """Positions in one direction of time; `wanted`: pairs of step x frame, ascending, and the index of the frame."""
     k, at = scene.owner(frame), frame
     while wanted:
         bound = seam(scene, k if step > 0 else k - 1)
@@ -66,7 +65,7 @@ def _walked(
 
 
 def _mover(scene: WindowedScene, k: int, points: FloatArray, frame: int) -> Callable[[int], FloatArray]:
-    """Frame -> positions of points of `frame`, by the Gaussians of window k."""
+    """Function frame -> positions of the points given at `frame`, moved by the Gaussians of window k."""
     from scipy.spatial import KDTree
 
     own = scene.window(k)

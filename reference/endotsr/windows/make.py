@@ -1,9 +1,9 @@
-"""The windows of a recording, trained: cold ones independently of one another, warm ones behind their neighbours.
+"""Training of the windows of a recording: cold windows independently, each warm window after its neighbour.
 
-In: a folder with windows.json and config.toml, and a function that makes runs somewhere, as that of a sweep. Out: one
-run folder a window. A chain is a window that starts cold and the warm ones behind it; the first windows of all chains
-are made together, then the second ones, and so on. A window that fails is named and ends nothing else; a warm window
-whose neighbour has failed starts cold. Finished windows are kept, and one that was begun goes on from its checkpoint.
+In: a folder with windows.json and config.toml, and a function that executes runs (`sweeps.place`). Out: one run folder
+per window. A chain is a cold window and the warm windows that follow it. The first windows of all chains are trained
+together, then the second, and so on. A failed window is reported and stops no other; a warm window whose neighbour
+failed starts cold. Finished windows are kept; unfinished ones continue from their checkpoints.
 """
 
 import contextlib
@@ -29,14 +29,14 @@ from endotsr.windows.survey import survey
 
 LOCK = "windows.lock"
 SETTINGS = "config.toml"
-VISITS = 36  # least iterations of a cold window per training frame, unless the length is given
-WARM = 0.4  # of the iterations of a cold window, into which the schedule of a warm one is compressed
+VISITS = 36  # minimum iterations of a cold window per training frame, unless the length is given
+WARM = 0.4  # iterations of a warm window as a fraction of a cold one; its schedule is compressed
 
 
 def plan_recording(source: Path, config: Config, wanted: Wanted, out: Path) -> WindowsRecord:
-    """Survey a recording and write the run folder with the plan of its windows; no window is trained.
+    """Survey a recording and write the run folder with its window plan; train nothing.
 
-    Raises: InputError for settings, a recording or a folder that cannot be used, and where no window remains.
+    Raises: InputError for unusable settings, recording or folder, and if no window remains.
     """
     refuse_existing(out)
     check_wanted(wanted, config.sequence)
@@ -56,24 +56,24 @@ def plan_recording(source: Path, config: Config, wanted: Wanted, out: Path) -> W
 
 
 def with_visits(config: Config) -> Config:
-    """The settings with at least 36 iterations per training frame, so that a longer window is trained for longer.
+    """The settings with at least 36 iterations per training frame.
 
-    36 is what preset `demo` gives a window of 48 frames. 15 leave such a window far from a fit (B18).
+    Preset `demo` trains a window of 48 frames with 36 per frame. With 15 per frame such a window is underfitted (B18).
     """
     return with_settings(config, training={"visits_per_frame": max(VISITS, config.training.visits_per_frame)})
 
 
 def window_length(config: Config, training_frames: int) -> Config:
-    """The settings of a window on so many training frames: `lengthened`, with 36 of its visits on each frame or all.
+    """The settings with the length of a window: `lengthened`, but at least min(36, visits) iterations per frame.
 
-    The length of a clip grows more slowly beyond 64 frames; a window keeps its least length per frame (B18).
+    `lengthened` grows more slowly beyond 64 frames; a window keeps this minimum per frame (B18).
     """
     found, least = lengthened(config, training_frames), min(VISITS, config.training.visits_per_frame) * training_frames
     return found if found.training.iterations >= least else with_iterations(config, least)
 
 
 def recording_settings(run: Path) -> Config:
-    """The settings of a run of windows; those of a window have its frames and its length."""
+    """The settings of a run of windows; `window_job` adds the frames and length of each window."""
     return load_config(run / SETTINGS)
 
 
@@ -83,13 +83,14 @@ def window_folder(run: Path, window: Window) -> Path:
 
 
 def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outcome]:
-    """Train every window that is not finished; returns one outcome per window, in their order.
+    """Train every unfinished window; returns one outcome per window, in order.
 
-    The job of a warm window is made when its neighbour is trained, whose Gaussians are the most that it may hold.
+    The job of a warm window is created after its neighbour's training, because the neighbour's final number of
+    Gaussians is its `density.maximum`.
 
-    outcomes   makes runs
-    Raises:    InputError for a folder that cannot be used, one that is trained already, and a full disk;
-               KeyboardInterrupt with a line that says how to continue.
+    outcomes   executes jobs
+    Raises:    InputError for an unusable folder, one that another process trains, and a full disk; KeyboardInterrupt
+               with a line on how to continue.
     """
     run = Path(run)
     record, config = read_record(run), recording_settings(run)
@@ -112,7 +113,7 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
 
 
 def waves(record: WindowsRecord) -> list[list[int]]:
-    """Windows by their places in their chains: those of one wave do not depend on one another."""
+    """Window numbers grouped by position in their chains; windows of one wave are independent."""
     found: list[list[int]] = []
     place = 0
     for k, window in enumerate(record.windows):
@@ -123,9 +124,9 @@ def waves(record: WindowsRecord) -> list[list[int]]:
 
 
 def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold: bool = False) -> Job:
-    """Window k as a run on its part of the sequence.
+    """The job of window k.
 
-    cold   also where the plan says warm; a window that was begun cold stays so
+    cold   start cold although the plan is warm; a window that was begun cold stays cold
     """
     window, folder = record.windows[k], window_folder(run, record.windows[k])
     config = with_settings(config, sequence={"frames": frame_range(config.sequence.frames, window)})
@@ -136,9 +137,9 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
         neighbour, shorter = record.windows[k - 1], warm_settings(own)
         saved = own.training.iterations - shorter.training.iterations
         shift = window.first - neighbour.first
-        beside = window_folder(run, neighbour)
-        start = CarriedStart(str(beside), shift, record.shared(k), saved)
-        ended = last_entry(beside / "log.jsonl")
+        source = window_folder(run, neighbour)
+        start = CarriedStart(str(source), shift, record.shared(k), saved)
+        ended = last_entry(source / "log.jsonl")
         own = no_larger(shorter, ended["gaussians"] if ended else None)
     return Job(
         window.name, Path(record.source).name, record.source, "", "window", own.training.seed, own, SimulatorSettings(),
@@ -147,17 +148,16 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
 
 
 def warm_settings(cold: Config) -> Config:
-    """The settings of a warm window: the schedule in fewer iterations, residuals and all degrees from the start."""
+    """The settings of a warm window: a compressed schedule, with residuals and all harmonic degrees from the start."""
     shorter = with_iterations(cold, max(1, round(WARM * cold.training.iterations)))
     whole = {"residual_activation": 0, "harmonics_interval": 1, "coarse_start": False}
     return with_settings(shorter, training=whole)
 
 
 def no_larger(config: Config, gaussians: int | None) -> Config:
-    """The settings with at most so many Gaussians, those that the neighbour ended with; unchanged before it is trained.
+    """The settings with at most `gaussians` Gaussians, the neighbour's final number; unchanged if it is None.
 
-    Without this bound each window of a chain adds to the Gaussians that are carried to it, and memory and time grow
-    along the chain.
+    Without this bound each window of a chain would add Gaussians, and memory and time would grow along the chain.
     """
     if gaussians is None or gaussians >= config.density.maximum:
         return config
@@ -165,7 +165,7 @@ def no_larger(config: Config, gaussians: int | None) -> Config:
 
 
 def size_of(job: Job) -> Size:
-    """The size of a window; the folder's first picture is read."""
+    """The size of a window; reads the first picture of the folder."""
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.source_options import SourceOptions
 
@@ -176,9 +176,9 @@ def size_of(job: Job) -> Size:
 
 
 def frame_range(selected: str, window: Window) -> str:
-    """The frames of a window as a range of the whole sequence. `selected`: the range that the recording was cut from.
+    """The frames of a window as a range of the whole sequence; `selected` is the range of the recording.
 
-    Edges:  negative bounds of `selected` count from the end of a folder whose length is not known here: refused.
+    Raises: InputError if `selected` begins with a negative frame: the length of the folder is not known here.
     """
     words = [int(word) if word.strip() else None for word in selected.split(":")] if selected.strip() else []
     first, _, step = (*words, None, None, None)[:3]
@@ -189,7 +189,7 @@ def frame_range(selected: str, window: Window) -> str:
 
 
 def _lonely(job: Job, found: dict[str, Outcome], reporter: Reporter) -> bool:
-    """Whether a warm window that is not begun has no finished neighbour to start from."""
+    """Whether a warm window that is not begun has no finished neighbour; reports it."""
     if not isinstance(job.start, CarriedStart) or Path(job.folder).exists():
         return False
     neighbour = Path(job.start.folder).name
@@ -200,7 +200,7 @@ def _lonely(job: Job, found: dict[str, Outcome], reporter: Reporter) -> bool:
 
 
 def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch, found: dict[str, Outcome]) -> None:
-    """The jobs of one wave, made; their outcomes are added to `found`."""
+    """Execute the jobs of one wave; add their outcomes to `found`."""
     left = []
     for job in jobs:
         if finished_folder(job) is None:
@@ -212,8 +212,8 @@ def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch,
         for outcome in made:
             found[outcome.name] = outcome
             reporter.say(_line(next(job for job in left if job.name == outcome.name), outcome))
-    for job in left:  # a pool that was stopped names no outcome
-        found.setdefault(job.name, Outcome(job.name, FAILED, "not made"))
+    for job in left:  # a stopped pool yields no outcome
+        found.setdefault(job.name, Outcome(job.name, FAILED, "not executed"))
 
 
 def _line(job: Job, outcome: Outcome) -> str:
@@ -225,7 +225,7 @@ def _line(job: Job, outcome: Outcome) -> str:
 
 
 def window_cost(folder: Path) -> dict[str, Any]:
-    """Iterations that a window was trained for, their seconds, and the peak of its memory in bytes (None: unknown)."""
+    """Start, iterations, iterations saved, seconds and peak memory in bytes (None: unknown) of a window's training."""
     record = open_run(folder).record()
     start = record.get("start") or {}
     return {

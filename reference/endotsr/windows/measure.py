@@ -1,15 +1,16 @@
-"""The held-out frames of a windowed run beside the baselines, and the flicker at its seams.
+"""Held-out metrics of a windowed run and of the baselines, and flicker at the seams.
 
-In: the scene of the windows and their sequences, one after another. Out: the dictionary of metrics.json. Frames are
-those of the recording; each is measured in the window with the larger weight, whose training frames the baselines use.
+In: the scene of the windows and their sequences, one at a time. Out: the dictionary of metrics.json. Frame numbers are
+those of the recording. Each frame is measured in the window with the larger weight; the baselines use the training
+frames of that window.
 
-Flicker compares three successive pictures where the tissue is: both neighbours are moved to the middle frame along the
-optical flow of the *recorded* frames, and
+Flicker compares three successive pictures on the tissue. Both neighbours are warped to the middle frame along the
+optical flow of the *recorded* frames:
 
     d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6).
 
-The root mean square of d over the tissue is given for frames in an overlap (at a seam) and for all others (inside), of
-the model and of the recorded frames. It needs no resting camera, unlike `evaluation.measures.flicker`.
+The root mean square of d over the tissue is reported for frames in an overlap (seams) and for all others (inside), for
+the model and for the recorded frames. Unlike `evaluation.measures.flicker`, it also applies to a moving camera.
 """
 
 from collections.abc import Iterator
@@ -27,20 +28,16 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.windows.make import window_cost
 from endotsr.windows.scene import WindowedScene, WindowFrames
 
-LEVELS = 255.0  # flicker is in grey levels of an 8-bit picture
-LEAST_PIXELS = 100  # of tissue that three frames show: with fewer, a frame does not count
+LEVELS = 255.0  # flicker is given in 8-bit grey levels
+LEAST_PIXELS = 100  # tissue pixels common to the three frames; frames with fewer are skipped
 
 
-def measure_windows(
-    scene: WindowedScene, frames: WindowFrames, weights: LpipsWeights | None = None, *, seams: bool = True
-) -> dict[str, Any]:
-    """The metrics of a windowed run.
+def measure_windows(scene: WindowedScene, frames: WindowFrames, weights: LpipsWeights | None = None) -> dict[str, Any]:
+    """The metrics of a windowed run; renders every frame.
 
-    seams     also measure the flicker, for which every frame is rendered
-    returns   the keys of `evaluate_model`, joined over the windows; `windows`, what each of them cost: frames, start,
-              iterations, iterations saved by a warm start, seconds, peak memory, and the mean held-out PSNR of its
-              frames; `left_out`; `seams`: the flicker of `model` and `recorded`, each {"seams", "inside", "ratio"} in
-              grey levels, and the numbers of frames
+    returns   the keys of `evaluate_model`, joined over the windows; `windows`: name, frames, cost (`window_cost`) and
+              mean held-out PSNR of each; `left_out`; `seams`: the flicker of `model` and `recorded`, each {"seams",
+              "inside", "ratio"} in grey levels, and the numbers of frames
     """
     found = [_measured(scene, frames, k, weights) for k in range(len(scene.plan.windows))]
     known = [entry for entry in found if entry is not None]
@@ -52,14 +49,14 @@ def measure_windows(
         for window, folder, entry in zip(scene.plan.windows, scene.folders, found)
     ]
     metrics["left_out"] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
-    metrics["seams"] = _seams(scene, frames) if seams else None
+    metrics["seams"] = _seams(scene, frames)
     return metrics
 
 
 def _measured(
     scene: WindowedScene, frames: WindowFrames, k: int, weights: LpipsWeights | None
 ) -> EvaluationRecord | None:
-    """`evaluate_model` on the frames in which window k has the larger weight; None if none is held out."""
+    """`evaluate_model` on the frames that window k owns (has the larger weight in); None if none is held out."""
     first, held_out = scene.plan.windows[k].first, {scene.frames[j] for j in scene.record.test_index}
     sequence = frames.of_window(k)
     own = [i for i in range(sequence.count) if scene.owner(first + i) == k]
@@ -83,13 +80,13 @@ def _measured(
 
 
 def _rendered(scene: WindowedScene, g: int) -> FloatArray:
-    """The picture of frame g, from its own camera."""
+    """The picture of frame g from its camera, (3, H, W)."""
     camera = scene.window(scene.owner(g)).cameras[g - scene.plan.windows[scene.owner(g)].first]
     return scene.render(g / scene.plan.frames, camera).colour
 
 
 def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
-    """The metrics of all windows as those of one sequence: rows one after another, means over all of them."""
+    """The metrics of all windows as one sequence: concatenated rows and means over all rows."""
 
     def joined_rows(found: list[FramesMeasured]) -> FramesMeasured:
         rows = [row for part in found for row in part["per_frame"]]
@@ -111,7 +108,7 @@ def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
 
 
 def _seams(scene: WindowedScene, frames: WindowFrames) -> dict[str, Any]:
-    """Flicker at seams and inside; a value is None where no frame counts."""
+    """Flicker at seams and inside; None where there is no frame."""
     squares: dict[str, dict[bool, list[float]]] = {name: {True: [], False: []} for name in ("model", "recorded")}
     for at_seam, model, recorded in _flickers(scene, frames):
         squares["model"][at_seam].append(model)
@@ -126,7 +123,7 @@ def _levels(found: dict[bool, list[float]]) -> dict[str, float | None]:
 
 
 def _flickers(scene: WindowedScene, frames: WindowFrames) -> Iterator[tuple[bool, float, float]]:
-    """Each frame with two neighbours: whether an overlap is among the three, mean of d^2 of model and recording."""
+    """Per frame with two neighbours: whether one of the three is in an overlap; mean d^2 of model and recording."""
     for k, window in enumerate(scene.plan.windows):
         last = window.end == scene.plan.frames or k + 1 == len(scene.plan.windows) or not scene.plan.shared(k + 1)
         sequence = frames.of_window(k)
@@ -134,7 +131,7 @@ def _flickers(scene: WindowedScene, frames: WindowFrames) -> Iterator[tuple[bool
         for i in range(1, sequence.count - 1):
             g = window.first + i
             if not last and g >= scene.plan.windows[k + 1].first + 1:
-                break  # the next window has this frame and both neighbours
+                break  # the next window contains this frame and both neighbours
             for j in (i - 1, i, i + 1):
                 if j not in shown:
                     shown[j] = np.clip(_rendered(scene, window.first + j), 0, 1)
@@ -145,7 +142,7 @@ def _flickers(scene: WindowedScene, frames: WindowFrames) -> Iterator[tuple[bool
 
 
 def _squares(sequence: Sequence, i: int, shown: dict[int, FloatArray]) -> tuple[float, float] | None:
-    """Means of d^2 at frame i over the tissue, of renders and recorded frames; None with too little tissue."""
+    """Mean d^2 over the tissue at frame i, of renders and of recorded frames; None with too little tissue."""
     from endotsr.opencv import dense_flow, warp_bilinear
 
     seen, sums = sequence.masks[i].copy(), [-2.0 * shown[i].astype(np.float64), -2.0 * unit_image(sequence, i)]

@@ -1,9 +1,9 @@
-"""The viewer page of a recording: a page that opens at once, and a script file beside it for each window.
+"""The viewer page of a recording: one HTML page and one script file per window.
 
 In: the scene of the windows and their frames. Out: PAGE.html and the folder PAGE_windows with 000.js, 001.js, ... The
-page loads the file of a window when its time is played and drops those that were not used for longest. It needs no
-server: a script file is all that a page opened from a disk may load. In an overlap both windows are drawn and blended
-with the weights of (B18), in colour, depth and opacity alike.
+page loads a window when its time is played and drops the least recently used. It needs no server: browsers allow a page
+opened from disk to load scripts, but no other files. In an overlap both windows are drawn; colour, depth and opacity
+are blended with the weights of (B18).
 """
 
 import json
@@ -30,30 +30,30 @@ from endotsr.views.page import (
 from endotsr.views.trajectories import header, key_times, trajectories
 from endotsr.windows.scene import WindowedScene, WindowFrames
 
-WINDOW_KEYS = 16  # key times of a window unless more or fewer are asked for
-DIGITS = 7  # of cameras, which single precision has
+WINDOW_KEYS = 16  # default number of key times per window
+DIGITS = 7  # significant digits of camera numbers: single precision
 
 
 class PageFiles(NamedTuple):
-    """What was written, in bytes."""
+    """Sizes of the written files, bytes."""
 
     page: int
     windows: list[int]
 
 
 class Span(NamedTuple):
-    """Where a window lies in time, and its file."""
+    """Time span and file of a window."""
 
     name: str
-    frames: str  # in words
+    frames: str  # as text, "0 to 63"
     begin: float  # time of the recording
     end: float
-    file: str  # beside the page
+    file: str  # relative to the page
     count: int  # Gaussians
 
 
 class HeldOutFrame(NamedTuple):
-    """Where a held-out frame is found: its place among those of the window that has the larger weight."""
+    """A held-out frame of the recording: its window, and its index among the held-out frames of that window."""
 
     name: str
     time: float
@@ -62,10 +62,10 @@ class HeldOutFrame(NamedTuple):
 
 
 class PagePart(NamedTuple):
-    """One window, for the page."""
+    """One window of the page."""
 
     span: Span
-    depths: tuple[float, float, float]  # least, largest, and of the pivot
+    depths: tuple[float, float, float]  # minimum, maximum, pivot
     held_out: list[HeldOutFrame]
     script: str  # content of its file
 
@@ -78,14 +78,14 @@ def window_files(page: Path) -> Path:
 def write_windows_page(
     file: Path, scene: WindowedScene, title: str, keys: int, frames: WindowFrames | None = None
 ) -> PageFiles:
-    """Write the windows and then the page; each appears whole or not at all.
+    """Write the windows, then the page. Each is written completely or not at all.
 
-    keys      largest number of key times of each window
-    frames    of the recording; without them the page has no held-out frames and no error
-    returns   the bytes of page and windows
+    keys      maximum number of key times per window
+    frames    of the recording; without them the page shows no held-out frames and no error
+    returns   the sizes of page and windows
 
-    One window is held in memory at a time. The windows of an earlier page of this name are replaced.
-    Raises: InputError if their folder holds anything else.
+    Only one window is in memory at a time. Windows of an earlier page of this name are replaced.
+    Raises: InputError if their folder contains any other file.
     """
     target, parts, sizes = window_files(file), [], []
     _refuse_other_files(target)
@@ -109,7 +109,7 @@ def _refuse_other_files(folder: Path) -> None:
 
 
 def _part(scene: WindowedScene, k: int, keys: int, sequence: Sequence | None, folder: str) -> PagePart:
-    """One window: its Gaussians, cameras and held-out pictures as a script, with the times of the recording."""
+    """One window: Gaussians, cameras and held-out pictures as a script, at times of the recording."""
     window, own, count = scene.plan.windows[k], scene.window(k), scene.plan.frames
     local = np.append(own.record.times, 1.0)
     found = trajectories(own, key_times(own, keys))

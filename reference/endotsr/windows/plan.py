@@ -1,14 +1,14 @@
-"""Windows from what the survey has found: stretches between faults and cuts, each divided into windows that overlap.
+"""Window plan: stretches between faults and cuts, each divided into overlapping windows.
 
-In: the surveyed frames, the length that is asked for, and the split. Out: windows and what is left out, with reasons.
+In: the surveyed frames, the requested length, and the split. Out: windows, and the left-out frames with reasons.
 
-A stretch of L frames becomes m windows. Its frames have the densities d_i: one over the frames of a window if these are
-given, otherwise the larger of 1 / 96 and motion_i / 0.1, so that a window holds about 96 frames, or a path of a tenth
-of the picture's width if that is less. m is the sum of the densities rounded up, and window k begins where their
-running sum reaches k / m of it: windows are shorter where the tissue moves more.
+A stretch is divided into m windows. Frame i has the window density d_i = max(1 / (96 - o), motion_i / 0.1), where o is
+the overlap, or 1 / (n - o) for a given length of n frames. A window then spans at most about 96 frames, and its motion
+adds up to about 10 % of the picture's width. m is the sum of the densities rounded up. Window k begins where the
+running sum of the densities reaches k / m of the total, so windows are shorter where the tissue moves more.
 
-Windows begin at multiples of the period of the split, counted from the stretch, so that a frame is held out in both of
-the windows that share it (ruling in the specification).
+Windows begin at multiples of the split's period, counted from the start of the stretch. A frame in two windows is
+therefore held out in both (ruling in the specification).
 """
 
 from itertools import groupby, pairwise
@@ -23,30 +23,30 @@ from endotsr.windows.record import LeftOut, Window
 from endotsr.windows.survey import SurveyedFrame
 
 LEAST_WINDOW = 16  # frames
-MOST_WINDOW = 96  # frames of a window whose length follows from the motion
-PATH = 0.1  # of the picture's width: summed median flow in such a window; 0.09 in the 63 frames of EndoNeRF pulling
-LEAST_TISSUE = 0.01  # fraction of a frame below which it shows no tissue
-EMPTY_RUN = 8  # frames without tissue in a row that are left out
+MOST_WINDOW = 96  # frames: maximum window length when the length follows from the motion
+PATH = 0.1  # summed median flow per window, fraction of the picture's width; EndoNeRF pulling: 0.09 in 63 frames
+LEAST_TISSUE = 0.01  # a frame with a smaller tissue fraction counts as empty
+EMPTY_RUN = 8  # runs of at least this many empty frames are left out
 
 
 class Wanted(NamedTuple):
-    """What a user asks for."""
+    """The user's options."""
 
-    frames: int | None = None  # of a window; None = from the motion
-    overlap: int = 8  # frames that neighbours share at least
-    chain: int = 1  # windows in a row of which each but the first starts warm
+    frames: int | None = None  # window length; None = from the motion
+    overlap: int = 8  # minimum number of frames shared by neighbours
+    chain: int = 1  # length of a chain; every window but its first starts warm
 
 
 class Stretch(NamedTuple):
-    """Frames without a fault or cut between them."""
+    """Consecutive frames without a fault or cut."""
 
     first: int
     end: int
-    begins: str  # why it begins there, in words
+    begins: str  # why it begins there, as text
 
 
 def check_wanted(wanted: Wanted, split: SequenceConfig) -> None:
-    """Raises InputError for a length, an overlap or a chain that is not allowed, and for a split without windows."""
+    """Raises InputError for an invalid length, overlap or chain, and for the split `end`."""
     least = wanted.overlap + _least_stride(wanted, split_period(split))
     if wanted.chain < 1:
         raise InputError(f"train: --chain {wanted.chain} is not allowed; allowed: an integer >= 1")
@@ -55,17 +55,17 @@ def check_wanted(wanted: Wanted, split: SequenceConfig) -> None:
     if wanted.frames is not None and wanted.frames < least:
         raise InputError(
             f"train: --windows {wanted.frames} is not allowed; allowed: auto, or at least {least} frames with an"
-            f" overlap of {wanted.overlap}, so that no frame is in three windows"
+            f" overlap of {wanted.overlap} (no frame may be in three windows)"
         )
 
 
 def _least_stride(wanted: Wanted, period: int) -> int:
-    """Frames between the starts of two windows: a window overlaps with its neighbours only, and is not all overlap."""
+    """Minimum frames between the starts of two windows: a window overlaps only its neighbours, and not entirely."""
     return max(LEAST_WINDOW, wanted.overlap + period)
 
 
 def split_period(split: SequenceConfig) -> int:
-    """Frames after which the held-out frames repeat. Raises InputError for the split `end`, which has no period."""
+    """Period of the split, frames. Raises InputError for the split `end`, which has none."""
     if split.split == "end":
         raise InputError("train: --windows with the split end: every window would hold out its end; allowed: others")
     periods = {"every_eighth": 8, "every_second": 2, "blocks": max(LEAST_BLOCK_PERIOD, 2 * split.block_length)}
@@ -75,10 +75,10 @@ def split_period(split: SequenceConfig) -> int:
 def planned_windows(
     frames: list[SurveyedFrame], wanted: Wanted, split: SequenceConfig
 ) -> tuple[list[Window], list[LeftOut]]:
-    """Windows and left-out frames, both ascending; without a usable stretch there is no window.
+    """Windows and left-out frames, both ascending; no window if no stretch is usable.
 
-    Edges:  frames that no window covers are left out with their reason: a fault, no tissue in eight frames or more,
-            a stretch with too few frames for the split.
+    Edges:  reasons to leave frames out: a fault, at least eight successive frames without tissue, a stretch with too
+            few frames for the split.
     """
     check_wanted(wanted, split)
     stretches, left_out = stretches_of(frames)
@@ -92,21 +92,21 @@ def planned_windows(
 
 
 def stretches_of(frames: list[SurveyedFrame]) -> tuple[list[Stretch], list[LeftOut]]:
-    """Stretches between faults, cuts and runs of frames without tissue, and the frames in none of them."""
+    """Stretches between faults, cuts and runs of empty frames, and the frames left out."""
     reasons = _reasons(frames)
     stretches, left_out, begins = [], [], "the recording begins"
     bounds = [0, *(i for i in range(1, len(frames)) if frames[i].cut or reasons[i] != reasons[i - 1]), len(frames)]
     for first, end in pairwise(bounds):
         if reasons[first]:
             left_out.append(LeftOut(first=first, end=end, reason=reasons[first]))
-            begins = f"behind frame {end - 1}, which is left out"
+            begins = f"after frame {end - 1}, which is left out"
             continue
         stretches.append(Stretch(first, end, f"cut: {frames[first].cut}" if frames[first].cut else begins))
     return stretches, left_out
 
 
 def _reasons(frames: list[SurveyedFrame]) -> list[str]:
-    """Why each frame is left out; "" for a frame that is not."""
+    """Why each frame is left out; "" if it is used."""
     reasons = [frame.fault for frame in frames]
     empty = [not frame.fault and frame.tissue < LEAST_TISSUE for frame in frames]
     for without_tissue, places in groupby(range(len(frames)), empty.__getitem__):
@@ -117,7 +117,7 @@ def _reasons(frames: list[SurveyedFrame]) -> list[str]:
 
 
 def _too_short(stretch: Stretch, split: SequenceConfig) -> str:
-    """Why a stretch holds no window, in words; "" if it does."""
+    """Why a stretch is too short for a window, as text; "" if it is not."""
     count = stretch.end - stretch.first
     if count < LEAST_WINDOW:
         return f"{count} frames between cuts or faults; a window has at least {LEAST_WINDOW}"
@@ -129,7 +129,7 @@ def _too_short(stretch: Stretch, split: SequenceConfig) -> str:
 
 
 def _windows_of(stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted, period: int, named: int) -> list[Window]:
-    """The windows of a stretch; `named` windows come before them."""
+    """The windows of a stretch; `named` is the number of windows before it."""
     length, least = stretch.end - stretch.first, _least_stride(wanted, period)
     sums = np.concatenate([[0.0], np.cumsum(_densities(stretch, frames, wanted))])
     count = max(1, int(np.ceil(sums[-1] - 1e-9)))
@@ -151,7 +151,7 @@ def _windows_of(stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted, p
 
 
 def _densities(stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted) -> list[float]:
-    """Windows per frame, for every frame of a stretch but those that the last window shares with nobody."""
+    """Windows per frame, for all frames of a stretch but the last `overlap` ones; at least one frame."""
     count = stretch.end - stretch.first - wanted.overlap
     if wanted.frames is not None:
         return [1.0 / (wanted.frames - wanted.overlap)] * max(count, 1)

@@ -1,10 +1,10 @@
-"""windows.json: the frames of every window and how it starts. Written once, before the first window is trained.
+"""windows.json: frames and start of every window. Written once, before training.
 
     {"format": "endotsr-windows-1", "source": "/data/recording", "frames": 400, "overlap": 8, "chain": 1,
      "windows": [{"name": "000", "first": 0, "end": 64, "start": "cold", "begins": "the recording begins"}, ...],
      "left_out": [{"first": 120, "end": 121, "reason": "..."}]}
 
-`first` and `end` count the frames that `sequence.frames` of config.toml selects; `end` is the first frame behind.
+`first` and `end` count the frames that `sequence.frames` of config.toml selects; `end` is exclusive.
 """
 
 from pathlib import Path
@@ -29,9 +29,9 @@ class Window(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     name: Annotated[str, msgspec.Meta(pattern="^[0-9]{3,8}$")]  # of its folder
     first: Count  # frame
-    end: PositiveCount  # the first frame behind it
-    start: Literal["cold", "warm"]  # from the initialisation, or from the state of the window before
-    begins: Words  # why it begins where it does
+    end: PositiveCount  # exclusive
+    start: Literal["cold", "warm"]  # from the initialisation, or from the previous window
+    begins: Words  # why it begins there
 
     @property
     def count(self) -> int:
@@ -40,7 +40,7 @@ class Window(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class LeftOut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Frames that are in no window."""
+    """Frames outside every window."""
 
     first: Count
     end: PositiveCount
@@ -48,23 +48,23 @@ class LeftOut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class WindowsRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """All of windows.json."""
+    """The content of windows.json."""
 
     format: Literal["endotsr-windows-1"] = FORMAT
     source: Words
-    frames: PositiveCount  # of the recording, those left out included
-    overlap: Count  # frames that neighbours share at least
-    chain: PositiveCount  # windows in a row of which each but the first starts warm
+    frames: PositiveCount  # of the recording, including the left-out ones
+    overlap: Count  # minimum number of frames shared by neighbours
+    chain: PositiveCount  # length of a chain; every window but its first starts warm
     windows: list[Window]
     left_out: list[LeftOut] = []
 
     def shared(self, k: int) -> int:
-        """Frames that window k shares with the window before; 0 for the first and behind a cut."""
+        """Number of frames that window k shares with window k - 1; 0 for the first window and after a cut."""
         return max(0, self.windows[k - 1].end - self.windows[k].first) if k else 0
 
 
 def is_windowed(run: Path) -> bool:
-    """Whether a run folder is one of windows."""
+    """Whether a run folder contains windows."""
     return (Path(run) / FILE).is_file()
 
 
@@ -76,8 +76,8 @@ def write_record(run: Path, record: WindowsRecord) -> None:
 def read_record(run: Path) -> WindowsRecord:
     """windows.json of a run folder, checked.
 
-    Raises: InputError naming file and key: not of this type, a window that is empty, reaches beyond the recording, is
-            out of order, or shares frames with more than its neighbours; a first or lonely window that starts warm.
+    Raises: InputError naming file and key: a wrong type; a window that is empty, out of range, out of order, or shares
+            frames with a window other than its neighbours; a warm window that shares no frame with the previous one.
     """
     path = Path(run) / FILE
     record = typed(read_json(path), WindowsRecord, path)
@@ -90,16 +90,16 @@ def read_record(run: Path) -> WindowsRecord:
 
 
 def _wrong(record: WindowsRecord, k: int, window: Window) -> str:
-    """What is wrong with a window, in words; "" if nothing is."""
+    """The fault of a window, as text; "" if it is valid."""
     windows = record.windows
     if window.name != f"{k:03d}":
         return f"allowed: the name {k:03d}, in the order of the frames"
     if not window.first < window.end <= record.frames:
         return f"frames {window.first}:{window.end}; allowed: first < end <= {record.frames}"
     if k and not (windows[k - 1].first < window.first and windows[k - 1].end < window.end):
-        return "begins or ends no later than the window before"
+        return "begins or ends no later than the previous window"
     if k > 1 and windows[k - 2].end > window.first:
-        return "shares frames with the window before the last"
+        return f"shares frames with window {k - 2:03d}; allowed: only with its neighbours"
     if window.start == "warm" and not record.shared(k):
-        return "starts warm without a frame that it shares with the window before"
+        return "starts warm but shares no frame with the previous window"
     return ""

@@ -1,4 +1,4 @@
-"""A run of windows from Python: what `endotsr.open_run` returns for one."""
+"""The Python interface of a run of windows; `endotsr.open_run` returns it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ from endotsr.windows.scene import WindowedScene, WindowFrames, open_windows
 
 @dataclass(eq=False, repr=False)
 class WindowedRun:
-    """A recording that was trained in windows. It renders and is measured as one run."""
+    """A recording trained in windows, rendered and evaluated as one run."""
 
     path: Path
-    _source: str | None = None  # where the sequence is; None = where the records say
+    _source: str | None = None  # folder of the sequence; None = as recorded
 
     def __repr__(self) -> str:
         return f"WindowedRun({len(self.scene.plan.windows)} windows, {len(self.scene.frames)} frames)"
@@ -36,39 +36,39 @@ class WindowedRun:
 
     @property
     def sequence_record(self) -> SequenceRecord:
-        """Times, names, split and unit of the frames that windows cover."""
+        """Times, names, split and unit of the covered frames."""
         return self.scene.record
 
     def render(self, time: float, camera: Camera | int | None = None, *, without: tuple[str, ...] = ()) -> RenderOut:
         """Colour (3, H, W) in display units, depth (H, W) in scene units and opacity (H, W), as `Run.render`.
 
         time      of the recording, in [0, 1]; frame g of G is at g / G
-        camera    a Camera, or the place of a frame in `sequence_record`; default: that of the frame nearest in time
+        camera    a Camera, or the index of a frame in `sequence_record`; default: the camera of the nearest frame
         without   spectral components to leave out: "appearance", "spectral_motion"
 
-        In an overlap the renders of both windows are blended, with weights linear in time.
-        Raises: InputError for a time that no window shows, and for a frame or component that does not exist.
+        In an overlap the renders of both windows are blended with weights linear in time.
+        Raises: InputError for a time outside every window, and for a frame or component that does not exist.
         """
         return self.scene.picture(time, camera, without)
 
     def follow(self, points: FloatArray, frame: int, frames: Sequence[int]) -> FloatArray:
-        """Positions (F, 3, P) of points (3, P) that are tissue at one frame, at other frames; scene units, world axes.
+        """Positions (F, 3, P) at `frames` of tissue points (3, P) given at `frame`; scene units, world axes.
 
         frame, frames   of the recording, counted from 0
 
-        A point moves with the Gaussians around it, and passes to those of the next window in the middle of an overlap
-        (B18d). Behind a cut its position is NaN. Raises: InputError for a frame that no window shows.
+        A point moves with the nearest Gaussians; in the middle of an overlap the next window takes over (B18d). Its
+        position is NaN beyond a cut. Raises: InputError for a frame outside every window.
         """
         from endotsr.windows.follow import followed
 
         return followed(self.scene, points, frame, frames)
 
     def view(self, path: str | Path, *, held_out: bool = False) -> Path:
-        """Write the page that plays the recording, and the folder of its windows beside it; returns the page.
+        """Write the viewer page and, in the same folder, the folder of its windows; returns the page.
 
-        held_out  also show the held-out frames, for which the sequence is read
+        held_out  also show the held-out frames; this reads the sequence
 
-        Raises: InputError for a name that is not that of a page, and for a folder of windows that holds other files.
+        Raises: InputError if `path` is no .html name, or if the folder of windows contains other files.
         """
         from endotsr.views.page import check_page
         from endotsr.windows.page import WINDOW_KEYS, write_windows_page
@@ -80,9 +80,9 @@ class WindowedRun:
         return path
 
     def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
-        """Metrics of the held-out frames of all windows, what each window cost, and the flicker at seams.
+        """Held-out metrics of all windows, the cost of each window, and the flicker at seams.
 
-        lpips     AlexNet LPIPS weights (.npz); without them the LPIPS values are None
+        lpips     AlexNet LPIPS weights (.npz); without them LPIPS is None
         returns   the keys of `windows.measure.measure_windows`
 
         Raises: InputError if the sequence or the weights cannot be used.

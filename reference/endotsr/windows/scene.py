@@ -1,13 +1,13 @@
-"""One scene to the outside: a run of windows that renders at any time, blended where two windows overlap.
+"""A run of windows as one scene that renders at any time, blended where two windows overlap.
 
 In: a run folder with windows.json and trained windows. Out: a `MovingScene` of the whole recording. Frame g of G has
-the time g / G, and its camera is that of the window with the larger weight.
+time g / G and the camera of the window with the larger weight.
 
-Where window k + 1 begins with frame b and window k ends before frame e, the weight of window k + 1 at frame g is
+If window k + 1 begins at frame b and window k ends before frame e, window k + 1 has the weight
 
     w(g) = (g - b) / (e - b),    b <= g <= e,
 
-and that of window k is 1 - w. Colour, depth and opacity are blended with these weights. At most two models are held in
+at frame g, and window k has 1 - w. Colour, depth and opacity are blended with these weights. At most two models are in
 memory.
 """
 
@@ -36,42 +36,42 @@ from endotsr.windows.make import window_folder
 from endotsr.windows.record import FOLDER, WindowsRecord, is_windowed, read_record
 
 EMPTY = WindowsRecord(source="", frames=1, overlap=0, chain=1, windows=[])
-KEPT = 2  # windows whose models are held in memory
+KEPT = 2  # windows with a model in memory
 
 
 class WindowPart(NamedTuple):
-    """A window that shows a time."""
+    """The contribution of a window at a time."""
 
     window: int
     time: float  # of the window, in [0, 1]
-    weight: float  # in [0, 1]; those of a time sum to 1
+    weight: float  # in [0, 1]; the weights at a time sum to 1
 
 
 @dataclass(frozen=True)
 class WindowedScene(MovingScene):
-    """A scene made of windows; `record` lists the frames that windows cover."""
+    """A scene made of windows; `record` lists the covered frames."""
 
     run: Path = Path()
     plan: WindowsRecord = EMPTY
 
     @property
     def model(self) -> Model:
-        """The model of the first window: for what all windows have in common."""
+        """The model of the first window, for properties common to all windows."""
         return self.window(0).model
 
     @cached_property
     def window(self) -> Any:
-        """Window number -> its `MovingScene`; the last ones are kept."""
+        """Function window number -> `MovingScene`; caches the last ones."""
         return lru_cache(KEPT)(lambda k: open_scene(window_folder(self.run, self.plan.windows[k])))
 
     @cached_property
     def frames(self) -> list[int]:
-        """The frames of the recording that windows cover, ascending: those that `record` lists."""
+        """The covered frames of the recording, ascending, as listed by `record`."""
         return covered(self.plan)
 
     @cached_property
     def cameras(self) -> list[Camera]:
-        """The cameras of the covered frames, each with the corrections of the window that has the larger weight."""
+        """The cameras of the covered frames, each with the pose correction of the window with the larger weight."""
         found: dict[int, list[Camera]] = {}
         chosen = []
         for g in self.frames:
@@ -82,9 +82,9 @@ class WindowedScene(MovingScene):
         return chosen
 
     def parts(self, g: float) -> list[WindowPart]:
-        """The windows that show the frame g, which may lie between two frames. Raises InputError where none does.
+        """The windows at frame g, not necessarily an integer. Raises InputError if there is none.
 
-        A window shows the times from its first frame to the frame behind its last.
+        A window covers the times from its first frame to its exclusive end.
         """
         found = []
         for k, window in enumerate(self.plan.windows):
@@ -93,7 +93,7 @@ class WindowedScene(MovingScene):
         if not found:
             gap = next((gap for gap in self.plan.left_out if gap.first <= g < gap.end), None)
             why = f": frames {gap.first}:{gap.end} are left out: {gap.reason}" if gap else ""
-            raise InputError(f"{self.run}: no window shows time {g / self.plan.frames:g}{why}")
+            raise InputError(f"{self.run}: no window covers time {g / self.plan.frames:g}{why}")
         if len(found) == 1:
             return found
         before, after = found
@@ -102,14 +102,14 @@ class WindowedScene(MovingScene):
         return [before._replace(weight=1.0 - weight), after._replace(weight=weight)]
 
     def owner(self, g: float) -> int:
-        """The window with the larger weight; the earlier one of equal weights."""
+        """The window with the larger weight; of equal weights, the earlier window."""
         return max(self.parts(g), key=lambda part: (part.weight, -part.window)).window
 
     def _shown_later(self, k: int, g: float) -> bool:
         return k + 1 < len(self.plan.windows) and self.plan.windows[k + 1].first <= g
 
     def local_time(self, k: int, g: float) -> float:
-        """The time of window k at frame g: linear between the times of its frames, 1 at the frame behind the last."""
+        """The time of window k at frame g: linear between the times of its frames, 1 at its exclusive end."""
         window, times = self.plan.windows[k], self._times[k]
         return float(np.interp(g - window.first, np.arange(window.count + 1), [*times, 1.0]))
 
@@ -123,19 +123,20 @@ class WindowedScene(MovingScene):
         return [open_run(window_folder(self.run, window)) for window in self.plan.windows]
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
-        """As `MovingScene.render`, blended over an overlap."""
+        """As `MovingScene.render`, blended in an overlap."""
         parts = [part for part in self.parts(time * self.plan.frames) if part.weight > 0]
         renders = [self.window(part.window).render(part.time, camera, taken_out) for part in parts]
         return blended(renders, [part.weight for part in parts])
 
     def at(self, time: float, taken_out: tuple[str, ...] = ()) -> DeformedScene:
-        """The deformed Gaussians at a time, of the window with the larger weight: two sets would occlude each other."""
-        part = max(self.parts(time * self.plan.frames), key=lambda part: (part.weight, -part.window))
-        return self.window(part.window).at(part.time, taken_out)
+        """The deformed Gaussians of the window with the larger weight: two sets would occlude each other."""
+        g = time * self.plan.frames
+        k = self.owner(g)
+        return self.window(k).at(self.local_time(k, g), taken_out)
 
 
 def blended(renders: list[RenderOut], weights: list[float]) -> RenderOut:
-    """The weighted sum of renders of one view: colour, depth and opacity. One render is returned as it is."""
+    """The weighted sum of colour, depth and opacity of renders of one view. A single render is returned unchanged."""
     if len(renders) == 1:
         return renders[0]
 
@@ -149,26 +150,26 @@ def blended(renders: list[RenderOut], weights: list[float]) -> RenderOut:
 
 
 def covered(plan: WindowsRecord) -> list[int]:
-    """The frames that windows cover, ascending."""
+    """The frames covered by windows, ascending."""
     return sorted({g for window in plan.windows for g in range(window.first, window.end)})
 
 
 def open_any(path: Path) -> MovingScene:
-    """A scene to render: a run of windows, or what `open_scene` takes. Raises InputError."""
+    """A scene to render: a run of windows, or any input of `open_scene`. Raises InputError."""
     return open_windows(Path(path)) if is_windowed(path) else open_scene(path)
 
 
 def refuse_one_set(path: Path, out: Path) -> None:
-    """Raises InputError for a file that holds one set of Gaussians, of a run of windows, which has many."""
+    """Raises InputError if a run of windows is to be exported to a format for one set of Gaussians."""
     if is_windowed(path) and out.suffix.lower() in (".npz", ".glb"):
         raise InputError(
-            f"{out}: holds one set of Gaussians, and {path} has one in each window; allowed: .ply files, a page, or the"
-            f" run of a window, {path / FOLDER / '000'}"
+            f"{out}: this format stores one set of Gaussians, but {path} has one per window; allowed: .ply files, a"
+            f" page, or the run of a window, {path / FOLDER / '000'}"
         )
 
 
 def open_windows(run: Path) -> WindowedScene:
-    """The scene of a run of windows. Raises InputError if a window has no usable record, or none is trained yet."""
+    """The scene of a run of windows. Raises InputError if a window has no usable record or no checkpoint."""
     plan = read_record(run)
     folders = [open_run(window_folder(run, window)) for window in plan.windows]
     for folder in folders:
@@ -178,10 +179,10 @@ def open_windows(run: Path) -> WindowedScene:
 
 
 def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecord:
-    """The record of the sequence as one window of the covered frames would have it.
+    """The record of the covered frames as one sequence.
 
-    A frame is held out if every window that has it holds it out. `cameras` are those of the first window where the
-    camera rests; a moving one has them in `WindowedScene.cameras`.
+    A frame is held out if every window that contains it holds it out. `cameras` are the first window's, valid for a
+    static camera; for a moving one see `WindowedScene.cameras`.
     """
     names: dict[int, str] = {}
     trained: set[int] = set()
@@ -205,7 +206,7 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
 def shown_frames(
     scene: MovingScene, panels: tuple[Panel, ...], views: list[PlannedView], source: str | None
 ) -> "Sequence | WindowFrames | None":
-    """The frames that truth and error of a film are shown from, as `views.pictures.frames_of`."""
+    """The recorded frames for the panels truth and error of a film, as `views.pictures.frames_of`."""
     if not isinstance(scene, WindowedScene):
         return frames_of(scene, panels, views, source)
     check_panels(panels, views)
@@ -213,9 +214,9 @@ def shown_frames(
 
 
 class WindowFrames:
-    """The frames of a recording, read window by window as they are asked for in ascending order.
+    """The frames of a recording. One window is in memory at a time: ask for frames in ascending order.
 
-    Raises: InputError if the sequence of a window cannot be found or is not the one that it was trained on.
+    Raises: InputError if the sequence of a window is missing or differs from its training sequence.
     """
 
     def __init__(self, scene: WindowedScene, source: str | None = None) -> None:
@@ -227,7 +228,7 @@ class WindowFrames:
         return self._sequence(k)
 
     def frame(self, index: int) -> Frame:
-        """Frame `index` of those that `record` of the scene lists, with its time in the recording."""
+        """Frame `index` of the scene's `record`, with its time in the recording."""
         g = self._scene.frames[index]
         k = self._scene.owner(g)
         found = self.of_window(k).frame(g - self._scene.plan.windows[k].first)

@@ -1,7 +1,7 @@
-"""One pass over a recording, frame by frame: which frames are damaged, where it is cut, and how much the tissue moves.
+"""Survey of a recording, frame by frame: damaged frames, cuts, and tissue motion.
 
-In: a folder that `train` reads, and the settings of its section `sequence`. Out: one `SurveyedFrame` for every selected
-frame. Two frames are held in memory, however long the recording is.
+In: a folder that `train` accepts, and the settings of section `sequence`. Out: one `SurveyedFrame` per selected frame.
+Only two frames are in memory at a time.
 """
 
 from collections.abc import Iterator
@@ -22,45 +22,45 @@ from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.splits import parse_frame_range
 from endotsr.splatting.camera import degrees_between
 
-LEAST_CORRELATION = 0.5  # of a frame with the one before, moved along the flow: below it another scene begins
-LARGEST_STEP = 0.1  # of the depth: a camera that moves farther between two frames has jumped
-LARGEST_TURN = 10.0  # degrees
-LEAST_PIXELS = 100  # of tissue that both frames show: with fewer, neither motion nor a cut is measured
+LEAST_CORRELATION = 0.5  # of successive frames after warping along the flow; a lower value is a cut
+LARGEST_STEP = 0.1  # camera translation between successive frames, fraction of the depth; a larger one is a cut
+LARGEST_TURN = 10.0  # camera rotation between successive frames, degrees; a larger one is a cut
+LEAST_PIXELS = 100  # tissue pixels common to both frames; with fewer, motion and correlation are not measured
 
 
 class SurveyedFrame(NamedTuple):
-    """What the pass has found in one frame."""
+    """The measurements of one frame."""
 
     name: str
     fault: str = ""  # why the frame cannot be read, one line
-    cut: str = ""  # why another scene begins with this frame, in words
+    cut: str = ""  # why another scene begins with this frame, as text
     tissue: float = 0.0  # fraction of the pixels
-    motion: float = 0.0  # median length of the flow of the tissue from the frame before, fraction of the width
+    motion: float = 0.0  # median tissue flow from the previous frame, fraction of the width
 
 
 class _Shown(NamedTuple):
-    """One frame at the working size."""
+    """One frame at working size."""
 
     grey: NDArray[np.uint8]  # (h, w)
     mask: BoolArray  # (h, w) True = tissue
     pose: CameraPose | None
-    depth: float | None  # median over the tissue, unit of the recording
+    depth: float | None  # median over the tissue, recording units
 
 
 def survey(source: Path, config: SequenceConfig) -> list[SurveyedFrame]:
     """Read every selected frame once.
 
-    Motion and cuts are measured between frames that follow one another and can both be read. A frame begins another
-    scene if its correlation with the frame before, moved along the flow, is below 0.5, or if the camera moves by more
-    than a tenth of the depth or turns by more than 10 degrees.
+    Motion and cuts are measured between successive readable frames. A frame begins another scene if, after warping
+    along the flow, its correlation with the previous frame is below 0.5, or if the camera translates by more than 10 %
+    of the depth or rotates by more than 10 degrees.
 
-    Raises: InputError for a folder that `train` does not read, and for one of arbitrary unit, whose windows would each
-            have a scale of their own. A frame that cannot be read raises nothing: its fault says why.
+    Raises: InputError for a folder that `train` does not accept, and for a recording of arbitrary unit, because each
+            window would have its own scale. An unreadable frame raises nothing; `fault` gives the reason.
     """
     readable_layout(source)
     recording = open_recording(source, SourceOptions(excluded_value=config.excluded_value))
     if recording.unit == ARBITRARY:
-        raise InputError(f"{source}: its unit is arbitrary, and each window would have a scale of its own; allowed: mm")
+        raise InputError(f"{source}: its unit is arbitrary, so each window would have its own scale; allowed: mm")
     try:
         frames = parse_frame_range(config.frames, recording.count)
     except InputError as error:
@@ -85,7 +85,7 @@ def _surveyed(recording: Recording, frames: range, masked: bool) -> Iterator[Sur
 
 
 def _shown(recording: Recording, i: int, masked: bool) -> _Shown:
-    """Frame i. Raises InputError if a file of it cannot be read."""
+    """Frame i. Raises InputError if one of its files cannot be read."""
     picture = next(iter(recording.pictures([i]))).left
     lens = recording.lens
     if lens is not None and picture.shape[:2] != (lens.height, lens.width):
@@ -101,7 +101,7 @@ def _shown(recording: Recording, i: int, masked: bool) -> _Shown:
 
 
 def _reduced(grey: NDArray[np.uint8], tissue: BoolArray) -> tuple[NDArray[np.uint8], BoolArray]:
-    """The working size: at most `WIDEST` columns; a pixel is tissue where all that it covers are."""
+    """Reduce to working size, at most `WIDEST` columns; a pixel is tissue if all covered pixels are."""
     from endotsr.opencv import area_resize
 
     side = -(-grey.shape[1] // WIDEST)
@@ -110,7 +110,7 @@ def _reduced(grey: NDArray[np.uint8], tissue: BoolArray) -> tuple[NDArray[np.uin
 
 
 def _between(before: _Shown, shown: _Shown) -> dict[str, float | str]:
-    """Motion from one frame to the next, and why they do not belong to one scene."""
+    """`motion` and `cut` between two successive frames."""
     from endotsr.opencv import dense_flow, warp_bilinear
 
     jump = _jump(before, shown)
@@ -129,14 +129,14 @@ def _between(before: _Shown, shown: _Shown) -> dict[str, float | str]:
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:
-    """Of two lists of grey levels; 1 where one of them is constant, which says nothing."""
+    """Pearson correlation of two lists of grey levels; 1 if one of them is constant."""
     a, b = a - a.mean(), b - b.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b) / size if size > 0 else 1.0
 
 
 def _jump(before: _Shown, shown: _Shown) -> str:
-    """How far the camera has jumped, in words; "" if it has not."""
+    """The camera's jump as text; "" if there is none."""
     if before.pose is None or shown.pose is None:
         return ""
     centres = [-pose.rotation.T @ pose.translation for pose in (before.pose, shown.pose)]
