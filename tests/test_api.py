@@ -117,7 +117,7 @@ def test_a_sequence_is_loaded_as_the_command_loads_it(sequence, tmp_path):
         ({"source": "simulated", "size": 2}, "unknown key sequence.size"),
         ({"source": "simulated", "simulator": {"frame": 9}}, "simulator: unknown key frame"),
         ({"source": "simulated", "simulator": {"frames": 2}}, "simulator: frames = 2 is not allowed"),
-        ({"source": "arrays in memory"}, "folder that holds the same frames"),
+        ({"source": "arrays in memory"}, "a folder with the same frames"),
     ],
 )
 def test_sequences_that_cannot_be_loaded(given, named):
@@ -242,7 +242,7 @@ def test_a_saved_run_opens_with_the_same_bits_and_the_commands_read_it(run, tmp_
     for name in ("colour", "depth", "opacity"):
         a, b = getattr(opened.render(0.37), name), getattr(run.render(0.37), name)
         assert a.tobytes() == b.tobytes(), name
-    with pytest.raises(endotsr.InputError, match="holds a run already"):
+    with pytest.raises(endotsr.InputError, match="already contains a run"):
         run.save(path)
     metrics = run.evaluate()
     assert opened.evaluate() == metrics
@@ -260,7 +260,7 @@ def test_arrays_in_memory_train_and_are_saved(sequence, run, tmp_path):
     path = trained.save(tmp_path / "run")
     opened = endotsr.open_run(path)
     assert arrays(opened) == arrays(run)
-    with pytest.raises(endotsr.InputError, match="folder that holds the same frames"):
+    with pytest.raises(endotsr.InputError, match="a folder with the same frames"):
         opened.evaluate()
 
 

@@ -46,13 +46,13 @@ def forget_settings(file):
 
 
 EDITS = [
-    ("bases = 17", "bases = 9", "model.bases = 17", "says 9"),
-    ("frequencies = 8", "frequencies = 4", "model.frequencies = 8", "says 4"),
-    ("harmonics_degree = 3", "harmonics_degree = 1", "model.harmonics_degree = 3", "says 1"),
-    ('precision = "float32"', 'precision = "float64"', "training.precision = 'float32'", "says 'float64'"),
-    ("appearance = true", "appearance = false", "model.appearance = True", "says False"),
-    ("spectral_motion = true", "spectral_motion = false", "model.spectral_motion = True", "says False"),
-    ("deformation = true", "deformation = false", "model.deformation = True", "says False"),
+    ("bases = 17", "bases = 9", "model.bases = 17", "has 9"),
+    ("frequencies = 8", "frequencies = 4", "model.frequencies = 8", "has 4"),
+    ("harmonics_degree = 3", "harmonics_degree = 1", "model.harmonics_degree = 3", "has 1"),
+    ('precision = "float32"', 'precision = "float64"', "training.precision = 'float32'", "has 'float64'"),
+    ("appearance = true", "appearance = false", "model.appearance = True", "has False"),
+    ("spectral_motion = true", "spectral_motion = false", "model.spectral_motion = True", "has False"),
+    ("deformation = true", "deformation = false", "model.deformation = True", "has False"),
 ]
 
 
@@ -69,13 +69,13 @@ def test_an_edited_setting_that_shapes_the_arrays_is_refused(old, new, trained, 
 def test_any_other_edited_setting_is_refused(run, capsys):
     edit(run, "beta = 0.3", "beta = 0.5")
     for words in commands(run):
-        assert_refused(capsys, words, "trained with model.beta = 0.3", f"{run / 'config.toml'} says 0.5")
+        assert_refused(capsys, words, "trained with model.beta = 0.3", f"{run / 'config.toml'} has 0.5")
 
 
 def test_empty_settings_are_refused(run, capsys):
     (run / "config.toml").write_text("")
     for words in commands(run):
-        assert_refused(capsys, words, "trained with loss.smoothness_from = 5", "says 1001")
+        assert_refused(capsys, words, "trained with loss.smoothness_from = 5", "has 1001")
 
 
 def test_the_checkpoint_of_another_run_is_refused(run, tmp_path, capsys):
@@ -83,7 +83,7 @@ def test_the_checkpoint_of_another_run_is_refused(run, tmp_path, capsys):
     assert main(train_words(other, "--no-evaluate", "--iterations", "3", "--seed", "4")) == 0
     shutil.copy(other / "checkpoint.npz", run)
     for words in commands(run):
-        assert_refused(capsys, words, f"{run / 'checkpoint.npz'}: trained with ", f"{run / 'config.toml'} says ")
+        assert_refused(capsys, words, f"{run / 'checkpoint.npz'}: trained with ", f"{run / 'config.toml'} has ")
 
 
 def test_a_checkpoint_from_before_the_residuals_is_of_the_run(run, tmp_path, monkeypatch):

@@ -244,7 +244,7 @@ def folder_vanishes(bench: Bench) -> tuple[bool, str]:
         return endotsr_quietly(train_words(out, "--no-evaluate"), said)
 
     code, text = in_child(work), said.read_text()
-    told = "the run folder has vanished" in text and "Traceback" not in text
+    told = "the run folder was deleted" in text and "Traceback" not in text
     return code == 2 and told and bench.finish(out), "one line and exit code 2; a new training is bitwise equal"
 
 

@@ -48,7 +48,7 @@ def test_the_iteration_stops_before_a_parameter_is_changed(name, value, trained,
     spoiled(monkeypatch, 17, name, value)
     code, said = run_line(capsys, *train_words(out, "--no-evaluate"))
     assert code == 1 and said.count("diverged: non-finite") == 1
-    assert "iteration 17, frame " in said and name in said and "diverged.npz holds the state before it" in said
+    assert "iteration 17, frame " in said and name in said and "diverged.npz contains the state before it" in said
     monkeypatch.undo()
     assert log_without_seconds(out) == log_without_seconds(trained)[:16]
     for number in (1, 1):  # the spoiled call is now the first one

@@ -43,7 +43,7 @@ def test_times_without_a_time_are_refused(run, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("command", "says"), [("train", "--scale"), ("render", "end other programs"), ("golden", "end other programs")]
+    ("command", "says"), [("train", "--scale"), ("render", "close other programs"), ("golden", "close other programs")]
 )
 def test_the_advice_on_memory_is_one_that_the_command_can_follow(command, says, capsys, monkeypatch):
     def full(words):

@@ -1,9 +1,9 @@
-"""Run folders: the files and records of a run, and how it is trained, resumed and read again.
+"""Run folders: files and records of a run, and how it is trained, resumed and opened.
 
-folder    the folder and its records          log       log.jsonl, cut at the checkpoint when a run is resumed
-files     files replaced whole, or refused    machine   versions, processor, memory, time
+folder    the folder and its records          log       log.jsonl, truncated at the checkpoint on resume
+files     atomic writes, checked paths        machine   versions, processor, memory, time
 sources   sequences by name: a folder, or `simulated`; the only module that imports both readers and simulator
-model     checkpoint -> model or training     training  a training that fills the folder
-records   what run.json may say                      diverged  the state before an iteration that was not finite
-stopping  signals, deferred while an iteration finishes
+model     checkpoint -> model or training     training  training with logs and checkpoints
+records   types of run.json                   diverged  the state before an iteration that was not finite
+pace      settings for a training time        stopping  signals, deferred until an iteration ends
 """

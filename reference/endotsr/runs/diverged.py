@@ -1,6 +1,6 @@
-"""diverged.npz: the state before an iteration whose loss or gradient was not finite, and the iteration once more.
+"""diverged.npz: the state before an iteration with a non-finite loss or gradient, and a way to repeat it.
 
-The file has the form of a checkpoint; its header names iteration, frame and term. It is never read by a command.
+The file has the format of a checkpoint; its header names iteration, frame and term. No command reads it.
 """
 
 from pathlib import Path
@@ -15,13 +15,12 @@ from endotsr.runs.folder import RunFolder, open_run
 
 if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
-    from endotsr.sequences.sequence import Sequence
 
 NAME = "diverged.npz"
 
 
 def save_diverged(folder: RunFolder, state: "TrainingState", error: Diverged, config: Config) -> Path:
-    """Write the state before the iteration that diverged; returns the file. Raises OSError."""
+    """Write the state before the diverged iteration; returns the file. Raises OSError."""
     from endotsr.fitting.checkpoint import save_checkpoint
 
     about = {"iteration": error.iteration, "frame": error.frame, "term": error.term}
@@ -38,11 +37,10 @@ def save_diverged(folder: RunFolder, state: "TrainingState", error: Diverged, co
     return path
 
 
-def repeat_iteration(run: str | Path, sequence: "Sequence | None" = None) -> LogEntry:
-    """Repeat the iteration that stopped a run, from its diverged.npz: the same error is raised again.
+def repeat_iteration(run: str | Path) -> LogEntry:
+    """Repeat the diverged iteration of a run from its diverged.npz; this raises the same error again.
 
     run        run folder
-    sequence   the sequence of the run; default: it is read from its recorded place
     returns    the log entry, if the iteration now succeeds (on another machine, or with changed code)
 
     Raises: Diverged as in the run; InputError if there is no diverged.npz or it cannot be used.
@@ -55,4 +53,4 @@ def repeat_iteration(run: str | Path, sequence: "Sequence | None" = None) -> Log
     folder = open_run(Path(run))
     config = folder.config()
     state = state_from_checkpoint(load_checkpoint(folder.path / NAME), config)
-    return training_step(state, training_constants(load_run_sequence(folder) if sequence is None else sequence, config))
+    return training_step(state, training_constants(load_run_sequence(folder), config))

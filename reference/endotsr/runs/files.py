@@ -1,4 +1,4 @@
-"""Checks of output paths before the work begins, and JSON files."""
+"""Checks of output paths before a computation, and JSON files."""
 
 import errno
 import json
@@ -16,7 +16,7 @@ from endotsr.untrusted.writing import replace_text
 
 
 def refuse_folder(path: Path) -> None:
-    """Raises InputError if this is no folder and cannot become one; leaves nothing behind."""
+    """Raises InputError if `path` is no folder and cannot be created; leaves nothing behind."""
     if path.is_dir():
         return
     if os.path.lexists(path):
@@ -27,7 +27,7 @@ def refuse_folder(path: Path) -> None:
     if not os.access(above, os.W_OK | os.X_OK):
         raise InputError(f"{path}: cannot be created: no permission to write in {above}")
     probe = above / f".partial-{secrets.token_hex(4)}-{path.name}"
-    try:  # only the attempt tells: of a read-only disk or of /proc the permissions say nothing
+    try:  # permissions do not reveal a read-only disk or /proc; an attempt does
         probe.mkdir()
         probe.rmdir()
     except OSError as error:
@@ -35,20 +35,20 @@ def refuse_folder(path: Path) -> None:
 
 
 def refuse_inside(path: Path, data: Path, what: str) -> None:
-    """Raises InputError if the folder `path` would lie in the folder `data`, which `what` describes in the message."""
+    """Raises InputError if `path` is inside the folder `data`; `what` describes `data` in the message."""
     inner, outer = Path(path).resolve(), Path(data).resolve()
     if outer.is_dir() and inner.is_relative_to(outer):
         raise InputError(f"{path}: is inside {what} {data}; choose an --out outside of it")
 
 
 def refuse_link(path: Path) -> None:
-    """Raises InputError if this exists and is no regular file, or is a link: a file elsewhere would be changed."""
+    """Raises InputError if `path` is a link, or exists and is no regular file: writing could change another file."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         raise InputError(f"{path}: is a link or no regular file; allowed: the file that the run wrote")
 
 
 def refuse_unwritable(*files: Path | None) -> None:
-    """Raises InputError if one of the files (None = not requested) cannot be written; called before the work."""
+    """Raises InputError if one of the files (None = not requested) cannot be written."""
     for file in filter(None, files):
         above = file.parent
         if file.is_dir():
@@ -60,11 +60,12 @@ def refuse_unwritable(*files: Path | None) -> None:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write JSON with null for every number that is not finite; the file is replaced whole."""
+    """Write JSON atomically, with null for every number that is not finite."""
     replace_text(path, json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n")
 
 
 def read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
+    """A JSON object. Raises InputError if it cannot be read or lacks a `needed` key, such as "input.source"."""
     data = json_files.read_json(path)
     for dotted in needed:
         value: Any = data
@@ -76,11 +77,12 @@ def read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def warn(line: str) -> None:
-    """One line on standard error about something that was worked around."""
+    """Print one line of warning on standard error."""
     print(f"endotsr: warning: {plain_line(line)}", file=sys.stderr, flush=True)
 
 
 def finite(data: Any) -> Any:
+    """Plain data for JSON: paths as text, NumPy values as Python values, None for numbers that are not finite."""
     if isinstance(data, dict):
         return {key: finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -93,7 +95,7 @@ def finite(data: Any) -> Any:
 
 
 def os_error_line(error: OSError, where: object = None) -> str:
-    """One line for an error of the file system; `where` is used if the error names no file."""
+    """An error of the file system in one line; `where` replaces a missing file name."""
     place = error.filename or where
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
     reason = "the disk is full" if full else error.strerror or str(error)

@@ -2,16 +2,16 @@
 
     config.toml      resolved settings; `load_config` reads back an equal Config
     run.json         command, versions, seed, threads, machine, input hashes, times, peak memory, status
-    sequence.json    cameras, times, names, split: what rendering needs when the pictures are elsewhere
+    sequence.json    cameras, times, names, split: enough to render without the pictures
     log.jsonl        one line per iteration
-    checkpoint.npz   the latest checkpoint, and checkpoint.previous.npz, the one before it
-    diverged.npz     the state before an iteration whose numbers were not finite
-    training.html    how far the training is; it leads to report.html once there is one
-    run.lock         empty; the process that trains the run holds its lock
+    checkpoint.npz   the latest checkpoint; checkpoint.previous.npz is the one before it
+    diverged.npz     the state before an iteration that was not finite
+    training.html    progress page; redirects to report.html once it exists
+    run.lock         empty; locked by the process that trains the run
     metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
 
-A run folder appears complete under its name or not at all, files are replaced whole, and the log of a resumed run
-is cut at the checkpoint. This module handles file names and JSON; it is independent of models and pictures.
+Folders and files are created and replaced atomically. Resuming truncates the log at the checkpoint. This module handles
+file names and JSON; it is independent of models and pictures.
 """
 
 import contextlib
@@ -38,7 +38,7 @@ class RunBusy(InputError):
 
 @dataclass(frozen=True)
 class RunFolder:
-    """A run folder that exists; see the module docstring for its files."""
+    """An existing run folder; the module docstring lists its files."""
 
     path: Path
 
@@ -49,38 +49,38 @@ class RunFolder:
 
     @property
     def has_checkpoint(self) -> bool:
-        """Whether there is a checkpoint, be it the one before the latest."""
+        """Whether there is a checkpoint, the latest or the previous one."""
         return os.path.lexists(self.checkpoint) or (self.path / "checkpoint.previous.npz").exists()
 
     @property
     def log(self) -> Path:
-        """One JSON object an iteration."""
+        """One JSON object per iteration."""
         return self.path / "log.jsonl"
 
     @property
     def lock(self) -> Path:
-        """The file whose lock is held while the run is trained."""
+        """The file that is locked during training."""
         return self.path / "run.lock"
 
     def config(self) -> Config:
-        """The resolved settings of the run: its length is `training.iterations`, in runs of earlier versions too."""
+        """The resolved settings of the run. Its length is `training.iterations`, also in runs of earlier versions."""
         return with_fixed_length(load_config(self.path / "config.toml"))
 
     def record(self, *needed: str) -> RunRecord:
-        """run.json, read anew and checked. Raises InputError if a `needed` key (`input.source`) is missing."""
+        """run.json, read and checked. Raises InputError if a `needed` key, such as `input.source`, is missing."""
         path = self.path / "run.json"
         return checked_run_record(read_json(path, needed), path)
 
     def sequence_record(self) -> SequenceRecord:
-        """sequence.json, read anew and checked. Raises InputError as `checked_record`."""
+        """sequence.json, read and checked. Raises InputError as `checked_record`."""
         return read_sequence_record(self.path / "sequence.json")
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the lock of the run for the block; the system releases the lock of a process that was killed.
+        """Hold the lock of the run for the block. The system releases the lock of a killed process.
 
-        The lock is that of an empty file of its own: on Windows no other process reads what is locked.
-        Raises: RunBusy, an InputError, if another process holds it. Without effect where the disk supports no locks.
+        The lock has its own, empty file, because Windows lets no other process read a locked file. On a disk without
+        locks it has no effect. Raises: RunBusy, an InputError, if another process holds the lock.
         """
         for file in (self.log, self.lock):
             refuse_link(file)
@@ -90,21 +90,21 @@ class RunFolder:
             yield
 
     def remove_leftovers(self) -> None:
-        """Temporary files of a process that was killed."""
+        """Remove the temporary files of a killed process."""
         for pattern in (".*.part", ".partial-*"):
             for file in self.path.glob(pattern):
                 folder = file.is_dir() and not file.is_symlink()
                 shutil.rmtree(file) if folder else file.unlink(missing_ok=True)
 
     def update(self, entries: RunRecord) -> None:
-        """Replace or add entries of run.json."""
+        """Add or replace entries of run.json."""
         write_json(self.path / "run.json", {**self.record(), **entries})
 
 
 def lock_taken(file: IO[bytes]) -> bool:
-    """Take the lock of an open file: whether no other process holds it. True where the disk has no locks.
+    """Try to lock an open file; False if another process holds the lock. True on a disk without locks.
 
-    It is `flock` on POSIX systems and `LockFileEx` on Windows: the system releases it with the file, or the process.
+    `flock` on POSIX systems, `LockFileEx` on Windows. The system releases the lock with the file or the process.
     """
     from filelock import lock_descriptor
 
@@ -115,11 +115,11 @@ def lock_taken(file: IO[bytes]) -> bool:
 
 
 def refuse_existing(path: Path) -> None:
-    """Raises InputError if a new folder cannot be made here: something exists, or its parent takes no folder."""
+    """Raises InputError if a new folder cannot be created at `path`, or if something exists there."""
     path = Path(path)
     if (path / "run.json").exists():
         raise InputError(
-            f"{path}: holds a run already; choose another --out, or continue it with "
+            f"{path}: already contains a run; choose another --out, or continue it with "
             f"`endotsr train --out {path} --resume`"
         )
     if os.path.lexists(path):
@@ -128,9 +128,9 @@ def refuse_existing(path: Path) -> None:
 
 
 def create_run(path: Path, config: Config, record: RunRecord, sequence_record: SequenceRecord) -> RunFolder:
-    """A new run folder, filled beside its final name and then renamed: it never exists half-written.
+    """Create a run folder under a temporary name, then rename it: it is complete or does not exist.
 
-    Raises:  InputError if `path` exists or the file system refuses (nothing stays behind).
+    Raises:  InputError if `path` exists or on an error of the file system; nothing is left behind.
     """
     path = Path(path)
     refuse_existing(path)

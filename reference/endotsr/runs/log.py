@@ -1,4 +1,4 @@
-"""log.jsonl: one line per iteration, cut at the checkpoint when a run is resumed."""
+"""log.jsonl: one line per iteration, truncated at the checkpoint on resume."""
 
 import contextlib
 import json
@@ -14,11 +14,11 @@ from endotsr.untrusted.json import integer, number, parsed
 
 LONGEST_LINE = 1 << 20  # bytes
 LARGEST_LOG = 1 << 30  # bytes: several million iterations
-LONGEST_TAIL = 1 << 13  # bytes that hold the last line of a log, and more
+LONGEST_TAIL = 1 << 13  # bytes read to find the last line; longer than a line
 
 
 class RunLog:
-    """log.jsonl opened for appending after iteration `kept`; later and broken lines are cut off first."""
+    """log.jsonl opened for appending after iteration `kept`; opening removes later and incomplete lines."""
 
     def __init__(self, path: Path, kept: int) -> None:
         self.seconds = 0.0  # sum over the kept lines
@@ -40,7 +40,7 @@ class RunLog:
         return end
 
     def append(self, entry: LogEntry) -> None:
-        """One line, flushed. On an error of the file system the log keeps its last whole line."""
+        """Append and flush one line. On an error of the file system the log ends with its last complete line."""
         line = (json.dumps(finite(entry), separators=(", ", ": ")) + "\n").encode()
         try:
             self._file.write(line)
@@ -52,19 +52,19 @@ class RunLog:
         self._end += len(line)
 
     def close(self) -> None:
-        """Close the file; lines that could not be written are dropped."""
+        """Close the file; errors of the file system are ignored."""
         with contextlib.suppress(OSError):
             self._file.close()
 
 
 def last_iteration(path: Path) -> int:
-    """The iteration of the last whole line of a log; 0 without one."""
+    """The iteration of the last complete line; 0 without one."""
     entry = last_entry(path)
     return entry["iteration"] if entry else 0
 
 
 def last_entry(path: Path) -> LogEntry | None:
-    """The last whole line of a log; None without one. Only the end of the file is read."""
+    """The last complete line; None without one. Reads only the end of the file."""
     try:
         with path.open("rb") as file:
             file.seek(max(file.seek(0, os.SEEK_END) - LONGEST_TAIL, 0))
@@ -75,7 +75,7 @@ def last_entry(path: Path) -> LogEntry | None:
 
 
 def log_until(path: Path, iteration: int) -> list[LogEntry]:
-    """The whole lines of a log up to an iteration, without those of anything else; none if there is no file."""
+    """The valid lines of a log up to an iteration; [] without a file."""
     if not path.exists():
         return []
     lines = read_bytes(path, LARGEST_LOG).splitlines(keepends=True)
@@ -92,7 +92,7 @@ def _entry(line: bytes) -> LogEntry | None:
 
 
 def _seconds(entry: LogEntry) -> float:
-    """The seconds of a line; 0 where they are missing or no number."""
+    """The seconds of a line; 0 if they are missing or invalid."""
     with contextlib.suppress(InputError):
         return number(entry.get("seconds"), "seconds", low=0.0)
     return 0.0

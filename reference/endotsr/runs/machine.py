@@ -1,4 +1,4 @@
-"""What results and times depend on: versions, processor, memory, the time of day."""
+"""The environment of a result: versions, processor, memory, date."""
 
 import contextlib
 import datetime
@@ -14,7 +14,7 @@ from endotsr.untrusted.json import Count, Text
 
 
 class MachinePart(TypedDict, total=False):
-    """`machine` of run.json and of other results."""
+    """The entry `machine` of run.json and of other results."""
 
     processor: Text
     cores: Count
@@ -26,7 +26,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headl
 
 
 def versions() -> dict[str, str]:
-    """Versions of this package, of Python and of the libraries that results depend on."""
+    """Versions of this package, of Python, and of the libraries that affect results."""
     found = {"endotsr": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
@@ -35,7 +35,7 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> MachinePart:
-    """Processor, cores this process may use, memory and system, as far as the system reports them."""
+    """Processor, cores available to this process, memory and system; memory is None if unknown."""
     processor = platform.processor() or platform.machine()
     with contextlib.suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
@@ -51,7 +51,7 @@ def machine() -> MachinePart:
 
 
 def peak_memory_bytes() -> int | None:
-    """Largest resident memory of this process so far; None where the system does not report it."""
+    """Peak resident memory of this process; None if the system does not report it."""
     try:
         import resource
     except ImportError:  # Windows
@@ -63,10 +63,10 @@ def peak_memory_bytes() -> int | None:
 
 
 def dated(result: dict[str, Any]) -> dict[str, Any]:
-    """The result with the date, the machine and the versions it belongs to."""
+    """The result with date, machine and versions."""
     return {"date": now(), "machine": machine(), "versions": versions()} | result
 
 
 def now() -> str:
-    """The time in UTC, to the second."""
+    """The current UTC time, ISO 8601, to the second."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")

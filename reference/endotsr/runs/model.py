@@ -1,8 +1,8 @@
-"""From a run folder to a model that renders, or to a training that continues.
+"""From a run folder to a model for rendering, or to a training state.
 
-A checkpoint is read with the settings of config.toml. If the two are not of one run (an edited file, a checkpoint
-copied in), the arrays would be misread, so every setting is compared first, and the fingerprint of the sequence with
-that of run.json.
+A checkpoint is read with the settings of config.toml. If they belong to different runs (an edited file, a copied
+checkpoint), the arrays would be misread. Therefore every setting is compared first, and the sequence's fingerprint with
+run.json.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from endotsr.scene.gaussians import Gaussians
     from endotsr.scene.parameters import FrameParameters
 
-CHANGE_NO_NUMBER = {  # settings that may differ from the checkpoint's; the length of the run is `training.iterations`
+CHANGE_NO_NUMBER = {  # settings that may differ from the checkpoint's: they do not affect results
     "preset",
     "training.threads",
     "training.checkpoint_every",
@@ -34,7 +34,7 @@ CHANGE_NO_NUMBER = {  # settings that may differ from the checkpoint's; the leng
 
 
 class Model(NamedTuple):
-    """Everything that rendering needs."""
+    """A trained model, ready to render."""
 
     gaussians: "Gaussians"
     spectral: Any  # frequencies, atom statistics and penalty weights of the training time stamps
@@ -44,7 +44,7 @@ class Model(NamedTuple):
 
 
 def load_model(folder: RunFolder) -> Model:
-    """The model of the latest checkpoint. Raises InputError if there is none, it is damaged or of other settings."""
+    """The model of the latest checkpoint. Raises InputError if it is missing, damaged, or has other settings."""
     from endotsr.fitting.model import spectral_from
 
     if not folder.has_checkpoint:
@@ -58,17 +58,17 @@ def load_model(folder: RunFolder) -> Model:
 
 
 def save_training(folder: RunFolder, state: Any, config: Config) -> None:
-    """Replace the last checkpoint by the state of a training; it names the sequence of run.json."""
+    """Replace the last checkpoint by a training state, with the fingerprint of the sequence in run.json."""
     from endotsr.fitting.state import save_state
 
     save_state(folder.checkpoint, state, config, sequence_fingerprint(folder.record()))
 
 
 def load_training(folder: RunFolder, config: Config, *, continues: bool = False) -> Any:
-    """The training at its latest whole checkpoint. Raises InputError if there is none, or it is of other settings.
+    """The training state of the latest intact checkpoint. Raises InputError if it is missing or has other settings.
 
-    continues   the caller holds the lock of the folder and will write checkpoints: a damaged one is put aside as
-                checkpoint.damaged.npz, so that it never takes the place of the one before it
+    continues   the caller holds the lock and will write checkpoints: a damaged latest one is renamed to
+                checkpoint.damaged.npz, so it never replaces the previous one
     """
     from endotsr.fitting.state import state_from_checkpoint
 
@@ -83,9 +83,9 @@ def load_training(folder: RunFolder, config: Config, *, continues: bool = False)
 
 
 def _checkpoint_of(folder: RunFolder, config: Config) -> tuple["Checkpoint", bool]:
-    """The latest whole checkpoint, and whether a later one is damaged (a warning names it).
+    """The latest intact checkpoint, and whether a later one is damaged (with a warning).
 
-    It must be of a training with these settings on the sequence of run.json.
+    Raises: InputError if its settings or its sequence differ from those of the folder.
     """
     from endotsr.fitting.checkpoint import load_latest
 
@@ -96,26 +96,26 @@ def _checkpoint_of(folder: RunFolder, config: Config) -> tuple["Checkpoint", boo
     if trained_on is not None and recorded is not None and trained_on != recorded:
         raise InputError(
             f"{folder.checkpoint}: trained on another sequence than the one in {folder.path / 'run.json'}; "
-            "allowed: checkpoint and records of one run, as it wrote them"
+            "allowed: unchanged checkpoint and records of one run"
         )
-    asked = by_key(msgspec.json.decode(msgspec.json.encode(config)))  # as JSON, which the checkpoint holds
+    asked = by_key(msgspec.json.decode(msgspec.json.encode(config)))  # as JSON, like the checkpoint's header
     for key, value in (*by_key(checkpoint.header.get("config")).items(), *_seen_in_arrays(checkpoint, config)):
         if key in asked and key not in CHANGE_NO_NUMBER and asked[key] != value:
             raise InputError(
-                f"{folder.checkpoint}: trained with {key} = {value!r}, but {folder.path / 'config.toml'} says "
-                f"{asked[key]!r}; allowed: checkpoint and settings of one run, as it wrote them"
+                f"{folder.checkpoint}: trained with {key} = {value!r}, but {folder.path / 'config.toml'} has "
+                f"{asked[key]!r}; allowed: unchanged checkpoint and settings of one run"
             )
     return checkpoint, bool(note)
 
 
 def sequence_fingerprint(record: RunRecord) -> str | None:
-    """SHA-256 over the hashes of the pictures, times and cameras in run.json; None where it holds none."""
+    """SHA-256 over the hashes of pictures, times and cameras in run.json; None without hashes."""
     hashes = record.get("input", {}).get("arrays_sha256")
     return hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest() if hashes else None
 
 
 def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[str, Any]]:
-    """The settings that can be read from the arrays themselves."""
+    """The settings implied by the arrays themselves: (key, value)."""
     from endotsr.fitting.schedules import residuals_active
     from endotsr.scene.parameters import trained
 
@@ -130,7 +130,7 @@ def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[
         yield "model.bases", gaussians.fdm_weight.shape[1]
     residuals = {"appearance": gaussians.appearance_coefficients, "spectral_motion": gaussians.motion_coefficients}
     for name, coefficients in residuals.items():
-        if active or coefficients is not None:  # before their activation they are missing in any model
+        if active or coefficients is not None:  # before their activation no model has them
             yield f"model.{name}", coefficients is not None
         if coefficients is not None:
             yield "model.frequencies", coefficients.shape[1] // 2

@@ -1,8 +1,8 @@
-"""Settings for a wish in minutes: length, points and Gaussians grow together, from a first look to the best.
+"""Settings for a given training time: length, points and Gaussians grow together.
 
-`paced(x)` is the preset `quick` at x = 0 and `sharp` on 55 training frames at x = 1. Between and below them the three
-counts follow geometric sequences; above 1 the length alone grows. The machine is timed on the clip itself: a
-few iterations of a model without motion, which is thrown away.
+`paced(x)` is the preset `quick` at x = 0 and `sharp` on 55 training frames at x = 1. The three counts are geometric in
+x up to 1; above 1 only the length grows. The speed of the machine is measured on the clip itself, with a few iterations
+of a model without motion.
 """
 
 import statistics
@@ -16,15 +16,15 @@ from endotsr.sequences.checks.cost import at_start, iteration_work, work_left
 from endotsr.sequences.sequence import Sequence
 
 SHARP_LENGTH = lengthened(SHARP, 55).training.iterations  # on 55 training frames
-SLOWEST, LONGEST = -1.5, 5.0  # range of x: 490 iterations, and 23 times those of x = 1
-COARSE_BELOW = 0.5  # x up to which frames of half size come first
-HALVINGS = 20  # of that range
+SHORTEST, LONGEST = -1.5, 5.0  # range of x: 490 iterations, and 23 times the iterations of x = 1
+COARSE_BELOW = 0.5  # largest x with a coarse start at half size
+HALVINGS = 20  # of the range in the bisection
 WARM, TIMED = 4, 9  # iterations
-PLAIN = 0.55  # part that they take of a late iteration of the whole model (0.55 on one thread and on two, pulling)
+PLAIN = 0.55  # time of a timed iteration relative to a late one of the full model; measured on pulling, 1 and 2 threads
 
 
 def paced(config: Config, x: float) -> Config:
-    """The settings with the length, the points and the budget of Gaussians of x; every other setting stays."""
+    """The settings with the length, points and Gaussian budget of x; all other settings are unchanged."""
 
     def between(low: int, high: int, at: float) -> int:
         return max(1, round(low * (high / low) ** at))
@@ -41,9 +41,10 @@ def paced(config: Config, x: float) -> Config:
 
 
 def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -> Config:
-    """The settings whose training takes so many minutes, where a unit of work takes `unit` seconds.
+    """The settings with the largest x whose training takes at most `minutes`.
 
-    Raises: InputError if the shortest training of this kind takes longer.
+    unit    seconds per unit of work, from `seconds_of_unit`
+    Raises: InputError if the shortest training takes longer.
     """
     pixels = sequence.width * sequence.height
 
@@ -51,7 +52,7 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -
         asked = paced(config, x)
         return unit * work_left(asked, pixels, at_start(asked))
 
-    low, high = SLOWEST, LONGEST
+    low, high = SHORTEST, LONGEST
     if seconds(low) > 60 * minutes:
         raise InputError(
             f"{minutes:g} minutes are not allowed: the shortest training of this clip takes {seconds(low) / 60:.2g} on"
@@ -64,7 +65,7 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -
 
 
 def seconds_of_unit(sequence: Sequence, config: Config) -> float:
-    """Seconds of a unit of work on this machine and this clip, from a few iterations, kernels compiled."""
+    """Seconds per unit of work on this machine and clip, from a few iterations with compiled kernels."""
     still = with_settings(QUICK.initialisation, motion="none")
     short = with_settings(config, initialisation=still, training={"bridge_fraction": 0.0, "coarse_start": False})
     state, constants, found = new_training(sequence, short), training_constants(sequence, short), []

@@ -1,7 +1,7 @@
-"""run.json: what that of any person may say.
+"""The types of run.json, which is untrusted input.
 
-Every key that is there must have the type and the range below. A key may be missing: whoever needs it names it
-(`RunFolder.record`), because earlier versions wrote fewer.
+Every present key must have the type and range below. Any key may be missing, because earlier versions wrote fewer;
+`RunFolder.record` checks for those that a reader needs.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
 
 
 class InputPart(TypedDict, total=False):
-    """`input` of run.json."""
+    """The entry `input` of run.json."""
 
     source: Text
     frames: Count
@@ -49,11 +49,11 @@ class ExtendedEntry(TypedDict, total=False):
 
 
 class StartPart(TypedDict, total=False):
-    """`start` of a run that began with the state of another one."""
+    """The entry `start` of run.json, for a run that began with the state of another run."""
 
-    configuration: Text  # of a sweep, and its iteration
+    configuration: Text  # in a sweep: the configuration and iteration of the initial state
     iteration: Count
-    carried_from: Text  # window
+    carried_from: Text  # in a recording: the neighbouring window
     shared_frames: Count
     iterations_saved: Count
 
@@ -89,6 +89,6 @@ REPORTED = (
 
 
 def checked_run_record(record: dict[str, Any], path: Path) -> RunRecord:
-    """The record that run.json holds. Raises InputError naming file and key for a value of another type or range."""
+    """The checked content of run.json. Raises InputError naming file and key for a wrong type or range."""
     typed(record, RunRecord, path)
-    return cast(RunRecord, record)  # with the keys of other versions, which are kept
+    return cast(RunRecord, record)  # keeps the keys of other versions

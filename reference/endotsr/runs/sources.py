@@ -1,4 +1,4 @@
-"""The source of a sequence, a folder or `simulated`, and its record in a run folder."""
+"""The source of a sequence (a folder or `simulated`) and its record in a run folder."""
 
 import dataclasses
 import hashlib
@@ -21,35 +21,35 @@ from endotsr.simulator.settings import SimulatorSettings
 if TYPE_CHECKING:
     from endotsr.kernels.arrays import FloatArray
 
-SIMULATED = "simulated"  # names the embedded sequence; a folder of that name is given as `./simulated`
-IN_MEMORY = "arrays in memory"  # the source of a sequence that was passed from Python and not read from files
+SIMULATED = "simulated"  # the simulated sequence; a folder of this name is written `./simulated`
+IN_MEMORY = "arrays in memory"  # source of a sequence passed from Python
 ARRAYS = ("images", "masks", "depth", "times")
 
 
 def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> Sequence:
-    """The whole sequence in memory, fully checked. Raises InputError for anything that cannot be used."""
+    """The complete sequence in memory, checked. Raises InputError for unusable input."""
     if source == SIMULATED:
         return _simulated(simulated_settings(simulator, config), config)
     if source == IN_MEMORY:
-        raise InputError("the run was trained on arrays in memory; allowed: the folder that holds the same frames")
+        raise InputError("the run was trained on arrays in memory; allowed: a folder with the same frames")
     from endotsr.sequences.layouts import read_sequence
 
     return read_sequence(Path(source), config.sequence, config.raster.near)
 
 
 def _simulated(settings: SimulatorSettings, config: Config) -> Sequence:
-    """The simulated sequence with the split of the sequence settings; with the default one, that of the simulator."""
+    """The simulated sequence with the split of the sequence settings; the default keeps the simulator's split."""
     from endotsr.simulator.simulate import simulate
 
     wanted = config.sequence
     if wanted.split == "every_eighth":
         return simulate(settings).sequence
-    train, test = split_frames(settings.frames, wanted.split, wanted.block_length)  # refused before the work
+    train, test = split_frames(settings.frames, wanted.split, wanted.block_length)  # may raise, so before simulating
     return dataclasses.replace(simulate(settings).sequence, train_index=train, test_index=test)
 
 
 def simulated_settings(simulator: SimulatorSettings, config: Config) -> SimulatorSettings:
-    """The simulator's settings with the scale of the sequence settings."""
+    """The simulator's settings at the scale of the sequence settings. Raises InputError for a choice of frames."""
     wanted = config.sequence
     if wanted.frames:
         raise InputError(
@@ -89,7 +89,7 @@ def start_record(
 
 
 def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> InputPart:
-    """Record of the input for run.json: shape, split, notes of the reader, hashes of the arrays and of the files."""
+    """The entry `input` of run.json: shape, split, notes of the reader, hashes of arrays and files."""
     record: InputPart = {
         "source": source if source in (SIMULATED, IN_MEMORY) else str(Path(source).resolve()),
         "frames": sequence.count,
@@ -113,7 +113,7 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
 
 
 def _digests(sequence: Sequence) -> dict[str, str]:
-    """SHA-256 of the pictures, the times and the cameras."""
+    """SHA-256 of `ARRAYS` and of the cameras."""
     import numpy as np
 
     poses = np.array([[*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy] for c in sequence.cameras])
@@ -121,7 +121,7 @@ def _digests(sequence: Sequence) -> dict[str, str]:
 
 
 def digest(array) -> str:
-    """SHA-256 of the bytes of an array, frame by frame: a long clip is not copied whole."""
+    """SHA-256 of the bytes of an array, frame by frame to avoid a copy of a long clip."""
     digest = hashlib.sha256()
     for frame in array:
         digest.update(frame.tobytes())
@@ -129,19 +129,19 @@ def digest(array) -> str:
 
 
 def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
-    """Raises InputError if this is not the sequence that the run was started on."""
+    """Raises InputError if the sequence differs from the one the run was started on."""
     remembered = run.record().get("input", {}).get("arrays_sha256", {})
     found = _digests(sequence)
     for name in (*ARRAYS, *({"cameras"} & remembered.keys())):
         if remembered.get(name) != found[name]:
             raise InputError(
                 f"{source}: {name} differ from those the run {run.path} was trained on (sha256 in run.json); "
-                "a run continues only on the input that it was started on"
+                "a run continues only on its original input"
             )
 
 
 def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
-    """Source and simulator settings of the sequence of a run. Raises InputError if run.json lacks them."""
+    """Source and simulator settings of a run's sequence. Raises InputError if run.json lacks the source."""
     record = folder.record("input.source", "input.arrays_sha256").get("input", {})
     where = str(folder.path / "run.json")
     simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
@@ -149,14 +149,17 @@ def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
 
 
 def refuse_inside_data(out: Path, folder: RunFolder) -> None:
-    """Raises InputError if the folder `out` would lie inside the sequence that a run was trained on."""
+    """Raises InputError if `out` is inside the sequence folder of a run."""
     source = folder.record().get("input", {}).get("source")
     if source not in (None, SIMULATED, IN_MEMORY):
         refuse_inside(out, Path(source), "the sequence of the run,")
 
 
 def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
-    """The sequence that a run was trained on, from its recorded place or from `source`; it must be the same."""
+    """The training sequence of a run, read from its recorded location or from `source`.
+
+    Raises: InputError if it cannot be read, or differs from the one the run was trained on.
+    """
     remembered, simulator = run_source(folder)
     source = source or remembered
     sequence = load_sequence(source, folder.config(), simulator)
@@ -167,9 +170,9 @@ def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
 def true_positions_of(
     source: str, simulator: SimulatorSettings, config: Config, sequence: Sequence
 ) -> "Callable[[int, int], FloatArray] | None":
-    """The true motion of a sequence that is simulated, in memory or in a folder; see `SimulatedSequence`.
+    """The true motion of a simulated sequence, see `SimulatedSequence`; None for other sequences.
 
-    Raises: InputError if the folder holds a truth that cannot be used.
+    Raises: InputError if the recorded truth of a folder is unusable.
     """
     if source == IN_MEMORY:
         return None

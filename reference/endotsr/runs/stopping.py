@@ -1,12 +1,10 @@
-"""Signals that stop a command: each is raised as KeyboardInterrupt and recorded.
+"""Signals that stop a command: each is recorded and raised as KeyboardInterrupt.
 
-Python raises the exception at whatever point the main thread has reached. Inside a callback of compiled code (the
-loader of a kernel) the exception cannot be caught: Python drops it there, and the command continues or fails with
-another error. Long work therefore calls `stop_asked` at intervals, and treats an error after a signal as an
-interruption.
+Python raises the exception at an arbitrary point of the main thread. Inside a callback from compiled code, such as the
+loader of a kernel, Python discards the exception; the command then continues or fails with another error. Long
+computations therefore call `stop_asked` regularly, and treat an error after a signal as an interruption.
 
-Work that must not be abandoned half-done runs inside `finishing`, where the first signal is only recorded, for
-PATIENCE seconds.
+Inside `finishing`, the first signal is only recorded, for PATIENCE seconds. Use it for work that must be completed.
 """
 
 import _thread
@@ -19,14 +17,14 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") i
 PATIENCE = 0.7  # seconds after the first signal within which work inside `finishing` must end
 
 _asked = threading.Event()
-_finishing: list[threading.Timer] = []  # the clocks of the open `finishing` blocks, started by the first signal
+_finishing: list[threading.Timer] = []  # the timers of the open `finishing` blocks, started by the first signal
 
 
 @contextlib.contextmanager
 def signals_stop() -> Iterator[None]:
     """In the block, SIGTERM (a batch system, a shutdown) acts like Ctrl-C: KeyboardInterrupt in the main thread.
 
-    So does SIGBREAK, which Windows sends for Ctrl-Break and when a console is closed; it has no SIGTERM of others.
+    So does SIGBREAK, which Windows sends for Ctrl-Break and for a closed console instead of SIGTERM.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -52,9 +50,9 @@ def signals_stop() -> Iterator[None]:
 
 @contextlib.contextmanager
 def finishing() -> Iterator[None]:
-    """In the block, the first signal raises nothing for PATIENCE seconds; the work there calls `stop_asked`.
+    """In the block, the first signal raises nothing for PATIENCE seconds; poll `stop_asked` there.
 
-    After that time, or at a second signal, KeyboardInterrupt is raised as outside the block.
+    After that time, or at a second signal, KeyboardInterrupt is raised.
     """
     clock = threading.Timer(PATIENCE, _thread.interrupt_main)
     clock.daemon = True

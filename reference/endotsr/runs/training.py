@@ -1,12 +1,13 @@
-"""A training that fills a run folder: started, resumed, logged, saved and stopped without loss.
+"""Training in a run folder: start, resume, log, save and stop without loss.
 
-In: a sequence, settings, and an observer that is called at every iteration. Out: the run folder with log, checkpoints
-and run.json. After a signal the current iteration is finished and a checkpoint is written; the errors say how to
-continue the run. This module prints nothing itself.
+In: a sequence, settings, and an observer called at every iteration. Out: the run folder with log, checkpoints and
+run.json. After a signal, the current iteration is completed and a checkpoint is written; the error message explains how
+to continue. This module prints nothing itself.
 
-A checkpoint is written after `training.checkpoint_every` iterations at the latest, and after a time: a kill costs at
-most a tenth of the training so far. That tenth has bounds (`FEWEST_SECONDS`, `MOST_SECONDS`), and where one checkpoint
-takes long, they are as rare as `LARGEST_FRACTION` demands. No result depends on when they are written.
+A checkpoint is written at least every `training.checkpoint_every` iterations, and whenever 10 % of the training time
+(between `FEWEST_SECONDS` and `MOST_SECONDS`) has passed since the last one. A kill therefore costs about 10 % of the
+training at most. Slow checkpoints are written less often, to take at most `LARGEST_FRACTION` of the time. Results do
+not depend on when checkpoints are written.
 """
 
 import contextlib
@@ -34,19 +35,19 @@ if TYPE_CHECKING:
 
 
 FEWEST_SECONDS, MOST_SECONDS = 10.0, 300.0  # of training between two checkpoints
-LARGEST_LOSS = 0.1  # of the training so far, which a kill may cost
-LARGEST_FRACTION = 0.02  # of the time, which checkpoints may take
+LARGEST_LOSS = 0.1  # fraction of the training time that a kill may cost
+LARGEST_FRACTION = 0.02  # fraction of the time that checkpoints may take
 
 
 class RunStopped(InputError):
-    """The file system refused a write in the middle of a run."""
+    """A write failed during a run."""
 
 
 class Observer(Protocol):
-    """Callbacks of a training while it runs."""
+    """Callbacks of a training."""
 
     def begin(self, state: "TrainingState") -> None:
-        """The training begins with `state`, which it changes in place; an observer changes nothing in it."""
+        """The training begins. It updates `state` in place; an observer must not change it."""
 
     def update(self, entry: LogEntry) -> None:
         """The log entry of one iteration."""
@@ -61,7 +62,7 @@ class Observer(Protocol):
 def train_new_run(
     out: "Path", record: RunRecord, sequence: "Sequence", config: Config, observer: Observer
 ) -> RunFolder:
-    """A new run folder, trained to the end. A folder that got no checkpoint is removed; errors as in `train_run`."""
+    """Create a run folder and train to the end; without a checkpoint it is removed. Errors as in `train_run`."""
     from endotsr.fitting.state import new_training
     from endotsr.sequences.record import record_of
 
@@ -79,7 +80,7 @@ def train_new_run(
 
 
 def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: Observer) -> None:
-    """Train a run from its last checkpoint to the end, with the settings of its config.toml."""
+    """Train a run from its last checkpoint to the end with the settings of its config.toml."""
     from endotsr.fitting.state import new_training
     from endotsr.runs.model import load_training
 
@@ -97,10 +98,10 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
 
 
 def extend_run(folder: RunFolder, iterations: int) -> None:
-    """Give a run more iterations: config.toml and checkpoint get the new number, and no other setting changes.
+    """Set a larger number of iterations in config.toml and the checkpoint; no other setting changes.
 
-    Milestones stay at their iterations. Rates that decay over the whole run follow, from the next iteration on, the
-    decay of a run of the new length, so that they begin higher than they ended.
+    Milestones keep their iterations. Learning rates that decay over the whole run follow the decay of the new length
+    from the next iteration on, and therefore jump up.
     """
     from endotsr.runs.model import load_training, save_training
 
@@ -119,11 +120,11 @@ def train_run(
 ) -> "TrainingState":
     """Train from `state` to the end, with log, checkpoints and observer; returns the last state.
 
-    After a signal the current iteration is finished and a checkpoint is written, so that nothing is lost. After a
-    second signal, or an iteration that takes too long, the last checkpoint remains.
+    A signal completes the current iteration and writes a checkpoint. After a second signal, or if the iteration takes
+    too long, the last checkpoint remains.
 
-    Raises:  KeyboardInterrupt or RunStopped (a full disk) with a line that says how to continue; the last checkpoint
-             and the log up to it are whole in both cases. FloatingPointError if the loss is not finite.
+    Raises:  KeyboardInterrupt or RunStopped (e.g. a full disk) with a line on how to continue; the last checkpoint and
+             the log up to it are intact. FloatingPointError if the loss is not finite.
     """
     from endotsr.fitting.compile_ahead import compile_ahead
     from endotsr.fitting.trainer import train
@@ -167,7 +168,7 @@ class _Recorder:
         self._last_tick = self._saved_at = self._began
         self._state, self._saving_took = state, 0.0
         self._saved = state.iteration if folder.has_checkpoint else None
-        self._between_iterations = False  # whether the run was stopped after a whole iteration
+        self._between_iterations = False  # whether the run was stopped after a complete iteration
 
     def on_iteration(self, entry: LogEntry) -> None:
         """Log one iteration. Raises KeyboardInterrupt after a signal."""
@@ -182,7 +183,7 @@ class _Recorder:
             self.on_checkpoint(self._state)
 
     def on_checkpoint(self, state: "TrainingState") -> None:
-        """Replace the checkpoint, unless it is of this iteration."""
+        """Replace the checkpoint, unless it already is of this iteration."""
         from endotsr.runs.model import save_training
 
         if self._saved == state.iteration:
@@ -194,13 +195,13 @@ class _Recorder:
         self._folder.update({"iterations_done": self._saved, "lambda_lap": state.lambda_lap, **self._costs()})
 
     def finish(self, last: "TrainingState") -> None:
-        """Save the last state and mark the run as finished."""
+        """Save the last state; mark the run as finished."""
         self.on_checkpoint(last)
         ended: RunRecord = {"status": "finished", "finished": now(), "iterations_done": last.iteration}
         self._folder.update({**ended, **self._costs()})
 
     def stop(self, error: BaseException, state: "TrainingState") -> BaseException:
-        """Save the state if possible and mark the run; returns the error that says how to continue it."""
+        """Save the state if possible and mark the run; returns the error with advice on how to continue."""
         if isinstance(error, KeyboardInterrupt) or stop_asked():
             if self._between_iterations:
                 with contextlib.suppress(OSError, KeyboardInterrupt):  # the previous checkpoint still exists
@@ -209,7 +210,7 @@ class _Recorder:
             self._mark("interrupted")
             return KeyboardInterrupt(self._advice())
         if not self._folder.path.is_dir():
-            return RunStopped(f"{self._folder.path}: the run folder has vanished, and what was trained is lost")
+            return RunStopped(f"{self._folder.path}: the run folder was deleted; its training is lost")
         self._mark("failed")
         if isinstance(error, Diverged):
             return self._dumped(error, state)
@@ -218,21 +219,21 @@ class _Recorder:
         return error
 
     def _dumped(self, error: Diverged, state: "TrainingState") -> BaseException:
-        """The error, with the place of the dump that repeats the iteration."""
+        """The error, with the path of the saved state in its message."""
         from endotsr.runs.diverged import save_diverged
 
         with contextlib.suppress(OSError):
             kept = save_diverged(self._folder, state, error, self._config)
-            error.args = (f"{error}; {kept} holds the state before it (`endotsr.runs.diverged.repeat_iteration`)",)
+            error.args = (f"{error}; {kept} contains the state before it (`endotsr.runs.diverged.repeat_iteration`)",)
         return error
 
     def _advice(self) -> str:
         saved = self._saved
-        kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet, it starts again"
+        kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet; the run starts again"
         return f"{kept}; continue with `endotsr train --out {self._folder.path} --resume`"
 
     def _mark(self, status: str) -> None:
-        with contextlib.suppress(OSError, InputError):  # a full disk cannot hold this record either
+        with contextlib.suppress(OSError, InputError):  # fails too on a full disk
             self._folder.update({"status": status})
 
     def _costs(self) -> RunRecord:
