@@ -68,7 +68,7 @@ def test_evaluate_refuses_what_it_cannot_measure(finished_run, flow_pictures, tm
     words = ["evaluate", run, "--pictures", pictures]
     assert_refused(capsys, [*words, "--sequence.scale", "0.5"], "--sequence.*", "the settings of a run are fixed")
     assert_refused(capsys, [*words, "--csv", str(tmp_path / "no" / "m.csv")], "m.csv: cannot be written")
-    assert_refused(capsys, [*words[:-1], str(tmp_path)], f"{tmp_path}: holds no picture")
+    assert_refused(capsys, [*words[:-1], str(tmp_path)], f"{tmp_path}: contains no picture")
 
 
 def test_compare_runs_and_pictures(finished_run, flow_pictures, tmp_path, capsys):

@@ -106,7 +106,7 @@ def test_lookup_order(no_weights_anywhere, weights_file, monkeypatch, tmp_path):
         ("lin3_weight", None, "lin3_weight is missing"),
         ("conv2_weight", lambda a: a.transpose(1, 0, 2, 3), r"conv2_weight is float32 \(64, 192, 5, 5\)"),
         ("lin1_weight", lambda a: a.reshape(1, -1, 1, 1), "lin1_weight"),
-        ("conv1_bias", lambda a: np.full_like(a, np.nan), "conv1_bias holds values that are not finite"),
+        ("conv1_bias", lambda a: np.full_like(a, np.nan), "conv1_bias has values that are not finite"),
         ("scale", lambda a: a.astype(int), "scale is int64"),
     ],
 )

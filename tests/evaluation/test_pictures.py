@@ -108,7 +108,7 @@ def test_files_are_paired_with_frames(names, expected, words, sequence, tmp_path
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        ([], "holds no picture; allowed: one file per frame, .npy, .png, .tif, .tiff, .bmp"),
+        ([], "contains no picture; allowed: one file per frame, .npy, .png, .tif, .tiff, .bmp"),
         (["a.png", "b.png"], "cannot be paired"),
         (["1.png", "2.png", "3.png"], "3 .png files cannot be paired with the 2 held-out frames (simulated-000001, "),
     ],

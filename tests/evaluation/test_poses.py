@@ -36,7 +36,7 @@ def test_a_turn_about_the_optical_axis_is_its_angle(clip):
     found = pose_change(clip, moved(clip, [0.0, 0, 0.02], [0.0, 0, 0]))
     assert found["degrees"] == pytest.approx(np.degrees(0.02), rel=1e-6)
     assert found["scene_units"] == pytest.approx(0, abs=1e-9) and 0.2 < found["pixels"] < 0.9
-    assert pose_sentence(found).startswith("Poses: corrected by 1.15 degrees and 0.00 mm in the mean, which moves")
+    assert pose_sentence(found).startswith("Mean pose correction 1.15 degrees and 0.00 mm; it moves")
 
 
 def test_nothing_corrected_is_none(clip):

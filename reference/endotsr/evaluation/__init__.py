@@ -1,1 +1,1 @@
-"""Metrics, LPIPS, image-space baselines, and the evaluation protocol."""
+"""Metrics, LPIPS, image-space baselines, evaluation protocol and comparison of methods."""

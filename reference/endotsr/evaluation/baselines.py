@@ -1,19 +1,19 @@
 """Image-space baselines: predictions of a held-out frame without a model.
 
-Four predictions, each made from training frames only and reported beside the model in every evaluation:
+Every evaluation reports four predictions, each from training frames only:
 
-temporal_mean      per-pixel mean over the training frames in which that pixel is tissue (0 where it never is)
-nearest_frame      copy of the training frame nearest in time (a tie goes to the earlier one)
+temporal_mean      per-pixel mean over the training frames in which the pixel is tissue; 0 if it never is
+nearest_frame      copy of the training frame nearest in time; of two, the earlier
 two_neighbours     the training frames before and after, blended linearly in time; on the 7:1 split this is their
-                   plain mean, inside a held-out block it is the blend of the two border frames
+                   mean, inside a held-out block it is a blend of the two border frames
 flow_interpolation dense optical flow (DIS, medium) in both directions between the same two frames, each warped to
-                   the wanted time and blended with the same weights
+                   the target time and blended with the same weights
 
-Excluded pixels. Only the temporal mean uses the masks of the training frames: a passing instrument would otherwise be
-smeared over the tissue. The other three use the training pixels as they are, instrument included; the metric sets the
-pixels that are excluded in the *test* frame to zero. On EndoNeRF `pulling` these choices give
-27.17, 37.71, 40.51 and 41.61 dB (full image, 7:1 split); zeroing the neighbours by their own masks first would
-cost 10 dB, a temporal mean that ignores the masks 1.2 dB.
+Excluded pixels: only the temporal mean uses the masks of the training frames, because a passing instrument would
+otherwise be smeared over the tissue. The other three use all training pixels, including the instrument. The metric sets
+the excluded pixels of the *test* frame to zero. On EndoNeRF `pulling` the four reach 27.17, 37.71, 40.51 and 41.61 dB
+(full image, 7:1 split). Zeroing the neighbours by their own masks would cost 10 dB; ignoring the masks in the temporal
+mean would cost 1.2 dB.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ RenderFrame = Callable[[int], FloatArray]
 
 
 class Neighbours(NamedTuple):
-    """Training frames around a time. A frame before the first or after the last has one neighbour, named twice."""
+    """The training frames around a time. Before the first or after the last one, both are the same frame."""
 
     before: int  # frame index
     after: int  # frame index
@@ -37,15 +37,15 @@ class Neighbours(NamedTuple):
 
     @property
     def nearest(self) -> int:
-        """The frame nearest in time; equally near: the earlier one."""
-        return self.after if self.fraction > 0.5 + 1e-9 else self.before  # times i / n are equally far up to rounding
+        """The frame nearest in time; of two, the earlier."""
+        return self.after if self.fraction > 0.5 + 1e-9 else self.before  # times i / n have rounding errors
 
 
 def neighbours(sequence: Sequence, index: int) -> Neighbours:
-    """The training frames next to frame `index` on both sides (never the frame itself) and the time fraction.
+    """The training frames before and after frame `index`, which is excluded, and the time fraction.
 
-    Edges    one-sided: both are the single neighbour, fraction 0; equal times: fraction 0.5
-    Raises   InputError if no other training frame exists
+    Edges    with one neighbour, both are this frame and the fraction is 0; equal times: fraction 0.5
+    Raises   InputError if there is no other training frame
     """
     train = np.asarray(sequence.train_index)
     earlier, later = train[train < index], train[train > index]
@@ -66,10 +66,10 @@ def unit_image(sequence: Sequence, index: int) -> FloatArray:
 
 
 def temporal_mean(sequence: Sequence) -> FloatArray:
-    """Mean of the training frames, each pixel over the frames in which it is tissue; 0 where it never is.
+    """Mean of the training frames, each pixel over the frames in which it is tissue; 0 if it never is.
 
-    returns   (3, H, W) float32, display units [0, 1]: one prediction for all frames, each of them included in its own.
-              Sums are exact integers, so the order of the frames has no effect
+    returns   (3, H, W) float32, display units [0, 1]: the same prediction for every frame. The sums are integers, so
+              the result does not depend on the order of the frames
     """
     total = np.zeros(sequence.images.shape[1:], np.int64)
     seen = np.zeros(sequence.images.shape[2:], np.int64)
@@ -80,24 +80,24 @@ def temporal_mean(sequence: Sequence) -> FloatArray:
 
 
 def nearest_frame(sequence: Sequence, index: int) -> FloatArray:
-    """Copy of the training frame nearest in time; equally near: the earlier one. (3, H, W) float32 in [0, 1]."""
+    """Copy of the training frame nearest in time; of two, the earlier. (3, H, W) float32 in [0, 1]."""
     return unit_image(sequence, neighbours(sequence, index).nearest)
 
 
 def two_neighbours(sequence: Sequence, index: int) -> FloatArray:
-    """(1 - s) before + s after with s the time fraction. (3, H, W) float32 in [0, 1]."""
+    """(1 - s) before + s after with the time fraction s. (3, H, W) float32 in [0, 1]."""
     near = neighbours(sequence, index)
     return _blend(unit_image(sequence, near.before), unit_image(sequence, near.after), near.fraction)
 
 
 def flow_interpolation(sequence: Sequence, index: int) -> FloatArray:
-    """Both neighbours warped along the optical flow to the wanted time, then blended as in `two_neighbours`.
+    """Both neighbours warped along the optical flow to the target time, then blended as in `two_neighbours`.
 
-    With flows f (before -> after) and g (after -> before) and time fraction s, the pixel p of the prediction is
-    (1 - s) before(p - s f(p)) + s after(p - (1 - s) g(p)), bilinear, border pixels repeated.
+    With flows f (before -> after) and g (after -> before) and time fraction s, the prediction at pixel p is
+    (1 - s) before(p - s f(p)) + s after(p - (1 - s) g(p)), bilinear, with repeated border pixels.
 
     returns   (3, H, W) float32, display units [0, 1]
-    Edges     one neighbour only: its copy; an image side below 16 px: the plain blend, without flow
+    Edges     one neighbour: its copy; an image side below 16 px: the blend without flow
     """
     from endotsr.opencv import dense_flow, warp_bilinear
 
@@ -127,4 +127,4 @@ BASELINES: dict[str, tuple[str, Callable[[Sequence], RenderFrame]]] = {
     "two_neighbours": ("Blend of the two neighbouring training frames", lambda s: lambda i: two_neighbours(s, i)),
     "flow_interpolation": ("Optical-flow interpolation (DIS)", lambda s: lambda i: flow_interpolation(s, i)),
 }
-"""Key in metrics.json -> (label, maker of the function frame index -> image)."""
+"""Key in metrics.json -> (label, function sequence -> function frame number -> image)."""

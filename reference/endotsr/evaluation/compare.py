@@ -1,8 +1,8 @@
-"""Several methods on the same held-out frames: means, and differences paired frame by frame.
+"""Comparison of methods on the same held-out frames: means and paired differences.
 
-In: dictionaries of metrics.json, of runs or of folders of pictures. Out: one row per method. A difference is taken from
-the first method on the same frame, so that frames that are difficult for both cancel. Its interval is a bootstrap over
-the frames: it covers other choices of frames of this clip, but not other clips.
+In: metrics.json of runs or of folders of pictures. Out: one row per method and metric. Differences to the first method
+are taken frame by frame, which cancels the difficulty of the frames. Their intervals are bootstrapped over frames: they
+cover other frames of this clip, but not other clips.
 """
 
 from typing import Any, NamedTuple, cast
@@ -19,25 +19,25 @@ SMALLER_IS_BETTER = ("lpips", "lpips_symmetric")
 
 
 class Method(NamedTuple):
-    """The held-out frames of one method."""
+    """The held-out metrics of one method."""
 
     label: str
     per_frame: list[FrameMetrics]  # entries of metrics.json: frame, name, time, metrics
-    digests: dict[str, str]  # array -> SHA-256 of the frames and masks it was measured on; empty if unknown
+    digests: dict[str, str]  # SHA-256 of `images` and `masks` of the sequence
 
 
 class PairedDifference(NamedTuple):
-    """A paired difference to the first method, over the frames for which both have a value."""
+    """A paired difference to the first method, over the frames with both values."""
 
     mean: float
     low: float  # of the interval
     high: float
-    better: int  # frames on which this method is the better one
+    better: int  # number of frames on which this method is better
     frames: int
 
 
 class Row(NamedTuple):
-    """One method and one metric."""
+    """The result of one method and metric."""
 
     label: str
     metric: str
@@ -46,10 +46,10 @@ class Row(NamedTuple):
 
 
 def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: bool = False) -> list[Method]:
-    """The method of one metrics.json, and the baselines in it if they are asked for.
+    """The method of one metrics.json, optionally with its baselines.
 
     where   the file, for messages
-    Raises: InputError if the dictionary is none of `endotsr evaluate`.
+    Raises: InputError if the dictionary is not from `endotsr evaluate`.
     """
     try:
         about: Any = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
@@ -67,11 +67,11 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
 
 
 def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:
-    """Means and paired differences to the first method, metric by metric.
+    """Means and paired differences to the first method for each metric.
 
-    metric_names   keys of the entries; a metric that no method has is left out
+    metric_names   keys of the entries; a metric without any value is left out
     seed           of the resampling
-    Raises: InputError if two methods have one label, or if they were not measured on the same frames and masks.
+    Raises: InputError if two methods have the same label, or were measured on different frames or masks.
     """
     _refuse_other_frames(methods)
     rows = []
@@ -102,7 +102,7 @@ def _refuse_other_frames(methods: list[Method]) -> None:
 
 
 def _frames(method: Method) -> list[int]:
-    """Numbers of the frames. Their names may differ: one clip has others in another layout, and equal digests."""
+    """Frame numbers. Names are not compared: they depend on the layout of the clip; the digests do not."""
     return [int(row["frame"]) for row in method.per_frame]
 
 
@@ -112,13 +112,13 @@ def _about(method: Method) -> str:
 
 
 def _column(method: Method, metric: str) -> FloatArray:
-    """The metric on every frame, NaN where it has no value."""
+    """The metric of every frame; NaN if it has no value."""
     values = [row.get(metric) for row in method.per_frame]
     return np.array([np.nan if value is None else float(value) for value in values], np.float64)
 
 
 def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference | None:
-    """Mean, interval and count of the differences; NaN entries are left out."""
+    """The paired difference; NaN entries are left out, None if there is no other."""
     known = difference[np.isfinite(difference)]
     if not known.size:
         return None
@@ -128,14 +128,14 @@ def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference 
 
 
 def interval(values: FloatArray, seed: int = 0) -> tuple[float, float]:
-    """The percentile bootstrap interval of a mean, at CONFIDENCE; one value is its own interval."""
+    """Percentile bootstrap interval of a mean at CONFIDENCE; for a single value both limits equal it."""
     if values.size < 2:
         return float(values[0]), float(values[0])
     return bootstrapped((values,), np.mean, seed)
 
 
 def bootstrapped(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> tuple[float, float]:
-    """Percentile bootstrap, at CONFIDENCE, of the average over the samples of their means or medians (`middle`)."""
+    """Percentile bootstrap interval at CONFIDENCE of the average of the samples' means or medians (`middle`)."""
     from scipy.stats import bootstrap
 
     def averaged(*drawn: FloatArray, axis: int = -1) -> FloatArray:

@@ -1,7 +1,7 @@
-"""Rendered depth of the held-out frames against the prior depth, which training never saw there.
+"""Rendered depth of the held-out frames compared with their prior depth, which is not used in training.
 
-The prior is no truth: it comes from stereo matching, and its errors count as errors here. The rows without a model
-predict the prior of a frame from those of training frames, so they share its way of erring.
+The prior is not ground truth: it comes from stereo matching, and its errors count as errors here. The rows without a
+model predict a prior from the priors of training frames, which have similar errors; this favours them.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,16 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 
-LEAST_OPACITY = 0.5  # of a pixel whose rendered depth counts; below, the render is mostly background
+LEAST_OPACITY = 0.5  # minimum opacity of a pixel with valid depth; below, the render is mostly background
 
 
 def normalised_depth(out: RenderOut, least_opacity: float = 0.0) -> FloatArray:
-    """Depth divided by opacity: the mean depth of what is seen, also where the scene is translucent.
+    """Rendered depth divided by opacity: the weighted mean depth of the visible Gaussians.
 
-    least_opacity  of a pixel that has a depth
-    returns        (H, W) scene units; 0 = below the least opacity, or no opacity. The rendered depth itself is the sum
-                   over Gaussians with their weights, which approaches 0 where little is opaque
+    The rendered depth is the weighted sum, which approaches 0 with the opacity.
+
+    least_opacity  minimum opacity of a pixel with depth
+    returns        (H, W) scene units; 0 where the opacity is 0 or below the minimum
     """
     seen = (out.opacity > 0) & (out.opacity >= least_opacity)
     return np.where(seen, out.depth / np.where(seen, out.opacity, 1), 0).astype(out.depth.dtype)
@@ -33,10 +34,10 @@ def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut
     """Errors over the tissue pixels of the held-out frames that have a prior, in scene units.
 
     render   frame number and camera -> render
-    returns  {"unit", "rows": [{"label", "mean_absolute", "root_mean_square", "relative", "covered"}]}: the model, the
-             blend of the priors of the two neighbouring training frames, and the prior of the nearest one. `relative`
-             is the mean of error / prior; `covered` the fraction of the pixels for which there is a prediction, and
-             the errors are those of the pixels that all rows cover
+    returns  {"unit", "rows": [{"label", "mean_absolute", "root_mean_square", "relative", "covered"}]} for the model,
+             the blend of the priors of the two neighbouring training frames, and the prior of the nearest one; or
+             {"reason"}. `relative` is the mean of error / prior, `covered` the fraction of pixels with a prediction.
+             Errors are taken over the pixels with a prediction in all rows
     """
     makers = {
         "this model": lambda i: normalised_depth(render(i, sequence.cameras[i]), LEAST_OPACITY),
@@ -76,7 +77,7 @@ def _errors(label: str, depth: FloatArray, truth: FloatArray) -> dict[str, Any]:
 
 
 def blended_prior(sequence: Sequence, index: int) -> FloatArray:
-    """The priors of the training frames before and after, blended in time; where one has none, the other's. (H, W)."""
+    """The priors of the training frames before and after, blended in time; a missing one is replaced. (H, W)."""
     near = neighbours(sequence, index)
     before, after = sequence.depth[near.before], sequence.depth[near.after]
     both = (before > 0) & (after > 0)

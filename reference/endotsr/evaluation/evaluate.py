@@ -1,11 +1,10 @@
-"""Metrics of renders against frames, the baseline rows beside them, and the dictionary that becomes metrics.json.
+"""Metrics of renders and baselines on the frames, and the dictionary of metrics.json.
 
-The source of a render is irrelevant here: the input is a function from frame number to picture, so the model, a
-baseline and the pictures of another program are measured by the same code.
+The input is a function from frame number to picture, so the same code evaluates the model, a baseline, and the pictures
+of another program.
 
-A metric without a value (LPIPS without weights, infinite PSNR of two equal pictures, tissue PSNR of an empty mask, a
-render that is not finite) is None, never NaN, so that the result is valid JSON. Means leave such values out and
-count them.
+A metric without a finite value (LPIPS without weights, infinite PSNR of two equal pictures, tissue PSNR of an empty
+mask, a render that is not finite) is None, never NaN, because the result is JSON. Means exclude and count such values.
 """
 
 import math
@@ -33,7 +32,7 @@ RenderFrame = Callable[[int], FloatArray]
 
 FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
 LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
-EVERY_TRAINING_FRAME = 6  # of the training frames reported beside the held-out ones
+EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
 
 
 def evaluate_frames(
@@ -42,9 +41,9 @@ def evaluate_frames(
     """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
 
     render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
-    lpips_weights   None: the LPIPS values are None
+    lpips_weights   None: LPIPS is None
 
-    Raises   ValueError naming the frame if a render has another shape than the frame
+    Raises   ValueError naming the frame if the shapes of render and frame differ
     """
     rows: list[FrameMetrics] = []
     bad = 0
@@ -61,7 +60,7 @@ def evaluate_frames(
 
 
 def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
-    """Frames with the means of their metrics; `not_finite` of their values were computed and are not finite."""
+    """Frames with the means of their metrics; `not_finite` is the number of computed values that are not finite."""
     keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]
     summary = mean_metrics([{key: row.get(key) for key in keys} for row in rows])
     excluded = {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])}
@@ -71,22 +70,22 @@ def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
 
 
 def left_out(evaluation: EvaluationRecord) -> list[str]:
-    """Names of the held-out frames without a tissue PSNR, which the means leave out: frames without tissue."""
+    """Names of the held-out frames without a tissue PSNR, which the means exclude."""
     rows = (evaluation.get("held_out") or {}).get("per_frame") or []
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
 
 
 def baseline_table(sequence: Sequence, lpips_weights: LpipsWeights | None = None) -> dict[str, LabelledFrames]:
-    """The four predictions of the held-out frames without a model, by key in the order of BASELINES."""
+    """Held-out metrics of the four baselines, in the order of BASELINES."""
     return {
         name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights)}
         for name, (label, make) in BASELINES.items()
     }
 
 
-def training_sample(sequence: Sequence, every: int = EVERY_TRAINING_FRAME) -> list[int]:
-    """Every `every`-th training frame, from the first."""
-    return [int(i) for i in sequence.train_index[::every]]
+def training_sample(sequence: Sequence) -> list[int]:
+    """Every sixth training frame, starting with the first."""
+    return [int(i) for i in sequence.train_index[::EVERY_TRAINING_FRAME]]
 
 
 def evaluate_model(
@@ -95,13 +94,12 @@ def evaluate_model(
     lpips_weights: LpipsWeights | None = None,
     training: Iterable[int] | None = None,
 ) -> EvaluationRecord:
-    """The content of metrics.json on the renders of a sequence.
+    """The content of metrics.json for the renders of a sequence.
 
-    training   frames whose PSNR is reported beside the held-out one; default `training_sample`. LPIPS is not computed
-               on them.
+    training   training frames to evaluate too, without LPIPS; default: `training_sample`
     returns    {"format", "frames", "held_out", "training", "temporal_gap", "baselines", "lpips_reason",
-               "not_finite"}; `temporal_gap` is training minus held-out mean, metric by metric;
-               `lpips_reason` is None when LPIPS was computed
+               "not_finite"}; `temporal_gap` is the training mean minus the held-out mean of each metric;
+               `lpips_reason` is None if LPIPS was computed
     """
     chosen = training_sample(sequence) if training is None else [int(i) for i in training]
     held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights)
@@ -124,7 +122,7 @@ def evaluation_record(
     baselines: dict[str, LabelledFrames],
     lpips_reason: str | None,
 ) -> EvaluationRecord:
-    """The content of metrics.json from what was measured; see `evaluate_model`."""
+    """The content of metrics.json from its measured parts; see `evaluate_model`."""
     return {
         "format": FORMAT,
         "frames": frames,
@@ -138,7 +136,7 @@ def evaluation_record(
 
 
 def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> Means:
-    """Both LPIPS values of the pictures with excluded pixels 0, the render clipped; None without weights."""
+    """Both LPIPS values, with a clipped render and excluded pixels 0; None without weights."""
     if weights is None:
         return dict.fromkeys(LPIPS_KEYS)
     shown, wanted = np.where(mask, np.clip(render, 0, 1), 0), np.where(mask, truth, 0)
@@ -146,7 +144,7 @@ def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weigh
 
 
 def difference(inside: Means, outside: Means) -> Means:
-    """Inside minus outside, metric by metric; None where one of them has no value."""
+    """Inside minus outside for each metric; None if one of them has no value."""
     pairs = {key: (value, outside.get(key)) for key, value in inside.items()}
     return {key: None if a is None or b is None else a - b for key, (a, b) in pairs.items()}
 

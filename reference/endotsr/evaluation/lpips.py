@@ -1,11 +1,11 @@
 """LPIPS (M3): perceptual distance of two images through the convolutional part of AlexNet, version 0.1, in NumPy.
 
-Five feature maps of each image are divided by their norm over channels, subtracted, squared, weighted by a learned
-non-negative vector, summed over channels and averaged over pixels; the distance is the sum over the five.
+Five feature maps of each image are divided by their norm over channels. Their squared differences are weighted by a
+learned non-negative vector, summed over channels and averaged over pixels; the distance is the sum over the five maps.
 The weights are not part of the package. Without them the value is None, with a reason.
 
 Weights file: an .npz with `conv1..5_weight` (out, in, k, k), `conv1..5_bias` (out,), `lin1..5_weight` (out,),
-`shift` (3,) and `scale` (3,), which normalise RGB in [-1, 1].
+`shift` (3,) and `scale` (3,); the last two normalise RGB in [-1, 1].
 """
 
 import math
@@ -30,12 +30,12 @@ STRIDES = (4, 1, 1, 1, 1)
 PADDINGS = (2, 2, 1, 1, 1)
 POOL_BEFORE = (False, True, True, False, False)  # 3 x 3 maximum, stride 2
 TINY = 1e-10  # added to the channel norm
-LARGEST_FILE = 1 << 28  # bytes of the weights; those of AlexNet have 10 MB
-SMALLEST_SIDE = 31  # pixels of an image side that leave one feature in the fifth map
+LARGEST_FILE = 1 << 28  # bytes; the AlexNet weights have 10 MB
+SMALLEST_SIDE = 31  # pixels; the fifth map of such an image has one feature per side
 
 
 class LpipsWeights(NamedTuple):
-    """AlexNet's five convolutions and the five heads, float32."""
+    """AlexNet's five convolutions and the five weight vectors of the distance, float32."""
 
     kernels: tuple[FloatArray, ...]  # five of (out, in, k, k)
     biases: tuple[FloatArray, ...]  # five of (out,)
@@ -45,7 +45,7 @@ class LpipsWeights(NamedTuple):
 
 
 def default_weights_path() -> Path:
-    """The weights file that is used when neither an argument nor the environment names one."""
+    """The weights file used if neither an argument nor the environment names one."""
     from platformdirs import user_data_dir
 
     return Path(user_data_dir("endotsr", appauthor=False)) / FILE_NAME
@@ -54,8 +54,8 @@ def default_weights_path() -> Path:
 def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | None:
     """Weights from `path`, else from the file in ENDOTSR_LPIPS, else from `default_weights_path()`, else None.
 
-    Raises InputError naming file and key if a file that was named is missing, or any found file cannot be used.
-    `lpips_obstacle(None, ...)` describes the places that were searched.
+    Raises InputError naming file and key if a named file is missing, or a file is unusable.
+    `lpips_obstacle(None, ...)` lists the searched locations.
     """
     named = path if path is not None else os.environ.get(ENVIRONMENT) or None
     if named is None:
@@ -65,7 +65,7 @@ def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | 
 
 
 def lpips_obstacle(weights: LpipsWeights | None, height: int, width: int) -> str | None:
-    """The reason why LPIPS of height x width images cannot be computed; None = it can."""
+    """The reason why LPIPS of height x width images cannot be computed; None if it can."""
     if weights is None:
         return f"no LPIPS weights: no file was given, {ENVIRONMENT} is not set, {default_weights_path()} does not exist"
     if min(height, width) < SMALLEST_SIDE:
@@ -81,8 +81,8 @@ def lpips(
     """LPIPS (M3) of two images; symmetric, 0 for equal images.
 
     a, b         (3, H, W)  RGB in [0, 1]; NaN gives NaN
-    input_range  "zero_one": used as they are (the protocol value); "minus_one_one": scaled to [-1, 1] first,
-                 the range that the weights are made for. The two are not comparable.
+    input_range  "zero_one": unchanged input (the protocol value); "minus_one_one": input scaled to [-1, 1], the range
+                 for which the weights were trained. The two values are not comparable.
     returns      the distance, or None if `lpips_obstacle` gives a reason
     Raises:      ValueError for shapes that do not fit or an unknown input_range.
     Oracle:      published pair of example images, 0.722 and 0.138 ("minus_one_one").
@@ -137,7 +137,7 @@ def _convolve(image: FloatArray, kernel: FloatArray, stride: int, padding: int) 
 
 
 def _pool(image: FloatArray) -> FloatArray:
-    """The largest of 3 x 3 neighbours at every second pixel."""
+    """3 x 3 maximum pooling with stride 2."""
     return np.lib.stride_tricks.sliding_window_view(image, (3, 3), axis=(1, 2))[:, ::2, ::2].max(axis=(3, 4))
 
 
@@ -163,11 +163,11 @@ def _read_weights(path: Path) -> LpipsWeights:
 def _entry(path: Path, arrays: dict[str, NDArray], key: str, shape: tuple[int, ...]) -> FloatArray:
     if key not in arrays:
         raise InputError(
-            f"{path}: LPIPS weights: key {key} is missing; it has {', '.join(sorted(arrays)) or 'no keys'}"
+            f"{path}: LPIPS weights: key {key} is missing; the file has {', '.join(sorted(arrays)) or 'no keys'}"
         )
     value = arrays[key]
     if value.shape != shape or not np.issubdtype(value.dtype, np.floating):
         raise InputError(f"{path}: LPIPS weights: {key} is {value.dtype} {value.shape}; expected floating {shape}")
     if not np.isfinite(value).all():
-        raise InputError(f"{path}: LPIPS weights: {key} holds values that are not finite")
+        raise InputError(f"{path}: LPIPS weights: {key} has values that are not finite")
     return np.ascontiguousarray(value, np.float32)

@@ -1,8 +1,8 @@
 """PSNR (M1) and SSIM (M2) of a render against a frame, over the full image and over tissue.
 
 In: planar images (3, H, W) in display units and the tissue mask. Out: plain floats. "Full" sets excluded pixels to 0 in
-both images and counts them, as published tables do; "tissue" counts tissue pixels only and is the stricter,
-lower number. All arithmetic is float64. Values at excluded pixels, NaN included, have no effect.
+both images and averages over all pixels, as published tables do. "Tissue" averages over tissue pixels only and gives
+lower values. All arithmetic is float64. Values at excluded pixels, including NaN, have no effect.
 """
 
 import math
@@ -19,12 +19,12 @@ LEVELS = 255  # of an 8-bit image
 
 
 def psnr(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
-    """PSNR (M1) in dB, peak 1, mean squared error over all C H W values with excluded pixels 0 in both.
+    """PSNR (M1) in dB, peak 1: mean squared error over all C H W values, with excluded pixels 0 in both images.
 
-    render, truth  (C, H, W)  display units, taken as they are
+    render, truth  (C, H, W)  display units, not clipped
     mask           (H, W)     bool, True = tissue
-    Edges:   images equal on tissue: inf; no tissue: nan. Both are left out of means (`mean_metrics`).
-    Raises:  ValueError for shapes that do not match or a mask that is not boolean.
+    Edges:   images equal on tissue: inf; no tissue: nan. `mean_metrics` excludes both.
+    Raises:  ValueError for different shapes or a mask that is not boolean.
     Oracle:  skimage.metrics.peak_signal_noise_ratio of the zeroed images.
     """
     squared, count = _squared_error(render, truth, mask)
@@ -32,13 +32,13 @@ def psnr(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
 
 
 def psnr_tissue(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
-    """PSNR (M1) in dB with the mean over tissue pixels only: `psnr` + 10 log10(tissue fraction). Edges as `psnr`."""
+    """PSNR (M1) in dB over tissue pixels only: `psnr` + 10 log10(tissue fraction). Edges as `psnr`."""
     squared, count = _squared_error(render, truth, mask)
     return _decibel(squared / count) if count else math.nan
 
 
 def ssim_full(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
-    """SSIM (M2): mean over all pixels of the map of the images with excluded pixels 0.
+    """SSIM (M2) of the images with excluded pixels 0: mean of the SSIM map over all pixels.
 
     11 x 11 Gaussian window, sigma 1.5, zero padding, C1 = 0.01^2, C2 = 0.03^2; other variants differ by up to 0.07.
     Edges:   no tissue: nan. Raises as `psnr`. Oracle: `endotsr.definition.metrics`.
@@ -51,24 +51,24 @@ def ssim_full(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
 
 
 def ssim_tissue(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
-    """SSIM (M2): the map of `ssim_full`, averaged over tissue pixels. Edges as there."""
+    """SSIM (M2): the map of `ssim_full` averaged over tissue pixels. Edges as `ssim_full`."""
     if not mask.any():
         return math.nan
     return masked_ssim_forward(_wide("render", render, mask), ssim_target(_wide("truth", truth, mask), mask))[0]
 
 
 def round_8bit(image: FloatArray) -> NDArray[np.float64]:
-    """The image as an 8-bit file holds it: clipped to [0, 1], rounded half up to k / 255. NaN stays NaN."""
+    """The image as stored in an 8-bit file: clipped to [0, 1], rounded half up to k / 255. NaN stays NaN."""
     return np.floor(np.clip(np.asarray(image, np.float64), 0.0, 1.0) * LEVELS + 0.5) / LEVELS
 
 
 def image_metrics(render: FloatArray, truth: FloatArray, mask: BoolArray) -> dict[str, float]:
     """All metrics of one image.
 
-    render  (3, H, W)  display units; clipped to [0, 1], as a display does
+    render  (3, H, W)  display units; clipped to [0, 1] first, like on a display
     truth   (3, H, W)  display units [0, 1]
-    returns `psnr_full`, `psnr_tissue`, `ssim_full`, `ssim_tissue` on floats, and the same four with the ending `_8bit`
-            on images rounded to 8 bit (the only difference between the two), inf and nan as in each function
+    returns `psnr_full`, `psnr_tissue`, `ssim_full`, `ssim_tissue` of the float images, and the same four with suffix
+            `_8bit` of the images rounded to 8 bits; inf and nan as in each function
     """
     pictures = {"": (np.clip(render, 0.0, 1.0), truth), "_8bit": (round_8bit(render), round_8bit(truth))}
     functions = {"psnr_full": psnr, "psnr_tissue": psnr_tissue, "ssim_full": ssim_full, "ssim_tissue": ssim_tissue}
@@ -80,11 +80,11 @@ def image_metrics(render: FloatArray, truth: FloatArray, mask: BoolArray) -> dic
 
 
 def mean_metrics(rows: Iterable[Mapping[str, float | None]]) -> dict[str, float | int | None]:
-    """Means over images, metric by metric; the mean of a PSNR is a mean of dB.
+    """Means over images of each metric; PSNR is averaged in dB.
 
-    rows     dictionaries of `image_metrics`, more metrics allowed; None = a metric that could not be computed
-    returns  for every metric its mean over the images with a finite value (None without any), under
-             `<metric>_excluded` the count of those left out, and under `images` the count of all
+    rows     dictionaries of `image_metrics`, possibly with more metrics; None = not computed
+    returns  for each metric its mean over the images with a finite value (None without any), `<metric>_excluded`: the
+             number of other images, `images`: the number of all images
     """
     rows = list(rows)
     result: dict[str, float | int | None] = {"images": len(rows)}
@@ -96,7 +96,7 @@ def mean_metrics(rows: Iterable[Mapping[str, float | None]]) -> dict[str, float 
 
 
 def _squared_error(render: FloatArray, truth: FloatArray, mask: BoolArray) -> tuple[float, int]:
-    """Sum of squared differences on tissue, and the number of values in it."""
+    """Sum of squared differences on tissue, and its number of terms."""
     difference = _wide("render", render, mask)[:, mask] - _wide("truth", truth, mask)[:, mask]
     return float(np.sum(difference * difference)), difference.size
 

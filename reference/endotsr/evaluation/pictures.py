@@ -1,9 +1,9 @@
-"""A folder of pictures or a video in the place of a model: the renders of any method, measured by the same code.
+"""Evaluation of a folder of pictures or a video: the renders of any method, measured by the same code.
 
-In: a folder with one picture per frame, `.png`, `.tiff`, `.bmp` (8 or 16 bit) or `.npy` (float), or a video of them;
-the sequence that it shows. Out: the file of every frame, and the dictionary of metrics.json for these pictures. A float
-array keeps what an 8-bit file rounds, so that the picture of a baseline that was saved as `.npy` gives the numbers of
-that baseline to the last digit. What the compression of a video loses counts as an error of its method.
+In: a folder with one picture per frame, `.png`, `.tiff`, `.bmp` (8 or 16 bit) or `.npy` (float), or a video, and the
+sequence that they show. Out: the file of every frame, and the dictionary of metrics.json. A baseline saved as `.npy`
+reproduces its metrics to the last digit; an 8-bit file rounds. Compression losses of a video count as errors of its
+method.
 """
 
 from pathlib import Path
@@ -24,18 +24,18 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.video_file import VIDEO_ENDINGS, video_facts, video_pictures
 from endotsr.untrusted.arrays import read_npy
 
-KINDS = (".npy", ".png", *stored.TIFF_ENDINGS, ".bmp")  # without loss; the first that a folder holds is read
+KINDS = (".npy", ".png", *stored.TIFF_ENDINGS, ".bmp")  # lossless; the first kind found in a folder is read
 CHANNELS = 3
 LARGEST_FILE = 1 << 32  # bytes
-LARGEST = 16.0  # display units: a larger number is a level from 0 to 255 or 65535, not an overshoot
+LARGEST = 16.0  # display units; a larger value means 8-bit or 16-bit levels, not an overshoot
 
 
 class Pictures(NamedTuple):
-    """The pictures of a folder or a video by frame number, and how they were paired with the frames."""
+    """The pictures of a folder or video by frame number, and how they were paired with the frames."""
 
     folder: Path  # or the video
-    files: dict[int, Path]  # frame number -> file, held-out frames at least; of a video the name and the number in it
-    pairing: str  # in words
+    files: dict[int, Path]  # frame number -> file (VIDEO/NUMBER for a video), at least for the held-out frames
+    pairing: str  # as text
     decoded: dict[int, NDArray[np.uint8]] | None = None  # of a video: frame number -> (H, W, 3)
 
     def read(self, index: int, shape: tuple[int, ...]) -> FloatArray:
@@ -47,13 +47,13 @@ class Pictures(NamedTuple):
 
 
 def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
-    """The picture of every held-out frame, in a folder or in a video.
+    """Pair the held-out frames with the pictures of a folder or a video.
 
-    The files are paired by the first of these rules that gives every held-out frame one file:
-    the name of the frame (the stem, or the stem up to its first dot); the number of the frame in the name; the order of
-    the numbers, where there are as many files as held-out frames, or as many as frames. A video has the last rule.
+    The first of these rules with one file for every held-out frame applies: the name of the frame (the stem, or the
+    stem up to its first dot); the frame number in the name; the order of the numbers, if there are as many files as
+    held-out frames, or as many as frames. For a video only the order applies.
 
-    Raises: InputError for a folder without pictures, one in which no rule applies, or a video that cannot be read.
+    Raises: InputError for a folder without pictures, if no rule applies, or for an unreadable video.
     """
     folder = Path(folder)
     if is_video(folder):
@@ -77,7 +77,7 @@ def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
 
 
 def is_video(path: Path) -> bool:
-    """Whether a path is a file with the ending of a video."""
+    """Whether a path is a file with a video's extension."""
     return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
 
 
@@ -105,11 +105,11 @@ def _listed(folder: Path) -> list[Path]:
         files = sorted(f for f in folder.iterdir() if f.suffix.lower() == kind and not f.name.startswith("."))
         if files:
             return files
-    raise InputError(f"{folder}: holds no picture; allowed: one file per frame, {', '.join(KINDS)}")
+    raise InputError(f"{folder}: contains no picture; allowed: one file per frame, {', '.join(KINDS)}")
 
 
 def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:
-    """Frames whose name, or name up to the first dot, is that of exactly one file."""
+    """Pair frames and files with equal names, or equal names up to the first dot if only one file matches."""
     whole = {file.stem: file for file in files}
     short: dict[str, list[Path]] = {}
     for file in files:
@@ -125,14 +125,14 @@ def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:
 
 
 def _by_number(files: list[Path], numbers: list[tuple[int, ...]] | None) -> dict[int, Path]:
-    """The files by the number in their names; none where it is not one number, or not unique."""
+    """The files by the number in their names; {} if a name has not exactly one number, or a number repeats."""
     if numbers is None or len(numbers[0]) != 1 or len(set(numbers)) < len(numbers):
         return {}
     return {number: file for (number,), file in zip(numbers, files)}
 
 
 def _by_order(files: list[Path], numbers: list[tuple[int, ...]] | None, frames: list[int]) -> dict[int, Path]:
-    """One file for each of the frames, in the order of the numbers; none if the counts differ."""
+    """One file per frame in the order of the numbers; {} if the counts differ."""
     if len(files) != len(frames) or (numbers is None and len(files) > 1):
         return {}
     ordered = files if numbers is None else [file for _, file in sorted(zip(numbers, files))]
@@ -145,9 +145,9 @@ def read_picture(file: Path, shape: tuple[int, ...]) -> FloatArray:
     file      PNG, TIFF or BMP: 8 or 16 bits, divided by 255 or 65535; NPY: floats in display units, (3, H, W) or
               (H, W, 3)
     shape     (3, H, W) of the frame
-    returns   (3, H, W), float32, or float64 where the file holds float64; not clipped
+    returns   (3, H, W), float32, or float64 for a float64 file; not clipped
 
-    Raises: InputError naming the file: unreadable, of another shape or type, with values that are no display units.
+    Raises: InputError naming the file: unreadable, wrong shape or type, values that are no display units.
     """
     return _of_shape(_read_array(file) if file.suffix.lower() == ".npy" else _read_levels(file), shape, file)
 
@@ -165,7 +165,7 @@ def _of_shape(picture: Array, shape: tuple[int, ...], file: Path) -> FloatArray:
 def _read_levels(file: Path) -> FloatArray:
     pixels = stored.read_picture(file)
     if pixels.dtype.kind != "u":
-        raise InputError(f"{file}: holds {pixels.dtype}; allowed: levels of 8 or 16 bits, or .npy")
+        raise InputError(f"{file}: type {pixels.dtype}; allowed: levels of 8 or 16 bits, or .npy")
     return pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
 
 
@@ -173,11 +173,11 @@ def _read_array(file: Path) -> Array:
     array = read_npy(file, LARGEST_FILE)
     if array.dtype not in (np.float32, np.float64):
         kinds = "an array of float32 or float64 in display units [0, 1]"
-        raise InputError(f"{file}: holds {array.dtype}; allowed: {kinds}")
+        raise InputError(f"{file}: type {array.dtype}; allowed: {kinds}")
     if not np.isfinite(array).all():
-        raise InputError(f"{file}: holds values that are not finite; allowed: display units [0, 1]")
+        raise InputError(f"{file}: values that are not finite; allowed: display units [0, 1]")
     if array.size and np.abs(array).max() > LARGEST:
-        raise InputError(f"{file}: holds {np.abs(array).max():g}; allowed: display units, from 0 to 1 (not to 255)")
+        raise InputError(f"{file}: value {np.abs(array).max():g}; allowed: display units, from 0 to 1 (not to 255)")
     return array
 
 
@@ -187,8 +187,8 @@ def measure_pictures(
     """The dictionary of metrics.json for a folder of pictures.
 
     label     name of the method; default: the name of the folder
-    returns   the keys of `evaluate_model`, `label` and `pictures` (folder, pairing, file of every frame). The training
-              part covers the training frames that the folder holds, which may be none
+    returns   the keys of `evaluate_model`, `label`, and `pictures` (folder, pairing, digests, file of every frame). The
+              training part covers the training frames with a picture, possibly none
 
     Raises: InputError as `read_picture`.
     """

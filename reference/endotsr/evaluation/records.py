@@ -1,4 +1,4 @@
-"""The parts of metrics.json. Every number is finite; a metric without a value is None."""
+"""The types of metrics.json. Every number is finite; a metric without a value is None."""
 
 from typing import Any, NotRequired, Required, TypedDict
 
@@ -30,7 +30,7 @@ class LabelledMeans(MetricValues, total=False):
 
 
 class FrameMetrics(MetricValues, total=False):
-    """One frame; every metric beside its number, name and time."""
+    """Number, name, time and metrics of one frame."""
 
     frame: Required[int]
     name: Required[str]
@@ -38,22 +38,22 @@ class FrameMetrics(MetricValues, total=False):
 
 
 class FramesMeasured(TypedDict):
-    """Some frames."""
+    """Metrics of several frames."""
 
-    mean: Means  # over the frames that have a value
+    mean: Means  # over the frames with a value
     per_frame: list[FrameMetrics]
-    excluded: dict[str, int]  # metric -> frames without a value, where there are any
-    not_finite: int  # values that were computed and are not finite
+    excluded: dict[str, int]  # metric -> number of frames without a value, if any
+    not_finite: int  # number of computed values that are not finite
 
 
 class LabelledFrames(FramesMeasured):
-    """Some frames of a prediction without a model, or of the blend of renders."""
+    """Metrics of several frames with a label: of a baseline, or of the blend of renders."""
 
     label: str
 
 
 class FramesPart(TypedDict):
-    """`frames` of metrics.json."""
+    """The entry `frames` of metrics.json."""
 
     total: int
     training: int
@@ -63,7 +63,7 @@ class FramesPart(TypedDict):
 
 
 class MotionPart(TypedDict):
-    """`trajectories` of metrics.json: the error of the motion beside the motion itself."""
+    """The entry `trajectories` of metrics.json: error of the motion, and size of the true motion."""
 
     scene_units: float
     pixels: float
@@ -73,7 +73,7 @@ class MotionPart(TypedDict):
 
 
 class PosePart(TypedDict):
-    """`pose_correction` of metrics.json: means over the training cameras."""
+    """The entry `pose_correction` of metrics.json: means over the training cameras."""
 
     degrees: float
     scene_units: float
@@ -82,7 +82,7 @@ class PosePart(TypedDict):
 
 
 class RunPart(TypedDict):
-    """`run` of metrics.json: what the numbers belong to."""
+    """The entry `run` of metrics.json: checkpoint, settings, input and machine."""
 
     iteration: int
     iterations_planned: int
@@ -102,7 +102,7 @@ class RunPart(TypedDict):
 
 
 class PicturesPart(TypedDict):
-    """`pictures` of metrics.json: the folder that was measured instead of a run."""
+    """The entry `pictures` of metrics.json: the evaluated folder or video."""
 
     folder: str
     pairing: str
@@ -111,7 +111,7 @@ class PicturesPart(TypedDict):
 
 
 class EvaluationRecord(TypedDict):
-    """metrics.json: of a model or of pictures (with `label`)."""
+    """metrics.json of a model, or of pictures (with `label`)."""
 
     format: int
     frames: FramesPart
@@ -120,7 +120,7 @@ class EvaluationRecord(TypedDict):
     temporal_gap: NotRequired[Means]
     components: NotRequired[list[LabelledMeans]]  # with one residual left out
     baselines: dict[str, LabelledFrames]
-    lpips_reason: str | None  # None when LPIPS was computed
+    lpips_reason: str | None  # None if LPIPS was computed
     not_finite: int
     cross_fade: NotRequired[LabelledFrames]
     trajectories: NotRequired[MotionPart | None]

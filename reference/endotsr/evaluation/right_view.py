@@ -1,12 +1,12 @@
-"""The view of the right camera of a rectified pair, against the real right picture, which no training frame shows.
+"""Renders for the right camera of a rectified pair, compared with the real right pictures, which training never uses.
 
-The baseline B of the pair follows from disparity d and prior depth z of the left pictures, B = d z / f, as the median
-over tissue pixels. A pair whose quartiles of B lie far apart is not calibrated, and is not measured. The right camera
-is the left one moved by B along its x axis.
+The stereo baseline B is the median of d z / f over tissue pixels, with disparity d and prior depth z of the left
+pictures. If the quartiles of B differ too much, the pair is not calibrated and is not measured. The right camera is the
+left one translated by B along its x axis.
 
-Which pixels count. The prior depth moves every left pixel to its place in the right picture, the nearest one in front.
-A right pixel counts if it shows tissue by this, with a margin, so that the choice depends on no model. Excluded pixels
-without depth are moved with the depth of the nearest pixel that has one.
+Evaluated pixels: every left pixel is warped to the right picture by its prior depth; of several, the nearest in depth
+is kept. A right pixel is evaluated if it then shows tissue, with a margin. This choice does not depend on a model.
+Pixels without depth use the depth of the nearest pixel with one.
 """
 
 from collections.abc import Callable
@@ -27,41 +27,40 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 
 FOLDER = "images_right"
-MATCHED_FRAMES = 5  # from which the baseline is found
-SEARCHED = 4  # disparities up to a quarter of the width
-SPREAD = 0.15  # (third - first quartile) / median of the baseline, above which the pair is not calibrated
-MARGIN = 3  # px that are removed at the border of the counted region
-LEAST_PIXELS = 100  # of tissue with disparity and depth
+MATCHED_FRAMES = 5  # number of frames for the stereo baseline
+SEARCHED = 4  # disparities up to 1 / SEARCHED of the width
+SPREAD = 0.15  # largest (third - first quartile) / median of the baseline for a calibrated pair
+MARGIN = 3  # px removed at the border of the evaluated region
+LEAST_PIXELS = 100  # tissue pixels with disparity and depth
 
 
 class Moved(NamedTuple):
-    """A left picture as the right camera sees it."""
+    """A left picture warped to the right camera."""
 
     picture: FloatArray  # (3, H, W) display units
-    counted: BoolArray  # (H, W) pixels that show tissue
+    counted: BoolArray  # (H, W) True = evaluated
 
 
 def right_view(
     sequence: Sequence, source: str, settings: SequenceConfig, render: Callable[[int, Camera], RenderOut]
 ) -> dict[str, Any]:
-    """PSNR (dB) and SSIM over the counted pixels, for held-out frames and for every sixth training frame.
+    """PSNR (dB) and SSIM over the evaluated pixels, for the held-out frames and every sixth training frame.
 
     source   sequence folder with images_right/
     render   frame number and camera -> render
     returns  {"baseline", "spread", "unit", "rows": [{"label", "held_out_psnr", "held_out_ssim", "training_psnr",
-             "training_ssim"}]}: the model, the left picture moved by the prior depth, the left picture as it is; or
-             {"reason"}
+             "training_ssim"}]} for the model, the warped left picture, and the unchanged left picture; or {"reason"}
     """
     folder = Path(source) / FOLDER
     if not folder.is_dir():
-        return {"reason": f"there is no {FOLDER}/ beside the left pictures"}
+        return {"reason": f"the sequence has no {FOLDER}/"}
     right = _right_pictures(folder, sequence, settings)
     found = stereo_baseline(sequence, right)
     if found is None:
         return {"reason": "left and right pictures have too few common pixels with depth"}
     baseline, spread = found
     if not baseline > 0 or spread > SPREAD:
-        return {"reason": f"disparity and depth do not give one baseline ({baseline:.3g}, spread {spread:.0%})"}
+        return {"reason": f"disparity and depth give no consistent baseline ({baseline:.3g}, spread {spread:.0%})"}
     rows: dict[str, dict[str, Any]] = {}
     for part, frames in (("held_out", sequence.test_index), ("training", training_sample(sequence))):
         values = [_frame(sequence, int(i), baseline, right(int(i)), render) for i in frames]
@@ -78,7 +77,7 @@ def right_camera(camera: Camera, baseline: float) -> Camera:
 
 
 def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]]) -> tuple[float, float] | None:
-    """Median of d z / f over tissue pixels of some frames, and its relative spread; None with too few pixels.
+    """Median of d z / f over tissue pixels of several frames, and its relative spread; None with too few pixels.
 
     right   frame number -> right picture (3, H, W)
     """
@@ -99,7 +98,7 @@ def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]
 
 
 def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
-    """The left picture moved by its prior depth; holes are 0 and do not count."""
+    """The left picture warped by its prior depth; holes are 0 and not evaluated."""
     from scipy.ndimage import binary_erosion, distance_transform_edt
 
     from endotsr.opencv import sample_bilinear
@@ -132,7 +131,7 @@ def _frame(
     right: NDArray[np.uint8],
     render: Callable[[int, Camera], RenderOut],
 ) -> dict[str, tuple[float, float]]:
-    """PSNR and SSIM of every row on one frame."""
+    """PSNR and SSIM of one frame by label."""
     truth = right.astype(np.float32) / np.float32(255)
     moved, camera = moved_left(sequence, index, baseline), right_camera(sequence.cameras[index], baseline)
     pictures = {

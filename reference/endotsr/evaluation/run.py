@@ -1,8 +1,7 @@
-"""The evaluation of a trained run: its renders against every frame, beside the baselines, as metrics.json.
+"""The evaluation of a trained run: metrics of its renders and of the baselines, as metrics.json.
 
-In: a model, the sequence that it was trained on, and run.json. Out: the dictionary of metrics.json (metrics of the
-frames, components taken out, how far the cameras were moved, what the numbers belong to) and the renders of the
-held-out frames. Writes nothing.
+In: a model, its training sequence, and run.json. Out: the dictionary of metrics.json (metrics of the frames, effect of
+each component, pose correction, description of the run) and the renders of the held-out frames. Writes nothing.
 """
 
 from collections.abc import Callable
@@ -41,10 +40,10 @@ COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, transla
 CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
 
-RENDERS_KEPT = 32  # of the held-out frames: a clip with more of them has others rendered again, and no more memory
-POINTS = 8  # along each side of the picture: where the motion of a camera is seen
+RENDERS_KEPT = 32  # cached held-out renders; further frames are rendered again
+POINTS = 8  # along each side of the picture: grid for the image motion of a camera
 
-RenderFrame = Callable[[int], RenderOut]  # of a frame number
+RenderFrame = Callable[[int], RenderOut]  # frame number -> render
 
 
 def measure_folder(
@@ -57,8 +56,8 @@ def measure_folder(
 ) -> tuple[Model, RunEvaluation, RenderFrame]:
     """The model of the latest checkpoint of a run, its metrics.json, and the renders of `measure_model`.
 
-    source    where the sequence is now; where it is simulated, the motion is measured too
-    measures  names of `evaluation.measures.MEASURES`: their results are `measures` in metrics.json
+    source    current location of the sequence; for a simulated one, the motion is measured too
+    measures  names of `evaluation.measures.MEASURES`; results under `measures` in metrics.json
     """
     model, (_, simulator), record = load_model(folder), run_source(folder), folder.record(*REPORTED)
     truth = true_positions_of(source, simulator, folder.config(), sequence)
@@ -75,14 +74,13 @@ def measure_model(
     weights: LpipsWeights | None = None,
     true_positions: TruePositions | None = None,
 ) -> tuple[EvaluationRecord, RenderFrame]:
-    """The part of metrics.json that needs no run folder, and the render of a held-out frame; the last are kept.
+    """The part of metrics.json that needs no run folder, and the function that renders held-out frames (cached).
 
-    weights         None: the LPIPS values are None
-    true_positions  of a simulated sequence: the motion is measured too
-    returns         the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at
-                    the neighbouring training times; `trajectories`, the fields of `TrajectoryError` and their `unit`,
-                    or None; `pose_correction`, that of `pose_change`; `components`, the means with one residual left
-                    out
+    weights         None: LPIPS is None
+    true_positions  of a simulated sequence, to measure the motion
+    returns         the keys of `evaluate_model`; `cross_fade`: metrics of the blend of the model's renders at the
+                    neighbouring training times; `trajectories`: `TrajectoryError` and its `unit`, or None;
+                    `pose_correction`: see `pose_change`; `components`: means with one residual removed
     """
     given, sequence = sequence, with_corrected_cameras(sequence, model.frames)
 
@@ -107,9 +105,9 @@ def measure_model(
 def _cross_fade(
     sequence: Sequence, render: Callable[[int], FloatArray], weights: LpipsWeights | None
 ) -> LabelledFrames:
-    """Held-out metrics of the blend of the model's own renders at the two neighbouring training times.
+    """Held-out metrics of the blend of the model's renders at the two neighbouring training times.
 
-    A model that is no better than this has fitted its training frames, and its motion carries nothing between them.
+    A model that is no better has learned no useful motion between its training frames.
     """
 
     def blend(index: int) -> FloatArray:
@@ -123,7 +121,7 @@ def _cross_fade(
 def _components(
     model: Model, sequence: Sequence, render: Callable[[int, str], RenderOut], full: Means
 ) -> list[LabelledMeans]:
-    """Held-out means with one spectral component taken out of the trained model, for those it has."""
+    """Held-out means of the whole model, and with each of its spectral components removed."""
     rows = [cast(LabelledMeans, {"label": "the whole model", **full})]
     arrays = {
         "appearance": model.gaussians.appearance_coefficients,
@@ -137,12 +135,12 @@ def _components(
 
 
 def pose_change(given: Sequence, seen: Sequence) -> PosePart | None:
-    """How far the training moved the cameras (B16): means over the training frames; None if both are one sequence.
+    """Mean pose correction (B16) over the training frames; None without correction.
 
-    given, seen  the sequence with its given poses, and with those that the model sees it by. A common motion of all
-                 cameras counts too, although it changes no picture
-    returns      `degrees` between the rotations, `scene_units` between the optical centres, `pixels` between the places
-                 of points at the median depth of the tissue, and the `unit` of the scene
+    given, seen  the sequence with its given poses and with the corrected ones (`given` itself: no correction). A common
+                 motion of all cameras counts too, although it changes no picture
+    returns      `degrees` between the rotations, `scene_units` between the optical centres, `pixels` between the
+                 projections of points at the median tissue depth, and the `unit` of the scene
     """
     if seen is given:
         return None
@@ -163,7 +161,7 @@ def _camera_change(sequence: Sequence, index: int, seen: Camera) -> tuple[float,
 
 
 def about_run(record: RunRecord, model: Model) -> RunPart:
-    """What the numbers belong to: enough for metrics.json to stand alone."""
+    """The entry `run` of metrics.json, which makes the file self-contained."""
     about = {
         "iteration": model.iteration,
         "iterations_planned": model.config.training.iterations,

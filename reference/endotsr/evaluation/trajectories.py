@@ -1,12 +1,12 @@
-"""The motion of a model against the true motion of the tissue, which a simulated sequence knows.
+"""The motion of a model compared with the true tissue motion of a simulated sequence.
 
-The model moves the point that is seen at pixel p of the frame at t_0 to the time t by the displacement of its
-Gaussians, averaged with the weights w_k with which they are composited at p:
+From time t_0 to time t, the model displaces the point visible at pixel p by the displacement of its Gaussians, averaged
+with their compositing weights w_k at p:
 
     D(p, t) = sum_k w_k(p) (mu_k(t) - mu_k(t_0)) / sum_k w_k(p)
 
-The error at p is the length of D(p, t) - (X(t) - X(t_0)), with the true position X of the material point that is seen
-at p. The depth of the render has no part in it: a model that is right about depth and does not move is wrong here.
+The error at p is |D(p, t) - (X(t) - X(t_0))| with the true position X of the material point visible at p. It does not
+depend on the rendered depth: a static model with correct depth has the error of the full motion.
 
 In: a model, a sequence and the true positions. Out: means over pixels, reference frames and times.
 """
@@ -25,10 +25,10 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, project
 from endotsr.splatting.render import Scene, render_forward
 
-# (reference frame, frame) -> (3, H, W): where the points seen at the pixels of the first are at the second.
+# (reference frame, frame) -> (3, H, W): positions at the second frame of the points visible at the pixels of the first.
 TruePositions = Callable[[int, int], FloatArray]
 
-LEAST_OPACITY = 1e-6  # of a pixel; a pixel with less shows no Gaussian, and the model predicts no motion there
+LEAST_OPACITY = 1e-6  # at pixels with a lower opacity the model predicts no motion
 
 
 class TrajectoryError(NamedTuple):
@@ -41,13 +41,13 @@ class TrajectoryError(NamedTuple):
 
 
 def displacement(scene: Scene, moved: Scene, camera: Camera, model: Model) -> FloatArray:
-    """Displacement D of what every pixel shows, from a scene to the same Gaussians at another time.
+    """Displacement D at every pixel, from a scene to the same Gaussians at another time.
 
     scene, moved  the Gaussians at the time of the picture and at the other time; N each
     camera        of the picture
-    returns       (3, H, W) scene units, world axes
+    returns       (3, H, W) scene units, world axes; 0 without opacity
 
-    The displacements are rendered as colours: scaled to [-1/2, 1/2], because B4 adds 1/2 and clips at 0.
+    The displacements are rendered as colours, scaled to [-1/2, 1/2] because B4 adds 1/2 and clips at 0.
     """
     moves = moved.position - scene.position
     largest = float(np.abs(moves).max(initial=0.0))
@@ -64,9 +64,9 @@ def displacement(scene: Scene, moved: Scene, camera: Camera, model: Model) -> Fl
 def trajectory_error(
     model: Model, sequence: Sequence, true_positions: TruePositions, references: Iterable[int] | None = None
 ) -> TrajectoryError | None:
-    """The errors of the model's motion from the reference frames to all frames; None without a tissue pixel.
+    """The error of the model's motion from the reference frames to all frames; None without a tissue pixel.
 
-    true_positions  of the simulator
+    true_positions  from the simulator
     references      frames; default: every sixth training frame
     """
     chosen = training_sample(sequence) if references is None else [int(i) for i in references]
@@ -82,7 +82,7 @@ def trajectory_error(
         tissue = sequence.masks[reference] & np.isfinite(positions).all(axis=0)  # a wound has no material point
         scene, start, camera = scenes[reference], positions[:, tissue], sequence.cameras[reference]
         for frame in range(sequence.count):
-            if frame != reference:  # sums, since the lengths of all pairs of a long clip do not fit in memory
+            if frame != reference:  # sums: the lengths of all pairs of a long clip do not fit in memory
                 moves = displacement(scene, scene._replace(position=moved[frame]), camera, model)[:, tissue]
                 truth = true_positions(reference, frame)[:, tissue]
                 total += _lengths(sequence.cameras[frame], start, moves, truth).sum(axis=1)
@@ -91,7 +91,7 @@ def trajectory_error(
 
 
 def _lengths(camera: Camera, start: FloatArray, moves: FloatArray, truth: FloatArray) -> FloatArray:
-    """(4, points): the lengths that `TrajectoryError` names, seen by the camera of the other frame."""
+    """(4, points): the lengths of `TrajectoryError`; pixels in the camera of the other frame."""
     place, still, moved = (np.stack(project(camera, point)[:2]) for point in (truth, start, start + moves))
     lengths = (start + moves - truth, moved - place, truth - start, place - still)
     return np.stack([np.sqrt(np.square(vector).sum(axis=0)) for vector in lengths])
