@@ -92,12 +92,12 @@ def test_numbers_beyond_half_precision_stay_finite(tmp_path):
 @pytest.mark.parametrize(
     ("name", "times", "content", "said"),
     [
-        ("a.npz", Times(count=2), Content(), "a slim model holds every time"),
-        ("a.npz", Times(), Content("points"), "a slim model holds every time"),
-        ("a.ply", Times(count=2), Content(), "one file holds one time, and 2 are chosen"),
+        ("a.npz", Times(count=2), Content(), "a slim model stores all times"),
+        ("a.npz", Times(), Content("points"), "a slim model stores all times"),
+        ("a.ply", Times(count=2), Content(), "a .ply file stores one time, not 2"),
         ("a.ply", Times(times=(1.5,)), Content(), "export: --times 1.5 is not allowed"),
         ("a.ply", Times(), Content(least_opacity=2), "--opacity 2 is not allowed"),
-        ("a.mp4", Times(), Content(), "a folder of ply files, and this is the name of a .mp4 file"),
+        ("a.mp4", Times(), Content(), "a folder of ply files, but this is the name of a .mp4 file"),
         (
             "a.spz",
             Times(),
@@ -146,12 +146,12 @@ def damaged(tmp_path, change):
         (lambda e, h: h["sequence"].update(train_index=[9]), "train_index: allowed: frames from 0 to"),
         (lambda e, h: e.pop("gaussians.quaternion"), "gaussians.quaternion is missing"),
         (lambda e, h: e.update({"gaussians.quaternion": e["gaussians.quaternion"][:3]}), "the shape (3, 80)"),
-        (lambda e, h: e.update({"gaussians.fdm_width": e["gaussians.fdm_width"][:, :2]}), "do not belong together"),
-        (lambda e, h: e.pop("gaussians.fdm_centre"), "do not belong together"),
+        (lambda e, h: e.update({"gaussians.fdm_width": e["gaussians.fdm_width"][:, :2]}), "have inconsistent shapes"),
+        (lambda e, h: e.pop("gaussians.fdm_centre"), "have inconsistent shapes"),
         (lambda e, h: e.update({"gaussians.harmonics": e["gaussians.harmonics"][:5]}), "harmonics has the shape (5,"),
         (lambda e, h: e.update({"gaussians.log_scale": e["gaussians.log_scale"] * np.nan}), "not finite"),
-        (lambda e, h: e.update({"gaussians.log_scale": e["gaussians.log_scale"].astype(int)}), "holds int64"),
-        (lambda e, h: e.update(other=np.zeros(2)), "other is foreign"),
+        (lambda e, h: e.update({"gaussians.log_scale": e["gaussians.log_scale"].astype(int)}), "has type int64"),
+        (lambda e, h: e.update(other=np.zeros(2)), "other is not an entry of a slim model"),
         (lambda e, h: h.update(frame_times=[0.0]), "two arrays for 1 frames expected"),
     ],
 )  # fmt: skip
@@ -173,11 +173,11 @@ def test_a_ply_file_that_is_cut_short_or_odd_is_refused(tmp_path):
     export(moving_scene(), tmp_path / "a.ply")
     content = (tmp_path / "a.ply").read_bytes()
     for changed, said in (
-        (content[:-1], "80 vertices of 248 bytes are announced"),
-        (content.replace(b"vertex 80", b"vertex 99999999999999999999"), "are announced"),
+        (content[:-1], "80 vertices of 248 bytes expected"),
+        (content.replace(b"vertex 80", b"vertex 99999999999999999999"), "bytes expected"),
         (content.replace(b"vertex 80", b"vertex -1"), "with a count"),
         (content.replace(b"float opacity", b"float opacitx"), "property opacity is missing"),
-        (content.replace(b"float rot_1", b"float rot_0"), "two vertex properties have one name"),
+        (content.replace(b"float rot_1", b"float rot_0"), "two with the same name"),
         (content.replace(b"property float f_rest_44\n", b""), "44 f_rest columns"),
         (content.replace(b"binary_little_endian", b"ascii"), "not a binary little-endian PLY file"),
     ):

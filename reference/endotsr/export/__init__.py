@@ -1,8 +1,8 @@
-"""A trained scene as files for other programs, and as one small file of its own.
+"""Export of a trained scene to files for other programs and to a compact format, and import.
 
-ply      the standard file of 3-D Gaussian splatting, at one time; point clouds     model    the slim model
-mesh     the visible surface at one time, from rendered depth
-scene    what rendering needs, opened from a run folder, a slim model or a ply file
-
-In: a model. Out: files, and the same back.
+ply      3-D Gaussian splatting files and point clouds, at one time    model      the slim model, a compact format
+gltf     animated points                                               mesh       the visible surface at one time
+npz      trained splats as arrays                                      placement  axes of the exported files
+scene    a scene from a run folder, a slim model or a ply file         times      the user's choice of times
+files    `endotsr export`: the format by the name of the file
 """

@@ -1,4 +1,4 @@
-"""What `endotsr export` writes: a slim model, one ply file, animated points, or a folder of ply files, by its name."""
+"""`endotsr export`: a slim model, one ply file, animated points, or a folder of ply files, selected by name."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ from endotsr.runs.folder import refuse_existing
 from endotsr.untrusted.writing import replacing_folder
 
 FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
-ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # of a file; `run.2` and `scale_0.5` are names of folders
+ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # extension of a file; `run.2` and `scale_0.5` are folder names
 WRITTEN = (
     "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.glb (animated points), FILE.npz (a slim"
     " model), or a name without an ending (a folder of .ply files)"
@@ -28,41 +28,41 @@ class Content(NamedTuple):
     """The content of a ply file."""
 
     kind: Literal["gaussians", "points", "mesh"] = "gaussians"
-    least_opacity: float = 0.1  # of a point
+    least_opacity: float = 0.1  # minimum opacity of a point
     taken_out: tuple[str, ...] = ()  # spectral components to leave out
-    voxel: float | None = None  # of a mesh: side of a voxel, scene units
+    voxel: float | None = None  # side of a voxel for a mesh, scene units
 
 
 ALL_TIMES, GAUSSIANS = Times(), Content()
-AXES = "axes: x right, y down, z forward, of the camera of the first frame"
+AXES = "axes: x right, y down, z forward in the camera of the first frame"
 
 
 def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> None:
-    """Raises InputError for a folder whose name has the ending of a file.
+    """Raises InputError for a folder name with a file extension.
 
-    of        what the folder holds, for the message
-    film      how a film is written instead
-    written   what can be written instead
+    of        content of the folder, for the message
+    film      advice for the extension of a film
+    written   advice for other extensions
     """
     ending = out.suffix.lower()
     if ENDING.fullmatch(ending) and not out.is_dir():
         advice = film if film and ending in FILM_ENDINGS else written or "allowed: a name without an ending"
-        raise InputError(f"{out}: --out is a folder of {of}, and this is the name of a {ending} file; {advice}")
+        raise InputError(f"{out}: --out is a folder of {of}, but this is the name of a {ending} file; {advice}")
 
 
 def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Content = GAUSSIANS) -> str:
-    """Write a scene to `out`, as the ending of its name says; returns one line on what was written.
+    """Write a scene to `out`; returns one line on the written file. The extension of `out` selects the format:
 
-    .npz    slim model; a choice of times or content is refused
-    .glb    points that move, at all frames if no times are chosen
-    .ply    one time, the first frame of the sequence if none is chosen
-    none    a folder with one ply file for each time; all frames if none is chosen
-    Raises: InputError for another ending, for times that do not exist, and for a place that cannot be written.
+    .npz    slim model; times or content cannot be chosen
+    .glb    animated points; default: at all frames
+    .ply    one time; default: the first frame of the sequence
+    none    a folder with one ply file per time; default: all frames
+    Raises: InputError for another extension, for invalid times or content, and for a path that cannot be written.
     """
     if not 0.0 <= content.least_opacity <= 1.0:
         raise InputError(f"export: --opacity {content.least_opacity:g} is not allowed; allowed: 0 to 1")
     if content.voxel is not None and content.kind != "mesh":
-        raise InputError("export: --voxel is the side of a voxel of a mesh; allowed: with --content mesh")
+        raise InputError("export: --voxel applies to a mesh only; allowed: with --content mesh")
     ending = out.suffix.lower()
     if ending == ".npz":
         return _slim(scene, out, times, content)
@@ -77,10 +77,10 @@ def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Con
 def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     if times.chosen or content != GAUSSIANS:
         raise InputError(
-            f"{out}: a slim model holds every time and the whole scene; allowed: --out alone, or a .ply file"
+            f"{out}: a slim model stores all times and the whole scene; allowed: --out alone, or a .ply file"
         )
     if scene.one_time:
-        raise InputError(f"{out}: a .ply file is one moment, a slim model a whole scene; allowed: of a run folder")
+        raise InputError(f"{out}: a slim model cannot be made from a .ply file of one time; allowed: a run folder")
     refuse_unwritable(out)
     model = scene.model
     save_slim_model(out, model, scene.record)
@@ -92,7 +92,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
 
 def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     if content.kind == "mesh":
-        raise InputError(f"{out}: a .glb holds points, and a mesh has other triangles at each time; allowed: a folder")
+        raise InputError(f"{out}: a .glb stores points; the triangles of a mesh change over time; allowed: a folder")
     wanted = [time for time, _, _, _ in chosen_times("export", times, scene.record, default="all")]
     refuse_unwritable(out)
     count = write_animated_points(out, scene, wanted, content.least_opacity, content.taken_out)
@@ -102,7 +102,7 @@ def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> 
 def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     wanted = chosen_times("export", times if times.chosen else Times(frames="all"), scene.record)
     if times.chosen and len(wanted) > 1:
-        raise InputError(f"{out}: one file holds one time, and {len(wanted)} are chosen; allowed: a folder, one time")
+        raise InputError(f"{out}: a .ply file stores one time, not {len(wanted)}; allowed: a folder, one time")
     refuse_unwritable(out)
     count = _write(scene, out, wanted[0][0], content)
     name = "triangles" if content.kind == "mesh" else content.kind
@@ -112,7 +112,7 @@ def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> 
 def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     wanted = chosen_times("export", times, scene.record, default="all")
     refuse_existing(out)
-    scene.model  # refuses a run without a usable checkpoint before anything is made  # noqa: B018
+    scene.model  # raises for a run without a usable checkpoint, before any file is created  # noqa: B018
     out.absolute().parent.mkdir(parents=True, exist_ok=True)
     with replacing_folder(out) as target:
         for k, (time, _, _, _) in enumerate(wanted):
@@ -121,7 +121,7 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
 
 
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
-    """One ply file; returns the number of its Gaussians, points or triangles."""
+    """Write one ply file; returns the number of Gaussians, points or triangles."""
     unit = scene.record.unit
     comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}", AXES)
     placement = scene.placement

@@ -1,9 +1,9 @@
 """Animated points as one binary glTF file (.glb), which Blender and other 3-D programs import.
 
-In: a scene and times. Out: a point cloud at the first time, a morph target for each other time (displacements), and an
-animation of their weights, so that positions between two times are interpolated linearly. The node turns the axes of
-the outputs (y down, z forward) into those of glTF (y up, z backward), and millimetres into metres. glTF has linear
-colours: those of the first time, from display RGB by the curve of sRGB.
+In: a scene and times. Out: a point cloud at the first time, a morph target (displacements) for every other time, and an
+animation of their weights. Positions between two times are interpolated linearly. The node transforms the axes of the
+exports (y down, z forward) to those of glTF (y up, z backward), and millimetres to metres. Colours are those of the
+first time, converted from display RGB to linear RGB by the sRGB curve.
 """
 
 import itertools
@@ -22,13 +22,13 @@ from endotsr.kernels.arrays import Array, FloatArray
 from endotsr.sequences.record import UNKNOWN_RATE
 from endotsr.untrusted.writing import replace_file
 
-LARGEST = 1 << 32  # bytes: a .glb states its length in 32 bits
-FLOAT, SHORT = 5126, 5123  # types of numbers, as glTF names them
-HALF_TURN = [1.0, 0.0, 0.0, 0.0]  # about x: quaternion x y z w
+LARGEST = 1 << 32  # bytes: the length of a .glb has 32 bits
+FLOAT, SHORT = 5126, 5123  # component types of glTF
+HALF_TURN = [1.0, 0.0, 0.0, 0.0]  # 180 degrees about x: quaternion x y z w
 
 
 class _Buffer:
-    """The numbers of a file, and where each array of them lies."""
+    """The binary data of a file, with its buffer views and accessors."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []
@@ -36,7 +36,7 @@ class _Buffer:
         self.accessors: list[dict[str, object]] = []
 
     def add(self, array: Array, kind: str, **more: Any) -> int:
-        """Append (n, k) or (n,) numbers; returns the number of their accessor."""
+        """Append (n, k) or (n,) numbers; returns the index of their accessor."""
         start, data = sum(map(len, self.parts)), np.ascontiguousarray(array).tobytes()
         self.parts.append(data + b"\0" * (-len(data) % 4))
         self.views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data)})
@@ -55,15 +55,15 @@ def write_animated_points(
 ) -> int:
     """Write the points of a scene at ascending times; returns their number.
 
-    least_opacity   of a Gaussian whose centre becomes a point
+    least_opacity   minimum opacity of the Gaussians whose centres are exported
 
     Raises: InputError for times that do not ascend, for a scene without such a Gaussian, and above 4 GB.
     """
     if any(b <= a for a, b in itertools.pairwise(times)):
-        raise InputError(f"{file}: an animation needs ascending times; allowed: each after the one before")
+        raise InputError(f"{file}: the times of an animation must ascend; allowed: each later than the previous one")
     shown = [point_vertices(placed_scene(scene.at(t, taken_out), scene.placement), least_opacity) for t in times]
     if not shown[0].size:
-        raise InputError(f"{file}: no Gaussian has an opacity of {least_opacity:g}; allowed: a smaller --opacity")
+        raise InputError(f"{file}: no Gaussian has opacity {least_opacity:g} or more; allowed: a smaller --opacity")
     if 12 * shown[0].size * (len(times) + 1) >= LARGEST:
         raise InputError(f"{file}: {shown[0].size} points at {len(times)} times need more than 4 GB; allowed: --count")
     points = [np.stack([each[axis] for axis in "xyz"], axis=1) for each in shown]
@@ -76,7 +76,7 @@ def write_animated_points(
 
 
 def _glb(points: list[FloatArray], levels: Array, seconds: FloatArray, times: list[float], unit: str) -> bytes:
-    """The bytes of the file: a header, the description, the numbers."""
+    """The bytes of the file: header, JSON chunk, binary chunk."""
     buffer, scale = _Buffer(), 0.001 if unit == "mm" else 1.0
     colours = np.append(_linear(levels), np.full((len(levels), 1), 65535, np.uint16), axis=1)
     primitive: dict[str, object] = {
@@ -116,6 +116,6 @@ def _glb(points: list[FloatArray], levels: Array, seconds: FloatArray, times: li
 
 
 def _linear(levels: Array) -> Array:
-    """8-bit display levels as linear ones of 16 bits: the curve of sRGB, IEC 61966-2-1."""
+    """8-bit display levels to 16-bit linear levels: the sRGB curve, IEC 61966-2-1."""
     shown = levels / 255
     return np.rint(65535 * np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)).astype("<u2")

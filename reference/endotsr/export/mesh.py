@@ -1,9 +1,9 @@
-"""The visible surface at one time as a triangle mesh: rendered depth, fused in a volume.
+"""The visible surface at one time as a triangle mesh, by volumetric fusion of rendered depth.
 
-In: a scene, a time, and the cameras of its frames. Every camera renders depth divided by opacity. The truncated signed
-distance of Curless and Levoy (1996) from these depths is averaged in a grid of voxels, and scikit-image extracts the
-surface of distance 0 (marching cubes). Out: vertices, triangles and colours. What no camera sees has no surface.
-scikit-image is an optional package (`pip install 'endotsr[mesh]'`) and imported where it is used.
+In: a scene, a time, and the cameras of its frames. Every camera renders depth divided by opacity. Their truncated
+signed distances (Curless and Levoy, 1996) are averaged in a voxel grid, and marching cubes of scikit-image extracts the
+zero level set. Out: vertices, triangles and colours of the observed surface. scikit-image is an optional package
+(`pip install 'endotsr[mesh]'`), imported on first use.
 """
 
 from collections.abc import Iterator
@@ -19,14 +19,14 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.splatting.camera import Camera, backproject, project
 
 MOST_VOXELS = 1 << 24
-MOST_VIEWS = 32  # cameras of a moving clip that are fused, evenly chosen
+MOST_VIEWS = 32  # maximum number of fused cameras of a moving clip, evenly spaced
 PIXELS_A_VOXEL = 1.5  # side of a voxel, in pixels at the median depth
-TRUNCATION = 4.0  # voxels in front of and behind the surface
-SLAB = 1 << 20  # voxels that are filled at once
+TRUNCATION = 4.0  # truncation distance, in voxels
+SLAB = 1 << 20  # voxels processed at once
 
 
 class DepthView(NamedTuple):
-    """What one camera sees."""
+    """Depth and colour rendered from one camera."""
 
     camera: Camera
     depth: FloatArray  # (H, W) view-space z, scene units; 0 = none
@@ -34,10 +34,10 @@ class DepthView(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """Triangles of a surface, counter-clockwise as the cameras see them."""
+    """Triangles of a surface, counter-clockwise seen from the cameras."""
 
     vertices: FloatArray  # (V, 3) float32, scene units
-    faces: NDArray[np.int32]  # (F, 3) positions in `vertices`
+    faces: NDArray[np.int32]  # (F, 3) indices into `vertices`
     colours: NDArray[np.uint8]  # (V, 3) red, green, blue
 
 
@@ -52,7 +52,7 @@ class Grid(NamedTuple):
 def surface(scene: MovingScene, time: float, voxel: float | None = None, taken_out: tuple[str, ...] = ()) -> Mesh:
     """The visible surface of a scene at `time` in [0, 1].
 
-    voxel        side of a voxel in scene units; None: `PIXELS_A_VOXEL` pixels, or larger if the grid would not fit
+    voxel        side of a voxel in scene units; None: `PIXELS_A_VOXEL` pixels, larger if the grid would be too large
     taken_out    spectral components to leave out
     Raises: InputError without scikit-image, without a surface, or for a voxel that is too small.
     """
@@ -62,7 +62,7 @@ def surface(scene: MovingScene, time: float, voxel: float | None = None, taken_o
 
 
 def depth_view(scene: MovingScene, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> DepthView:
-    """Depth divided by opacity, where the scene is opaque enough to have one."""
+    """Render depth divided by opacity (0 below `LEAST_OPACITY`) and colour."""
     out = scene.render(time, camera, taken_out)
     return DepthView(camera, normalised_depth(out, LEAST_OPACITY), out.colour)
 
@@ -79,7 +79,7 @@ def fused(views: list[DepthView], voxel: float | None = None) -> Mesh:
         ) from None
     grid = _grid(views, voxel)
     distance, weight = _distances(views, grid)
-    # The border between the seen and the unseen is no surface: a cell counts if everything around it was seen.
+    # The border of the observed region is no surface: use only cells whose whole neighbourhood was observed.
     known = binary_erosion(weight > 0, np.ones((3, 3, 3)))
     corners, faces, _, _ = marching_cubes(distance, 0.0, mask=known, gradient_direction="descent")
     vertices = grid.low + grid.side * corners
@@ -87,7 +87,7 @@ def fused(views: list[DepthView], voxel: float | None = None) -> Mesh:
 
 
 def _grid(views: list[DepthView], voxel: float | None) -> Grid:
-    """A grid around everything that is seen."""
+    """A grid around all observed points."""
     if not any((view.depth > 0).any() for view in views):
         raise InputError("export: no surface at this time; the rendered views have no depth")
     points = np.concatenate([_points(view) for view in views], axis=1)
@@ -101,8 +101,8 @@ def _grid(views: list[DepthView], voxel: float | None) -> Grid:
         side = voxel
     else:
         raise InputError(
-            f"export: --voxel {voxel:g} is not allowed; allowed: a number > 0 with which the grid has at most "
-            f"{MOST_VOXELS} voxels; {PIXELS_A_VOXEL * float(footprint):.3g} is {PIXELS_A_VOXEL:g} pixels"
+            f"export: --voxel {voxel:g} is not allowed; allowed: a number > 0 for a grid of at most {MOST_VOXELS} "
+            f"voxels; {PIXELS_A_VOXEL * float(footprint):.3g} corresponds to {PIXELS_A_VOXEL:g} pixels"
         )
     margin = TRUNCATION * side
     counts = np.ceil((high - low + 2 * margin) / side).astype(int) + 1
@@ -119,7 +119,7 @@ def _points(view: DepthView) -> FloatArray:
 
 
 def _distances(views: list[DepthView], grid: Grid) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Mean truncated signed distance in units of the truncation, 1 = free or unseen, and the number of its views."""
+    """Mean truncated signed distance in units of the truncation (1 = free or unobserved), and its number of views."""
     total, weight = np.zeros(grid.shape, np.float32), np.zeros(grid.shape, np.float32)
     for part, points in _slabs(grid):
         for view in views:
@@ -132,7 +132,7 @@ def _distances(views: list[DepthView], grid: Grid) -> tuple[NDArray[np.float32],
 
 
 def _slabs(grid: Grid) -> Iterator[tuple[slice, FloatArray]]:
-    """Slices of the first axis with the corners in them, (3, M)."""
+    """Slices of the first axis, with the corners of each, (3, M)."""
     step = max(1, SLAB // (grid.shape[1] * grid.shape[2]))
     for start in range(0, grid.shape[0], step):
         part = slice(start, min(start + step, grid.shape[0]))
@@ -141,13 +141,13 @@ def _slabs(grid: Grid) -> Iterator[tuple[slice, FloatArray]]:
 
 
 def _projected(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """View-space z of points (3, M), and their row and column in the picture as `map_coordinates` counts them."""
+    """View-space z of points (3, M), and their (row, column) for `map_coordinates`."""
     u, v, z = project(camera, points)
     return z, np.where(z > 0, np.stack([v, u]) - 0.5, 0)
 
 
 def _looked_up(view: DepthView, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """View-space z of points (3, M), and the depth that the camera sees there: bilinear, 0 beside missing depth."""
+    """View-space z of points (3, M), and the rendered depth at their pixels: bilinear, 0 next to missing depth."""
     from scipy.ndimage import map_coordinates
 
     z, place = _projected(view.camera, points)
@@ -157,7 +157,7 @@ def _looked_up(view: DepthView, points: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _colours(views: list[DepthView], vertices: FloatArray, side: float) -> NDArray[np.uint8]:
-    """The mean colour of the views in which a vertex lies on the surface; mid-grey where there is none."""
+    """Mean colour of each vertex over the views that observe it, (V, 3); mid-grey without a view."""
     from scipy.ndimage import map_coordinates
 
     total, count = np.zeros((3, len(vertices))), np.zeros(len(vertices))

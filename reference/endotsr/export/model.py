@@ -1,10 +1,9 @@
-"""The slim model: all that rendering needs of a run, in one compressed file of half precision.
+"""The slim model: a trained scene for rendering, in one compressed file of half precision.
 
-A checkpoint also holds the state of the optimiser, in full precision. The slim model drops it and rounds every array
-but the positions to float16: the positions keep float32, since an error of theirs moves the picture. The arrays are in
-the world of the training, as the cameras of the record are; `placement` leads to the axes of the other outputs. The
-file is an npz without pickle: a JSON header (as bytes) with settings, iteration and the record of the sequence, and one
-entry an array.
+Unlike a checkpoint, it has no optimiser state, and all arrays except the positions are rounded to float16. Positions
+keep float32, because rounding them would move the picture. Arrays and cameras are in world coordinates of the training;
+`placement` transforms them to the axes of the other exports. The file is an npz without pickle: a JSON header (as
+bytes) with settings, iteration and the record of the sequence, and one entry per array.
 """
 
 import json
@@ -29,8 +28,8 @@ from endotsr.untrusted.writing import replace_file
 FORMAT = "endotsr slim model"
 VERSION = 1
 HEADER = "header"
-LARGEST_FILE = 1 << 33  # bytes of all arrays together
-KEPT_WHOLE = ("gaussians.position",)  # float32
+LARGEST_FILE = 1 << 33  # bytes, sum over all arrays
+KEPT_WHOLE = ("gaussians.position",)  # stored as float32
 HALF = np.finfo(np.float16)
 
 
@@ -42,10 +41,10 @@ class SlimModel(NamedTuple):
 
 
 def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
-    """Write a slim model; the file appears whole or not at all, and equal models give equal bytes.
+    """Write a slim model atomically. Equal models give equal bytes.
 
     record   sequence.json
-    A number beyond the range of float16 (65504) becomes the largest one.
+    Edges:   values beyond the range of float16 (65504) are clipped.
     """
     exposures = _exposures(model.frames)
     header = {
@@ -72,10 +71,10 @@ def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
 
 
 def load_slim_model(path: Path) -> SlimModel:
-    """Read and check a slim model; arrays come back as float32.
+    """Read and check a slim model; returns float32 arrays.
 
     Raises: InputError naming the file and the key: not a slim model, another version, an array that is missing,
-            foreign, of another shape or not finite, settings that do not exist, damaged data.
+            unknown, of the wrong shape or not finite, unknown settings, damaged data.
     """
     path = Path(path)
     try:
@@ -86,7 +85,7 @@ def load_slim_model(path: Path) -> SlimModel:
         raise InputError(f"{path}: not a slim model, or damaged: {error}") from None
     if not isinstance(header, dict) or (header.get("format"), header.get("version")) != (FORMAT, VERSION):
         raise InputError(
-            f"{path}: not a slim model of version {VERSION}; `endotsr export RUN --out FILE.npz` makes one"
+            f"{path}: not a slim model of version {VERSION}; `endotsr export RUN --out FILE.npz` writes one"
         )
     for key in ("iteration", "config", "sequence", "frame_times"):
         if key not in header:
@@ -96,14 +95,14 @@ def load_slim_model(path: Path) -> SlimModel:
     gaussians = _gaussians(entries, path)
     frames = _frames(entries, header["frame_times"], path)
     if entries:
-        raise InputError(f"{path}: {next(iter(entries))} is foreign to a slim model")
+        raise InputError(f"{path}: {next(iter(entries))} is not an entry of a slim model")
     spectral = spectral_from(config.model, record.train_times)
     iteration = integer(header["iteration"], f"{path}: header: iteration", low=0)
     return SlimModel(Model(gaussians, spectral, config, iteration, frames), record)
 
 
 def _gaussians(entries: dict[str, NDArray], path: Path) -> Gaussians:
-    """The arrays of the Gaussians, taken out of `entries`."""
+    """The checked arrays of the Gaussians, removed from `entries`."""
     found = {name: _entry(entries, f"gaussians.{name}", path) for name in Gaussians._fields}
     needed = Gaussians._fields[: len(Gaussians._fields) - len(Gaussians._field_defaults)]
     for name in needed:
@@ -120,12 +119,12 @@ def _gaussians(entries: dict[str, NDArray], path: Path) -> Gaussians:
 
 
 def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
-    """Shapes that depend on the settings of a model: all three arrays of the deformation, harmonics of a degree."""
+    """Raises InputError for wrong shapes of the arrays that depend on the settings: FDM, harmonics, residuals."""
     fdm = [found[name] for name in ("fdm_weight", "fdm_centre", "fdm_width")]
     shapes = {None if array is None else array.shape for array in fdm}
     shape = next(iter(shapes))
     if len(shapes) > 1 or (shape is not None and (len(shape) != 3 or shape[0] != DEFORMATION_CHANNELS)):
-        raise InputError(f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width do not belong together")
+        raise InputError(f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width have inconsistent shapes")
     if found["harmonics"].shape[:-1] not in [(k, 3) for k in (1, 4, 9, 16)]:
         raise InputError(f"{path}: gaussians.harmonics has the shape {found['harmonics'].shape}")
     for name in ("appearance_coefficients", "motion_coefficients"):
@@ -135,14 +134,14 @@ def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
 
 
 def _exposures(frames: FrameParameters | None) -> FrameParameters | None:
-    """The parameters of frames that the file keeps; corrections of poses are part of its cameras."""
+    """The frame parameters stored in the file: exposures only, since its cameras include the pose correction."""
     if frames is None or frames.exposure_log_gain is None:
         return None
     return frames._replace(pose_rotation=None, pose_translation=None)
 
 
 def _with_corrected_cameras(record: SequenceRecord, model: Model) -> SequenceRecord:
-    """The record with the cameras that the model has corrected."""
+    """The record with the model's corrected cameras."""
     if pose_at(model.frames, 0.0) is None:
         return record
     cameras = corrected_cameras(model.frames, record.frame_cameras, record.times)
@@ -159,12 +158,12 @@ def _frames(entries: dict[str, NDArray], times: Any, path: Path) -> FrameParamet
 
 
 def _entry(entries: dict[str, NDArray], name: str, path: Path) -> Any:
-    """An array as float32, taken out of `entries`; None if it is not there."""
+    """An array as float32, removed from `entries`; None if it is missing."""
     array = entries.pop(name, None)
     if array is None:
         return None
     if array.dtype not in (np.float16, np.float32):
-        raise InputError(f"{path}: {name} holds {array.dtype}; allowed: float16, float32")
+        raise InputError(f"{path}: {name} has type {array.dtype}; allowed: float16, float32")
     if not np.isfinite(array).all():
-        raise InputError(f"{path}: {name} holds numbers that are not finite")
+        raise InputError(f"{path}: {name} has numbers that are not finite")
     return np.ascontiguousarray(array, np.float32)

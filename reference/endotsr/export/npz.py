@@ -17,7 +17,7 @@ LARGEST_FILE = 1 << 32  # bytes
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """The arrays of a trained scene.
 
-    Raises: InputError naming the file and what is missing or has another shape.
+    Raises: InputError naming the file, and the array that is missing or has the wrong shape.
     """
     try:
         with open_npz(path, LARGEST_FILE, compressed=True) as file:

@@ -1,10 +1,10 @@
-"""The axes of everything that is written for other programs, whatever those of the input were.
+"""The axes of exported files, independent of the axes of the input.
 
-A scene is trained in the world of its sequence, and layouts differ: an EndoNeRF world has y up and z backward. Every
-output (ply, point cloud, mesh, camera paths) is in the axes of the camera of the first frame instead: x to the right, y
-down, z forward, the origin at its optical centre. The camera with the identity as its pose sees what the first frame
-shows. Outputs are converted when they are written: checkpoints, sequence.json and the arrays of a slim model stay in
-the world of the training, to the bit, and `cameras[0]` of their records leads from it to the outputs.
+Training uses the world coordinates of the sequence, which depend on its layout: EndoNeRF has y up and z backward. All
+exports (ply, point cloud, mesh, camera paths) use the camera axes of the first frame: x right, y down, z forward,
+origin at its optical centre. A camera with the identity pose therefore shows the first frame. The conversion takes
+place on export only: checkpoints, sequence.json and slim models keep the training coordinates bitwise, and `cameras[0]`
+of their records is the transformation to the exports.
 """
 
 from typing import NamedTuple
@@ -16,9 +16,9 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.harmonics_formulas import harmonic_basis
 from endotsr.splatting.render import Scene
 
-DIRECTIONS = 64  # from which the rotation of the harmonics is found
+DIRECTIONS = 64  # sample directions for the rotation of the harmonics
 DEGREES = (slice(0, 3), slice(3, 8), slice(8, 15))  # Y_1 ... Y_15 of degree 1, 2 and 3
-NEAR_WHOLE = 1e-12  # an entry of a rotation of harmonics this near to a whole number is that number
+NEAR_WHOLE = 1e-12  # entries of a harmonics rotation this close to an integer are rounded to it
 
 
 class Placement(NamedTuple):
@@ -29,7 +29,7 @@ class Placement(NamedTuple):
 
     @property
     def unchanged(self) -> bool:
-        """Whether the outputs have the axes of the training."""
+        """Whether exports and training have the same axes."""
         return bool((self.rotation == np.eye(3)).all()) and not np.any(self.translation)
 
 
@@ -37,12 +37,12 @@ HERE = Placement(np.eye(3), np.zeros(3))
 
 
 def placement_of(camera: Camera) -> Placement:
-    """The placement that makes this camera the identity."""
+    """The placement that maps this camera to the identity pose."""
     return Placement(np.asarray(camera.rotation, np.float64), np.asarray(camera.translation, np.float64))
 
 
 def placed_points(points: FloatArray, placement: Placement) -> FloatArray:
-    """Positions (3, N) in the axes of the outputs, in their type; unchanged positions to the bit."""
+    """Positions (3, N) in export coordinates, same type; bitwise unchanged for the identity."""
     if placement.unchanged:
         return points
     moved = placement.rotation @ points.astype(np.float64) + placement.translation[:, None]
@@ -50,7 +50,7 @@ def placed_points(points: FloatArray, placement: Placement) -> FloatArray:
 
 
 def placed_scene(scene: Scene, placement: Placement) -> Scene:
-    """Gaussians in the axes of the outputs: positions, rotations, and the directions of their colours."""
+    """Gaussians in export coordinates: positions, quaternions and harmonics are transformed."""
     if placement.unchanged:
         return scene
     return scene._replace(
@@ -61,7 +61,7 @@ def placed_scene(scene: Scene, placement: Placement) -> Scene:
 
 
 def _turned_quaternions(quaternion: FloatArray, rotation: FloatArray) -> FloatArray:
-    """The quaternions (4, N), w x y z, of rotation @ R(quaternion); their lengths stay."""
+    """The quaternions (4, N), w x y z, of rotation @ R(quaternion), with unchanged norms."""
     from scipy.spatial.transform import Rotation
 
     a, b, c, d = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
@@ -70,7 +70,7 @@ def _turned_quaternions(quaternion: FloatArray, rotation: FloatArray) -> FloatAr
 
 
 def _turned_harmonics(harmonics: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Coefficients (K, 3, N) whose colour in the direction rotation @ d is that of the given ones in d."""
+    """Rotated coefficients (K, 3, N): their colour in direction rotation @ d equals the given one's in direction d."""
     found = harmonics.astype(np.float64)
     if len(harmonics) > 1:
         directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
@@ -91,7 +91,7 @@ def _basis(directions: FloatArray) -> FloatArray:
 
 
 def placed_camera(camera: Camera, placement: Placement) -> Camera:
-    """The pose of a camera of the training in the axes of the outputs."""
+    """A camera of the training, in export coordinates."""
     if placement.unchanged:
         return camera
     rotation = np.asarray(camera.rotation, np.float64) @ placement.rotation.T
@@ -99,7 +99,7 @@ def placed_camera(camera: Camera, placement: Placement) -> Camera:
 
 
 def training_camera(camera: Camera, placement: Placement) -> Camera:
-    """A camera in the axes of the outputs, such as that of a file, in the world of the training."""
+    """A camera in export coordinates, for example from a file, in training coordinates."""
     if placement.unchanged:
         return camera
     translation = camera.rotation @ placement.translation + camera.translation

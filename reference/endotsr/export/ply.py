@@ -1,9 +1,9 @@
-"""The file of 3-D Gaussian splatting (.ply): written at one time of a scene, and read.
+"""3-D Gaussian splatting files (.ply): written for one time of a scene, and read.
 
-Binary little-endian vertices with the properties that the original program writes and other viewers expect: x y z,
-nx ny nz (zero), f_dc_0..2, f_rest_* (all of red, then green, then blue), opacity (logit), scale_0..2 (logarithms),
-rot_0..3 (w x y z), all float32. Harmonics are those of this package; `placement` gives the axes. Numbers of a
-file are user input: a Gaussian with a number that is not finite is left out when it is read.
+Binary little-endian vertices with the properties of the original program, which other viewers expect: x y z, nx ny nz
+(zero), f_dc_0..2, f_rest_* (all of red, then green, then blue), opacity (logit), scale_0..2 (logarithms), rot_0..3
+(w x y z), all float32. The basis of the harmonics is the package's; `placement` defines the axes. Files are untrusted
+input: reading drops Gaussians with numbers that are not finite.
 """
 
 from collections.abc import Sequence
@@ -25,15 +25,15 @@ PLY_TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8"
              "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4"}  # fmt: skip
 TYPE_NAMES = {np.dtype("<f4"): "float", np.dtype("u1"): "uchar"}
 LARGEST_FILE = 1 << 33  # bytes
-REST = (0, 9, 24, 45)  # f_rest columns of degree 0 to 3
-LEAST_NORM = 1e-12  # of a quaternion: a shorter one has no direction
+REST = (0, 9, 24, 45)  # number of f_rest columns for degree 0 to 3
+LEAST_NORM = 1e-12  # lower bound for the norm of a quaternion
 
 
 def gaussian_vertices(scene: Scene) -> NDArray[np.void]:
     """The vertices of a scene at one time; the colour residual is added to the coefficient of degree 0.
 
-    scene     raw parameters of N Gaussians, as `scene_at` gives them
-    returns   (N,) records with the properties of the module docstring, the quaternion normalised
+    scene     raw parameters of N Gaussians, from `scene_at`
+    returns   (N,) records with the properties of the module docstring and normalised quaternions
     """
     harmonics = scene.harmonics if scene.residual is None else scene.harmonics.copy()
     if scene.residual is not None:
@@ -51,7 +51,7 @@ def gaussian_vertices(scene: Scene) -> NDArray[np.void]:
 
 
 def point_vertices(scene: Scene, least_opacity: float) -> NDArray[np.void]:
-    """The centres of the Gaussians that are opaque enough, with their colour of degree 0 as 8-bit red, green, blue."""
+    """The centres of the Gaussians with at least this opacity, with their degree-0 colour as 8-bit RGB."""
     opacity = 1 / (1 + np.exp(-scene.opacity_logit.astype(np.float64)))
     base = scene.harmonics[0] if scene.residual is None else scene.harmonics[0] + scene.residual
     chosen = opacity >= least_opacity
@@ -76,7 +76,7 @@ def mesh_vertices(position: FloatArray, colours: NDArray[np.uint8]) -> NDArray[n
 def write_ply(
     path: Path, vertices: NDArray[np.void], comments: Sequence[str] = (), faces: NDArray[np.int32] | None = None
 ) -> None:
-    """Write vertices and, if given, triangles (F, 3) of them; the file appears whole or not at all.
+    """Write vertices and optional triangles (F, 3) atomically.
 
     comments   single lines of ASCII
     """
@@ -95,7 +95,7 @@ def write_ply(
 
 
 def read_gaussians(path: Path) -> Gaussians:
-    """The Gaussians of a file, float32, without those that hold a number that is not finite.
+    """The Gaussians of a file, float32, without those with a number that is not finite.
 
     Raises: InputError naming file and reason.
     """
@@ -113,8 +113,8 @@ def read_gaussians(path: Path) -> Gaussians:
 
 
 def sound(found: Gaussians, path: Path) -> Gaussians:
-    """The Gaussians all of whose numbers are finite, float32. Raises InputError if there are none."""
-    with np.errstate(over="ignore"):  # a float64 that float32 cannot hold becomes infinite, and is left out
+    """The Gaussians with finite numbers only, float32. Raises InputError if there are none."""
+    with np.errstate(over="ignore"):  # a float64 beyond the range of float32 becomes infinite, and is left out
         single = {name: a.astype(np.float32) for name, a in arrays(found).items()}
     keep = np.all([np.isfinite(a).reshape(-1, a.shape[-1]).all(axis=0) for a in single.values()], axis=0)
     if not keep.any():
@@ -146,7 +146,7 @@ def _gaussians(vertex: NDArray[np.void]) -> Gaussians:
 
 
 def _vertices(content: bytes) -> NDArray[np.void]:
-    """The vertex element of a binary little-endian PLY file whose first element it is."""
+    """The vertices of a binary little-endian PLY file, whose first element must be `vertex`."""
     head, mark, body = content.partition(b"end_header\n")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     if not mark or lines[:1] != [["ply"]] or ["format", "binary_little_endian", "1.0"] not in lines:
@@ -160,8 +160,8 @@ def _vertices(content: bytes) -> NDArray[np.void]:
         raise ValueError("a vertex property is not a plain number")
     names, count = [line[2] for line in properties], int(first[2])
     if len(set(names)) < len(names) or not names:
-        raise ValueError("two vertex properties have one name, or there is none")
+        raise ValueError("no vertex property, or two with the same name")
     kind = np.dtype([(line[2], PLY_TYPES[line[1]]) for line in properties])
     if count < 1 or len(body) < count * kind.itemsize:
-        raise ValueError(f"{count} vertices of {kind.itemsize} bytes are announced, {len(body)} bytes are there")
+        raise ValueError(f"{count} vertices of {kind.itemsize} bytes expected, {len(body)} bytes found")
     return np.frombuffer(body, kind, count=count)

@@ -1,6 +1,6 @@
-"""What rendering needs, opened from any file that holds it: a run folder, a slim model, or a 3DGS ply file.
+"""A scene to render, opened from a run folder, a slim model, or a 3DGS ply file.
 
-A ply file is one moment: its scene does not move, and it is seen by a camera that faces it.
+The scene of a ply file is static; its camera looks along z at the Gaussians.
 """
 
 from dataclasses import dataclass
@@ -24,26 +24,26 @@ from endotsr.sequences.record import SequenceRecord, nearest_frame, recorded
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut, Scene
 
-FOCAL = 1.2  # image widths, of a camera that faces a scene
-MARGIN = 1.1  # of its picture around the Gaussians
-SIDE = 512  # pixels of its picture
-NEAR = 0.01  # distances of the camera: its near plane
+FOCAL = 1.2  # focal length of the facing camera, picture widths
+MARGIN = 1.1  # width of its picture relative to the extent of the Gaussians
+SIDE = 512  # side of its picture, pixels
+NEAR = 0.01  # near plane relative to the distance of the camera
 STILL = ModelConfig(appearance=False, spectral_motion=False, deformation=False)
 COMPONENTS = ("appearance", "spectral_motion")
 
 
 @dataclass(frozen=True)
 class MovingScene:
-    """The record of a sequence (sequence.json) and the model of it, which a run folder gives at its first use."""
+    """The record of a sequence (sequence.json) and its model; the model of a run folder is loaded on first use."""
 
     record: SequenceRecord
     loaded: Model | None = None
     folder: RunFolder | None = None
-    one_time: bool = False  # of a ply file, which has the axes of the outputs
+    one_time: bool = False  # from a ply file, which has export coordinates
 
     @cached_property
     def model(self) -> Model:
-        """Raises: InputError if the run has no usable checkpoint."""
+        """The model. Raises: InputError if the run has no usable checkpoint."""
         if self.loaded is not None:
             return self.loaded
         assert self.folder is not None
@@ -51,12 +51,12 @@ class MovingScene:
 
     @cached_property
     def cameras(self) -> list[Camera]:
-        """The cameras of the frames, with the corrections of the model."""
+        """The cameras of the frames, with the model's pose correction."""
         return corrected_cameras(self.model.frames, self.record.frame_cameras, self.record.times)
 
     @property
     def placement(self) -> Placement:
-        """From the world of the training to the axes of the outputs; a ply file has these already."""
+        """The transformation from training to export coordinates; a ply file already has export coordinates."""
         return HERE if self.one_time else placement_of(self.cameras[0])
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
@@ -66,9 +66,9 @@ class MovingScene:
         return render_at(gaussians, model.spectral, model.config, camera, time, frames=model.frames)
 
     def picture(self, time: float, camera: Camera | int | None, taken_out: tuple[str, ...]) -> RenderOut:
-        """As `render`, with everything checked; a camera can be that of a frame: its number, or None for the nearest.
+        """As `render`, with checked arguments. `camera` can also be a frame number, or None for the nearest frame.
 
-        Raises: InputError for a time, a frame or a component that does not exist.
+        Raises: InputError for a time, frame or component that does not exist.
         """
         if not 0.0 <= time <= 1.0:
             raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
@@ -84,7 +84,7 @@ class MovingScene:
         return self.render(float(time), camera, taken_out)
 
     def at(self, time: float, taken_out: tuple[str, ...] = ()) -> Scene:
-        """The deformed Gaussians at a time; the exposure of a frame is no part of them."""
+        """The deformed Gaussians at a time, without the exposure of a frame."""
         model = self.model
         return scene_at(self._kept(taken_out), model.spectral, model.config.model, time)[0]
 
@@ -94,7 +94,7 @@ class MovingScene:
 
 
 def open_scene(path: Path) -> MovingScene:
-    """A scene to render. Raises: InputError if there is none at `path`, or if a file is damaged."""
+    """A scene to render. Raises: InputError if `path` has none, or if a file is damaged."""
     path = Path(path)
     if path.suffix.lower() == ".ply" and not path.is_dir():
         return _from_ply(path)
@@ -121,7 +121,7 @@ def _from_ply(path: Path) -> MovingScene:
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:
-    """A camera along +z towards the middle of the positions, with all but a few per cent of them in the picture."""
+    """A camera looking along +z at the middle of the positions; all but a few per cent are in the picture."""
     low, high = np.quantile(position.astype(np.float64), [0.02, 0.98], axis=1)
     reach = max(float((high - low)[:2].max()) / 2, 1e-6)
     distance = MARGIN * 2 * FOCAL * reach + float(high[2] - low[2]) / 2

@@ -1,6 +1,6 @@
-"""The times that a user chooses: given ones, those of frames, or evenly spaced ones.
+"""The user's choice of times: explicit times, times of frames, or evenly spaced times.
 
-In: the choice and the record of the sequence (sequence.json). Out: times with the nearest frame and a name.
+In: the choice and the record of the sequence (sequence.json). Out: times, each with the nearest frame and a name.
 """
 
 from typing import Literal, NamedTuple
@@ -10,7 +10,7 @@ from endotsr.sequences.record import SequenceRecord, nearest_frame
 
 
 class Times(NamedTuple):
-    """A choice of times. One of the three is given, or none for the default of a command."""
+    """A choice of times: at most one of the three; none = the default of a command."""
 
     times: tuple[float, ...] = ()  # normalised, in [0, 1]
     frames: Literal["test", "train", "all"] | None = None
@@ -25,12 +25,12 @@ class Times(NamedTuple):
 def chosen_times(
     command: str, request: Times, record: SequenceRecord, default: str = "test"
 ) -> list[tuple[float, int, str, bool]]:
-    """Time, nearest frame, name, and whether it is the time of that frame.
+    """Time, nearest frame, name, and whether the time is exactly that of the frame.
 
     command   for messages
-    default   frames to take if nothing is chosen
+    default   frames to use if nothing is chosen
 
-    Raises: InputError for a time that does not exist, or for two ways to choose the times.
+    Raises: InputError for a time outside [0, 1], a count below 1, or more than one kind of choice.
     """
     if sum([bool(request.times), request.frames is not None, request.count is not None]) > 1:
         raise InputError(f"{command}: give one of --times, --frames and --count")
