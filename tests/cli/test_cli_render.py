@@ -102,7 +102,7 @@ def test_a_film_in_slow_motion(finished_run, tmp_path, capsys):
     [
         (
             ["--out", "{}/film.mp4"],
-            "film.mp4: --out is a folder of pictures, and this is the name of a .mp4 file; --film",
+            "film.mp4: --out is a folder of pictures, but this is the name of a .mp4 file; --film",
         ),
         (["--out", "{}/a.png"], "the name of a .png file"),
         (["--film", "{}/a.avi"], "a.avi: not a film; allowed: a name that ends in .mp4, .webm, .gif"),

@@ -189,7 +189,7 @@ def test_keys_play_turn_and_change_the_frame(opened):
     said = keys_pressed(opened[1], ".", ",", ",", "ArrowLeft", "0", "+", "x", " ", " ")
     assert [time for time, _, _ in said[:3]] == [f"frame {i} of 64, t = {times[i - 1]:.3f}" for i in (2, 1, 64)]
     assert [view.split(",")[0] for _, view, _ in said[2:7]] == [
-        "View of the camera", "Turned view", "View of the camera", "Turned view", "Turned view"
+        "Camera view", "Free view", "Camera view", "Free view", "Free view"
     ]  # fmt: skip
     assert [label for _, _, label in said[6:]] == ["Play", "Stop", "Play"]
 
@@ -211,7 +211,7 @@ def test_the_view_that_is_asked_for_is_drawn_and_a_distance_is_that_of_the_rende
     said = re.search(r'id="length"[^>]*>Distance ([\d.]+) mm on the rendered surface', content)
     assert said, re.search(r'id="length"[^>]*>[^<]*', content)
     assert float(said[1]) == pytest.approx(np.linalg.norm(points[0] - points[1]), rel=0.02)
-    assert "no measurement" in content
+    assert "An estimate" in content
 
 
 def test_the_page_names_the_frame(opened):

@@ -1,9 +1,9 @@
-"""What a trained scene looks like: cameras and times, panels side by side, folders of pictures, films.
+"""Pictures, films and viewer pages of a trained scene.
 
-cameras   camera paths: observed, orbit, sway, a file          plan      which times, cameras and names: the views
+cameras   camera paths: observed, orbit, sway, a file          plan      the views: times, cameras and names
 panels    a view as a picture: render, truth, error, depth     pictures  a folder of PNG and NPY files
-film      mp4, webm and gif files                         page      the viewer page, drawn by the browser
-trajectories   the moving Gaussians at key times, rounded, for the page
+film      mp4, webm and gif files                              page      the interactive viewer page
+preview   the animation of the report                          trajectories   quantised Gaussians at key times
 
-In: a model and the record of its sequence. Out: files. Nothing here trains or measures.
+In: a model and the record of its sequence. Out: files.
 """

@@ -1,7 +1,7 @@
-"""Camera paths around an observed camera, and cameras of a file.
+"""Camera paths around the observed camera, and cameras from a file.
 
-In: the cameras of the frames and a pivot depth. Out: one camera per picture. A path of a static clip shows what the
-observed camera cannot: that the scene is three-dimensional. Conventions are those of `splatting.camera`.
+In: the cameras of the frames and a pivot depth. Out: one camera per picture. For a clip with a static camera, a path
+shows the three-dimensional structure of the scene. Conventions as in `splatting.camera`.
 """
 
 import math
@@ -24,9 +24,9 @@ LARGEST_SIDE = 16384  # pixels of a rendered picture
 
 
 def turned(camera: Camera, yaw: float, pitch: float, pivot_depth: float) -> Camera:
-    """The camera turned about the point of its optical axis at `pivot_depth`, which stays where it is in the picture.
+    """The camera rotated about the point of its optical axis at `pivot_depth`, whose projection is unchanged.
 
-    yaw, pitch    radians; positive: the camera moves to the right, and down
+    yaw, pitch    radians; positive: the camera moves right, and down
     pivot_depth   view-space z of the pivot, scene units
     """
     sy, cy, sp, cp = math.sin(yaw), math.cos(yaw), math.sin(pitch), math.cos(pitch)
@@ -38,12 +38,12 @@ def turned(camera: Camera, yaw: float, pitch: float, pivot_depth: float) -> Came
 
 
 def shifted(camera: Camera, offset: tuple[float, ...]) -> Camera:
-    """The camera moved by `offset` = (right, down, forward) along its own axes, scene units."""
+    """The camera translated by `offset` = (right, down, forward) along its own axes, scene units."""
     return camera._replace(translation=np.asarray(camera.translation, np.float64) - np.asarray(offset, np.float64))
 
 
 def fitted(camera: Camera, width: int, height: int) -> Camera:
-    """The camera for a picture of another size: square pixels stay square, and all that it saw stays in the picture."""
+    """The camera for another picture size: the same aspect ratio of pixels, and at least the same field of view."""
     scale = min(width / camera.width, height / camera.height)
     return camera._replace(
         fx=camera.fx * scale,
@@ -56,10 +56,10 @@ def fitted(camera: Camera, width: int, height: int) -> Camera:
 
 
 def path_cameras(path: str, cameras: list[Camera], angle: float, pivot_depth: float) -> list[Camera]:
-    """Each camera moved along a path: once around over all pictures, so that a film can be repeated.
+    """The cameras moved along a path, with one period over all pictures, so a film loops.
 
-    path     observed: as they are; sway: left, right and back; orbit: around a circle
-    angle    largest turn, degrees
+    path     observed: unchanged; sway: left, right and back; orbit: around a circle
+    angle    largest rotation, degrees
     """
     radians, count = math.radians(angle), max(len(cameras), 1)
     phases = [2 * math.pi * k / count for k in range(count)]
@@ -71,7 +71,7 @@ def path_cameras(path: str, cameras: list[Camera], angle: float, pivot_depth: fl
 
 
 def pivot_depth_of(depth: FloatArray, opacity: FloatArray) -> float:
-    """The median depth of a rendered view, over the pixels that are more than half opaque; 1 if there are none."""
+    """The median depth of a rendered view over pixels with opacity above 0.5; 1 if there are none."""
     seen = opacity > 0.5
     return float(np.median(depth[seen] / opacity[seen])) if seen.any() else 1.0
 
@@ -79,9 +79,9 @@ def pivot_depth_of(depth: FloatArray, opacity: FloatArray) -> float:
 def read_cameras(file: Path, like: Camera) -> list[Camera]:
     """The cameras of a JSON file: `{"cameras": [{"rotation": 3x3, "translation": [3], "fx": ..., ...}, ...]}`.
 
-    The keys are those of sequence.json: a world-to-camera pose and pinhole intrinsics in pixels. The world is that of
-    the outputs (`export.placement`), in which the first frame has the identity as its pose. Intrinsics and size
-    that a camera does not name are those of `like`.
+    The keys are those of sequence.json: a world-to-camera pose and pinhole intrinsics in pixels. Poses are in export
+    coordinates (`export.placement`), in which the first frame has the identity pose. Missing intrinsics and sizes are
+    taken from `like`.
 
     Raises: InputError naming file, camera and key.
     """
@@ -102,15 +102,15 @@ def _camera(entry: Any, like: Camera, where: str) -> Camera:
 
 
 def checked_side(side: Any, where: str) -> None:
-    """Raises InputError if this is no number of pixels of a side."""
+    """Raises InputError if `side` is no valid number of pixels."""
     if isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= LARGEST_SIDE:
         raise InputError(f"{where} = {side!r} is not allowed; allowed: an integer from 1 to {LARGEST_SIDE}")
 
 
 def along(cameras: list[Camera], count: int) -> list[Camera]:
-    """`count` cameras along the given ones, the first and the last included; as many as given are those given.
+    """`count` cameras along the given ones, interpolated with `camera_between`, including the first and the last.
 
-    Between two of them it is `camera_between`; the size is that of the first camera.
+    The size is that of the first camera. If `count` cameras are given, they are returned unchanged.
     """
     if len(cameras) == count:
         return list(cameras)

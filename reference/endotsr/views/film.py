@@ -1,7 +1,7 @@
-"""Films: a series of pictures as one mp4, webm or gif file.
+"""Films: a series of pictures as one mp4, webm or gif file, written atomically.
 
-In: pictures of one size. Out: a file that appears whole or not at all. mp4 holds H.264, which browsers, PowerPoint and
-QuickTime play (VP9 where there is no encoder); webm holds VP9; a gif has 256 colours per picture and plays everywhere.
+In: pictures of one size. Out: a file. mp4 uses H.264, which browsers, PowerPoint and QuickTime play (VP9 without an
+encoder); webm uses VP9; gif has 256 colours and plays everywhere.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,17 +17,17 @@ from endotsr.untrusted.writing import replace_file
 
 KINDS = (".mp4", ".webm", ".gif")
 GIF_COLOURS = 256
-PALETTE_FRAMES = 8  # pictures that the colours of a gif are chosen from
+PALETTE_FRAMES = 8  # pictures that determine the palette of a gif
 LOWEST, USUAL = 0.1, (1.0, 60.0)  # pictures per second
-HUNDREDTHS = 100  # of a second: the unit of time in a gif
+HUNDREDTHS = 100  # units of time per second in a gif
 
 
 def check_film(file: Path, rate: float | None = None, slow: float | None = None) -> None:
-    """Raises InputError if this is no name of a film, no rate that a film can have, or nothing can encode it."""
+    """Raises InputError for a wrong extension, an invalid rate or slow-down, or a missing encoder."""
     if file.suffix.lower() not in KINDS:
         raise InputError(f"{file}: not a film; allowed: a name that ends in {', '.join(KINDS)}")
     if rate is not None and slow is not None:
-        raise InputError("render: --rate with --slow: each of them sets the speed of the film; allowed: one")
+        raise InputError("render: --rate with --slow: both set the speed of the film; allowed: one of them")
     highest = _highest(file)
     if rate is not None and not LOWEST <= rate <= highest:
         allowed = f"{LOWEST:g} to {highest} pictures per second"
@@ -41,20 +41,18 @@ def check_film(file: Path, rate: float | None = None, slow: float | None = None)
 
 
 def film_rate(file: Path, times: list[float], duration: float, slow: float | None = None) -> float:
-    """Pictures a second with which a film takes `slow` times as long as the recording.
+    """Pictures per second for a film that takes `slow` times as long as the recording.
 
     times      of the pictures, normalised
     duration   seconds from time 0 to time 1; 0 = unknown
-    slow       default: 1, within USUAL pictures per second; 15 per second where times or duration give no speed
+    slow       default: 1, clipped to the range USUAL; 15 pictures per second if times or duration define no speed
 
-    Raises: InputError for a speed that is asked for and unknown, or that the film cannot have.
+    Raises: InputError if `slow` is given but the speed is undefined, or out of the film's range.
     """
     seconds = (times[-1] - times[0]) * duration
     if seconds <= 0:
         if slow is not None:
-            unknown = (
-                "its pictures are not in the order of time" if duration else "the recording's frame rate is unknown"
-            )
+            unknown = "the pictures are not in order of time" if duration else "the recording's frame rate is unknown"
             raise InputError(f"render: --slow {slow:g}: {unknown}; allowed: --rate, pictures per second")
         return UNKNOWN_RATE
     own = (len(times) - 1) / seconds
@@ -62,28 +60,28 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
         return min(max(own, USUAL[0]), min(USUAL[1], _highest(file)))
     if not LOWEST <= own / slow <= _highest(file):
         raise InputError(
-            f"render: --slow {slow:g} is {own / slow:.3g} pictures per second; allowed: --slow from"
+            f"render: --slow {slow:g} gives {own / slow:.3g} pictures per second; allowed: --slow from"
             f" {own / _highest(file):.3g} to {own / LOWEST:.3g} with {len(times)} pictures (--count), or --rate"
         )
     return own / slow
 
 
 def speed_in_words(times: list[float], duration: float, rate: float) -> str:
-    """How fast a film is beside the recording, as the end of a sentence; empty where that is unknown."""
+    """The speed of a film relative to the recording, as the end of a sentence; "" if unknown."""
     seconds = (times[-1] - times[0]) * duration
     return f", {rate * seconds / (len(times) - 1):.3g} times the speed of the recording" if seconds > 0 else ""
 
 
 def _highest(file: Path) -> int:
-    """The highest rate of a film, pictures per second."""
+    """The highest rate of a film in this format, pictures per second."""
     return 50 if file.suffix.lower() == ".gif" else 120
 
 
 def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     """Write a film; returns the number of its pictures.
 
-    pictures   (H, W, 3) uint8 RGB, all of one size; an odd side of an mp4 or webm is repeated by one pixel
-    rate       pictures per second; a gif rounds the time of a picture to a hundredth of a second
+    pictures   (H, W, 3) uint8 RGB, all of one size; for mp4 and webm an odd side is padded by one pixel
+    rate       pictures per second; a gif rounds the duration of a picture to 0.01 s
     Raises: InputError if there is no picture or this FFmpeg cannot encode the film.
     """
     count = 0
@@ -104,7 +102,7 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
 
 
 def _even(picture: ByteImage) -> ByteImage:
-    """The picture with even sides, which the colour format of a film needs."""
+    """The picture padded to even sides, as required by the colour format of a film."""
     rows, columns = picture.shape[0] % 2, picture.shape[1] % 2
     return np.pad(picture, ((0, rows), (0, columns), (0, 0)), mode="edge") if rows or columns else picture
 
@@ -117,12 +115,12 @@ def _write_gif(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
         raise InputError(f"{file}: a film needs a picture")
     palette = _palette(frames)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for frame in frames]
-    milliseconds = 10 * max(2, round(HUNDREDTHS / rate))  # browsers play a shorter time as a tenth of a second
+    milliseconds = 10 * max(2, round(HUNDREDTHS / rate))  # browsers replace shorter durations by 100 ms
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
 
 
 def _palette(frames: list[Any]) -> Any:
-    """One palette for the whole film, of pictures spread over it, so that still parts do not flicker."""
+    """One palette for the whole film, from evenly spaced pictures; a palette per picture would flicker."""
     from PIL import Image
 
     chosen = frames[:: max(1, len(frames) // PALETTE_FRAMES)]

@@ -1,7 +1,7 @@
 """The viewer page: a moving scene in one HTML file that needs no server, no network and no other file.
 
-In: a scene and, for the held-out frames beside it, its sequence. Out: the text of the page. The page draws the
-Gaussians with WebGL 2 from the formulas of the specification (B2, B3, B5), sorted by depth on every picture.
+In: a scene and, to show held-out frames, its sequence. Out: the text of the page. It renders the Gaussians with WebGL 2
+by the formulas of the specification (B2, B3, B5), sorted by depth in every picture.
 """
 
 import base64
@@ -27,14 +27,14 @@ from endotsr.views.panels import ERROR_SCALE
 from endotsr.views.trajectories import Trajectories, header, key_times, packed, trajectories
 
 MOST_KEYS = 128
-SECONDS = 4  # that the page takes to play one set of Gaussians where the duration is unknown
-KEYS = 32  # key times unless more or fewer are asked for
+SECONDS = 4  # playing time of a scene of unknown duration
+KEYS = 32  # default number of key times
 RUN_PAGE = "view.html"  # in a run folder
 TEMPLATE, SCRIPT = "viewer.html", "viewer.js"
 
 
 def check_page(file: Path, keys: int) -> None:
-    """Raises InputError if this is no name of a page, or no number of key times."""
+    """Raises InputError for a wrong extension or an invalid number of key times."""
     if file.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{file}: not a page; allowed: a name that ends in .html")
     if not 2 <= keys <= MOST_KEYS:
@@ -42,14 +42,14 @@ def check_page(file: Path, keys: int) -> None:
 
 
 def write_page(file: Path, scene: MovingScene, title: str, keys: int, sequence: Sequence | None = None) -> int:
-    """Write the page, which appears whole or not at all; returns its bytes."""
+    """Write the page atomically; returns its size in bytes."""
     content = page(scene, title, keys, sequence).encode()
     replace_file(file, lambda temporary: temporary.write_bytes(content))
     return len(content)
 
 
 def write_run_page(folder: Path, scene: MovingScene, sequence: Sequence | None) -> None:
-    """Write the page of a run into its folder, or remove that of an earlier evaluation if `sequence` is None."""
+    """Write the page of a run into its folder; if `sequence` is None, remove an earlier page."""
     if sequence is None:
         (folder / RUN_PAGE).unlink(missing_ok=True)
     else:
@@ -59,9 +59,9 @@ def write_run_page(folder: Path, scene: MovingScene, sequence: Sequence | None) 
 def page(scene: MovingScene, title: str, keys: int, sequence: Sequence | None = None) -> str:
     """The text of the page.
 
-    title      text, shown as the heading
-    keys       largest number of key times
-    sequence   the frames; without it the page has no held-out frames and no error
+    title      heading
+    keys       maximum number of key times
+    sequence   the frames; without it the page shows no held-out frames and no error
     """
     found = trajectories(scene, key_times(scene, keys))
     low, high, pivot = depths_shown(scene)
@@ -72,12 +72,12 @@ def page(scene: MovingScene, title: str, keys: int, sequence: Sequence | None = 
 
 
 def encoded(found: Trajectories) -> str:
-    """The compressed numbers as text."""
+    """The packed trajectories as base64 text."""
     return base64.b64encode(packed(found)).decode("ascii")
 
 
 def page_text(title: str, about: dict[str, object], data: str) -> str:
-    """The template with its heading, its script, what the script reads, and the numbers of the Gaussians."""
+    """The template filled with the heading, the script, its input `about`, and the encoded Gaussians."""
     folder = resources.files("endotsr.views")
     text = (folder / TEMPLATE).read_text(encoding="utf-8")
     parts = {
@@ -96,19 +96,19 @@ def about_frames(record: SequenceRecord) -> dict[str, object]:
 
 
 def depths_shown(scene: MovingScene) -> tuple[float, float, float]:
-    """Least and largest depth of the first picture, and that of the point about which the view turns; scene units."""
+    """Minimum and maximum depth of the first picture, and the pivot depth; scene units."""
     out = scene.render(scene.record.times[0], scene.cameras[0])
     return *depth_range(normalised_depth(out)), pivot_depth_of(out.depth, out.opacity)
 
 
 def camera_numbers(scene: MovingScene) -> list[list[float]]:
-    """Rotation, translation, focal lengths and centre of each frame's camera; one row where the camera rests."""
+    """Rotation, translation, focal lengths and centre of each frame's camera; one row for a static camera."""
     shown = scene.cameras[:1] if scene.record.static_camera else scene.cameras
     return [[*np.ravel(c.rotation).tolist(), *np.ravel(c.translation).tolist(), c.fx, c.fy, c.cx, c.cy] for c in shown]
 
 
 def about_pictures(scene: MovingScene, pivot_depth: float) -> dict[str, object]:
-    """Size of the pictures, rules of the rasteriser and colours."""
+    """Picture size, rasteriser settings and colour maps."""
     settings, camera = raster_settings(scene.model.config), scene.cameras[0]
     return {
         "width": camera.width,
@@ -127,11 +127,11 @@ def about_pictures(scene: MovingScene, pivot_depth: float) -> dict[str, object]:
 
 
 class HeldOut(NamedTuple):
-    """A held-out frame."""
+    """A held-out frame of the page."""
 
     name: str
     time: float
-    picture: str  # data: address; an excluded pixel is transparent
+    picture: str  # data URI; excluded pixels are transparent
 
 
 def held_out_frames(sequence: Sequence) -> list[HeldOut]:

@@ -1,6 +1,6 @@
-"""A view as an 8-bit picture: one panel, or several side by side under one height.
+"""A view as an 8-bit picture: one panel, or several in a row.
 
-In: a rendered view and, for truth and error, the frame it shows. Out: (H, W, 3) uint8.
+In: a rendered view and, for truth and error, the recorded frame. Out: (H, W, 3) uint8.
 """
 
 from typing import Literal, NamedTuple
@@ -24,27 +24,27 @@ from endotsr.splatting.render import RenderOut
 Panel = Literal["render", "truth", "error", "depth", "opacity"]
 NEEDS_TRUTH: tuple[Panel, ...] = ("truth", "error")
 GAP = 4  # pixels between panels
-ERROR_SCALE = 0.1  # display units of the brightest colour of an error
+ERROR_SCALE = 0.1  # error of the brightest colour, display units
 
 
 class Scale(NamedTuple):
-    """What the colours of a series of pictures mean, the same in all of them."""
+    """The colour scale of a series of pictures."""
 
     near: float  # depth of the darkest colour, scene units
-    far: float
-    error: float = ERROR_SCALE
+    far: float  # depth of the brightest colour
+    error: float = ERROR_SCALE  # error of the brightest colour
 
 
 def scale_of(depth: FloatArray) -> Scale:
-    """The colours of a series, from the depth of its first view."""
+    """The colour scale of a series, from the depth of its first view."""
     return Scale(*depth_range(depth))
 
 
 def panel(kind: Panel, out: RenderOut, scale: Scale, frame: Frame | None = None) -> ByteImage:
     """One panel.
 
-    out      rendered view, its depth as it is to be shown
-    frame    the frame at this time from this camera; needed for truth and error
+    out      rendered view; its depth is shown unchanged
+    frame    the recorded frame of this time and camera; required for truth and error
     """
     if kind == "render":
         return bytes_image(out.colour)

@@ -1,6 +1,6 @@
-"""The pictures of views: a folder of PNG and NPY files, a film, or both from the same renders.
+"""Pictures of views: a folder of PNG and NPY files, a film, or both from the same renders.
 
-In: a scene and its views. Out: colour/, depth/, opacity/ and render.json in a folder, or panels side by side in a film.
+In: a scene and its views. Out: a folder with colour/, depth/, opacity/ and render.json; or a film of panels in a row.
 """
 
 from collections.abc import Callable, Iterator
@@ -38,27 +38,27 @@ ABOUT_DEPTH = {
     "normalised": "normalised by opacity",
 }
 DEPTH_LEVELS = 65535  # of a 16-bit picture
-DEPTH_HEADROOM = 1.5  # over the largest prior depth, since rendered depth may be a little larger
+DEPTH_HEADROOM = 1.5  # factor on the largest prior depth, because rendered depth may exceed it
 
 
 class ReadFrames(Protocol):
-    """What a film shows beside its renders: a `Sequence`, or frames that are read when they are asked for."""
+    """The recorded frames for a film: a `Sequence`, or frames read on demand."""
 
     def frame(self, index: int) -> Frame:
-        """Frame `index` of the record of the scene."""
+        """Frame `index` of the scene's record."""
         ...
 
 
 class Look(NamedTuple):
-    """How views are shown."""
+    """Options for the appearance of views."""
 
     depth: DepthKind = "accumulated"
     taken_out: tuple[str, ...] = ()  # spectral components to leave out
-    panels: tuple[Panel, ...] = ("render",)  # of a film, from left to right
+    panels: tuple[Panel, ...] = ("render",)  # of a film, left to right
 
 
 def check_panels(panels: tuple[Panel, ...], views: list[PlannedView]) -> None:
-    """Raises InputError for panels that cannot be shown: none, or a truth that the views do not have."""
+    """Raises InputError for no panels, and for truth or error in views that match no frame."""
     if not panels:
         raise InputError("render: --panels is empty; allowed: one or more of render, truth, error, depth, opacity")
     needed = [name for name in panels if name in NEEDS_TRUTH]
@@ -71,10 +71,10 @@ def check_panels(panels: tuple[Panel, ...], views: list[PlannedView]) -> None:
 
 
 def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> list[PlannedView]:
-    """The views of a request on a scene. A path turns around the median depth of the first view.
+    """The views of a request. Paths rotate about the point at the median depth of the first view.
 
     default   frames to show if no times are chosen
-    Raises: InputError as `views_of`, before the model is read; and as `MovingScene.model`.
+    Raises: InputError as `check_request`, before the model is read, as `views_of`, and as `MovingScene.model`.
     """
     wanted = chosen_times("render", request.times, scene.record, default)
     check_request(request, scene.record.count)
@@ -87,9 +87,9 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
 
 
 def check_outputs(out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None) -> None:
-    """Raises InputError if there is nothing to write to, or if a folder or a film cannot be written."""
+    """Raises InputError without an output, or if the folder or film cannot be written."""
     if out is None and film is None:
-        raise InputError("render: --out DIR or --film FILE is missing: where the pictures are written")
+        raise InputError("render: --out DIR or --film FILE is missing; allowed: one or both")
     if out is not None:
         check_folder_name(out, "pictures", film="--film FILE writes a film")
         refuse_existing(out)
@@ -101,10 +101,10 @@ def check_outputs(out: Path | None, film: Path | None, rate: float | None = None
 def frames_of(
     scene: MovingScene, panels: tuple[Panel, ...], views: list[PlannedView], source: str | None
 ) -> Sequence | None:
-    """The sequence that truth and error are shown from; None if the panels need none.
+    """The sequence for the panels truth and error; None if they are not shown.
 
-    source   its current location (default: the recorded one)
-    Raises: InputError for panels that cannot be shown.
+    source   its current location; default: the recorded one
+    Raises: InputError as `check_panels`, and if the scene is no run folder.
     """
     check_panels(panels, views)
     if not set(panels) & set(NEEDS_TRUTH):
@@ -115,7 +115,7 @@ def frames_of(
 
 
 def rendered(scene: MovingScene, views: list[PlannedView], look: Look) -> Iterator[tuple[PlannedView, RenderOut]]:
-    """Every view with its picture; the depth is the one that is asked for."""
+    """Render every view, with the requested kind of depth."""
     for view in views:
         out = scene.render(view.time, view.camera, look.taken_out)
         yield view, out if look.depth == "accumulated" else out._replace(depth=normalised_depth(out))
@@ -129,10 +129,10 @@ def write_pictures(
     npy: bool = False,
     consume: Callable[[Iterator[tuple[PlannedView, RenderOut]]], object] = list,
 ) -> int:
-    """Write a folder, which appears whole or not at all; returns the number of pictures.
+    """Write a folder atomically; returns the number of pictures.
 
     npy       also write float arrays
-    consume   gets every picture after it was written, for example to make a film of the same renders
+    consume   consumes the pictures after they are written, for example to write a film of the same renders
     """
     out.absolute().parent.mkdir(parents=True, exist_ok=True)
     entries: list[dict[str, Any]] = []
@@ -156,7 +156,7 @@ def write_pictures(
 
 
 def _entry(view: PlannedView, placement: Placement) -> dict[str, Any]:
-    """The entry of render.json; the camera is named where it is not that of a frame at its own time."""
+    """The entry of render.json, with the camera unless the view is exactly that of a frame."""
     entry = {"file": f"{view.label}.png", "time": view.time, "camera_of_frame": view.frame}
     return entry if view.exact else entry | {"camera": _as_json(placed_camera(view.camera, placement))}
 
@@ -171,13 +171,13 @@ def _write_view(target: Path, label: str, out: RenderOut, step: float, npy: bool
 
 
 def depth_step(largest_depth: float, depth: FloatArray) -> float:
-    """Scene units of one step of a 16-bit depth picture: a power of two that leaves headroom, one for all views."""
+    """Scene units per level of a 16-bit depth picture: a power of two with headroom, the same for all views."""
     largest = max(largest_depth, float(np.nan_to_num(depth).max()), 1e-6) * DEPTH_HEADROOM
     return float(2.0 ** np.ceil(np.log2(largest / DEPTH_LEVELS)))
 
 
 def depth_bytes(depth: FloatArray, step: float) -> NDArray[np.uint16]:
-    """(H, W) scene units as whole steps, clipped to 16 bits; 0 = no depth."""
+    """(H, W) depth in scene units -> 16-bit levels, clipped; 0 = no depth."""
     return np.clip(np.rint(np.nan_to_num(depth) / step), 0, DEPTH_LEVELS).astype(np.uint16)
 
 
@@ -188,9 +188,9 @@ def _as_json(camera: Camera) -> dict[str, Any]:
 def film_pictures(
     pictures: Iterator[tuple[PlannedView, RenderOut]], look: Look, sequence: ReadFrames | None = None
 ) -> Iterator[ByteImage]:
-    """The panels of every view; depth and error have the same colours in all of them.
+    """The panels of every view, with the same colour scale for all.
 
-    sequence   the frames; needed for the panels truth and error
+    sequence   the recorded frames; required for the panels truth and error
     """
     scale = None
     for view, out in pictures:

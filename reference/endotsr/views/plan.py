@@ -1,6 +1,6 @@
-"""Which pictures are made: a time, a camera and a name for each.
+"""The views to render: a time, a camera and a name for each.
 
-In: what the user asks for and the record of the sequence (sequence.json). Out: the views, checked.
+In: the user's options and the record of the sequence (sequence.json). Out: the checked views.
 """
 
 import math
@@ -13,21 +13,21 @@ from endotsr.export.times import Times
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
-LARGEST_ANGLE = 89.0  # degrees: beyond it a scene that was seen from one side is empty
+LARGEST_ANGLE = 89.0  # degrees; a scene observed from one side is not visible beyond it
 
 
 class PlannedView(NamedTuple):
     """Time, camera and name of one picture."""
 
     time: float
-    frame: int  # whose camera it is, or that the camera path starts from
+    frame: int  # the frame of the camera, or of the start of its path
     label: str
     camera: Camera
-    exact: bool  # whether this is the moment of a frame and its own camera, so that it can be compared with it
+    exact: bool  # whether time and camera are exactly those of the frame, which allows a comparison
 
 
 class ViewRequest(NamedTuple):
-    """The views that are asked for."""
+    """The user's choice of views."""
 
     times: Times = Times()
     camera: str = "observed"  # a path, the number of a frame, or a JSON file
@@ -37,7 +37,7 @@ class ViewRequest(NamedTuple):
 
 
 def check_request(request: ViewRequest, count: int) -> None:
-    """Everything that can be refused without a model and its cameras, of `count` frames. Raises: InputError."""
+    """Check a request on a sequence of `count` frames without its model. Raises: InputError."""
     if request.size:
         read_size(request.size)
     if not 0.0 <= request.angle <= LARGEST_ANGLE:
@@ -64,10 +64,10 @@ def views_of(
     request       checked by `check_request`
     wanted        its `chosen_times`
     observed      the cameras of the frames
-    pivot_depth   depth of the point around which `orbit` and `sway` turn, scene units
-    placement     of the outputs: the cameras of a file are in its axes
+    pivot_depth   depth of the pivot of `orbit` and `sway`, scene units
+    placement     from training to export coordinates, in which a camera file is given
 
-    Raises: InputError for a file of cameras that cannot be used.
+    Raises: InputError for an unusable camera file.
     """
     cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth, placement)
     if any(request.offset):
@@ -84,7 +84,7 @@ def views_of(
 def _cameras(
     request: ViewRequest, observed: list[Camera], frames: list[int], pivot_depth: float, placement: Placement
 ) -> tuple[list[Camera], bool]:
-    """One camera for each of the frames, and whether they are those of the frames."""
+    """One camera per frame, and whether they are the frames' own cameras."""
     nearest = [observed[i] for i in frames]
     if request.camera in PATHS:
         return path_cameras(request.camera, nearest, request.angle, pivot_depth), request.camera == "observed"

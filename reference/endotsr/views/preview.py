@@ -1,7 +1,7 @@
-"""The moving preview of a report: the scene over all times, small enough to be embedded.
+"""The animated preview of a report: the scene over all times, small enough to embed.
 
-In: a scene. Out: an animated WebP of at most PREVIEW_BYTES, on the left as the observed camera sees it, on the right
-from a camera that moves left and right. It is rendered at its own size, so it costs little beside an evaluation.
+In: a scene. Out: an animated WebP of at most PREVIEW_BYTES: on the left from the observed camera, on the right from a
+camera that moves left and right. Rendering at this small size is cheap compared with an evaluation.
 """
 
 import io
@@ -15,12 +15,12 @@ from endotsr.report.figures import ByteImage, bytes_image
 from endotsr.views.cameras import fitted, path_cameras, pivot_depth_of
 from endotsr.views.panels import GAP
 
-PREVIEW_BYTES = 500_000  # at most; base64 makes a third more of it in the page
-PREVIEW_WIDTH = 240  # pixels of one of the two pictures, whatever the size of the frames
-PREVIEW_COUNT = 24  # pictures of a round, at most
-MILLISECONDS = 120  # between two of them
-ANGLE = 8.0  # largest turn of the moving camera, degrees
-QUALITIES = (80, 60, 40, 20)  # of WebP, tried in this order until the limit is kept
+PREVIEW_BYTES = 500_000  # maximum size; base64 adds 33 % in the page
+PREVIEW_WIDTH = 240  # width of each of the two pictures, pixels
+PREVIEW_COUNT = 24  # maximum number of pictures
+MILLISECONDS = 120  # per picture
+ANGLE = 8.0  # largest rotation of the moving camera, degrees
+QUALITIES = (80, 60, 40, 20)  # of WebP, tried in this order until the size is within the limit
 WORDS = "The scene over all times: from the observed camera, and from a camera that moves left and right."
 
 
@@ -32,7 +32,7 @@ def preview(scene: MovingScene) -> Preview | None:
 def encoded(found: list[ByteImage], words: str) -> Preview | None:
     """Pictures of one size as a preview; None if even the lowest quality is larger than PREVIEW_BYTES.
 
-    words   what they show
+    words   caption
     """
     from PIL import Image
 
@@ -45,7 +45,7 @@ def encoded(found: list[ByteImage], words: str) -> Preview | None:
 
 
 def preview_pictures(scene: MovingScene) -> list[ByteImage]:
-    """The pictures of a round, (H, W, 3) uint8, two views of one time side by side."""
+    """The pictures of the preview, (H, W, 3) uint8, with two views of the same time next to each other."""
     times, cameras = np.asarray(scene.record.times, np.float64), scene.cameras
     count = min(PREVIEW_COUNT, max(len(times), 2))
     wanted = np.linspace(0, float(times.max()), count)

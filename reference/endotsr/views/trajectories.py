@@ -1,9 +1,9 @@
-"""The moving Gaussians at key times, rounded to few bytes, for the viewer page.
+"""The moving Gaussians at key times, quantised for the viewer page.
 
 In: a scene and its cameras. Out: 20 bytes per Gaussian and key time (position and log-scale 16 bits, rotation, colour
-and opacity 8 bits), stored as differences between neighbouring key times and compressed. Between two key times the
-viewer interpolates. The colour of a Gaussian is the one in the direction of the observed camera, exposure included; its
-dependence on the direction is not part of the page.
+and opacity 8 bits), stored as differences between successive key times and compressed. The viewer interpolates between
+key times. The colour of a Gaussian is evaluated in the direction of the observed camera, with exposure; the page has no
+view-dependent colour.
 """
 
 import zlib
@@ -21,24 +21,24 @@ from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.harmonics import harmonics_forward
 
 LEVELS_16, LEVELS_8 = 65535, 255
-ROTATION_LEVELS = 127  # of a component of a quaternion, either sign
-OPACITY_STEP = 1 / 255  # a Gaussian below it is never drawn
-POSITION, LOG_SCALE, COLOUR = slice(0, 3), slice(3, 6), slice(6, 9)  # rows that are rounded within their range
-COMPRESSION = 6  # of zlib; more takes much longer and gains one per cent
+ROTATION_LEVELS = 127  # largest level of a quaternion component, either sign
+OPACITY_STEP = 1 / 255  # Gaussians with a lower opacity are never drawn
+POSITION, LOG_SCALE, COLOUR = slice(0, 3), slice(3, 6), slice(6, 9)  # rows that are quantised within their range
+COMPRESSION = 6  # level of zlib; higher levels take much longer and save 1 %
 
 
 class Trajectories(NamedTuple):
-    """N Gaussians at K key times, rounded."""
+    """N Gaussians at K key times, quantised."""
 
     times: FloatArray  # (K,) normalised, ascending
     words: NDArray[np.uint16]  # (6, K, N) position x y z, log-scale
     bytes: NDArray[np.uint8]  # (8, K, N) quaternion w x y z (two's complement), red, green, blue, opacity
-    low: FloatArray  # (9,) values of level 0 of position, log-scale and colour
-    high: FloatArray  # (9,) values of the largest level
+    low: FloatArray  # (9,) position, log-scale and colour of level 0
+    high: FloatArray  # (9,) the same for the largest level
 
 
 def key_times(scene: MovingScene, most: int) -> FloatArray:
-    """Key times: those of the frames and 1, or `most` evenly spaced ones if they are fewer."""
+    """Key times: the frames' times and 1, or at most `most` evenly spaced ones; one for a static scene."""
     times = np.unique(np.append(np.asarray(scene.record.times, np.float64), 1.0))
     if scene.model.gaussians.fdm_weight is None and scene.model.gaussians.appearance_coefficients is None:
         return times[:1] if scene.model.gaussians.motion_coefficients is None else np.linspace(0, 1, most)
@@ -46,7 +46,7 @@ def key_times(scene: MovingScene, most: int) -> FloatArray:
 
 
 def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
-    """The Gaussians that can be seen, at the key times."""
+    """The visible Gaussians at the key times."""
     cameras, known = scene.cameras, scene.record.times
     opacity = 1 / (1 + np.exp(-scene.model.gaussians.opacity_logit.astype(np.float64)))
     seen = opacity >= OPACITY_STEP
@@ -65,7 +65,7 @@ def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
 
 
 def _at_time(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
-    """Position, log-scale and colour (9, N), and the unit quaternion (4, N), of the Gaussians that are seen."""
+    """Position, log-scale and colour (9, N), and unit quaternion (4, N), of the Gaussians with `seen`."""
     deformed, degree = scene.at(time), scene.model.config.model.harmonics_degree
     centre = camera_centre(camera)
     colour = harmonics_forward(deformed.harmonics, deformed.residual, deformed.position, centre, degree)[0]
@@ -78,7 +78,7 @@ def _at_time(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.b
 
 
 def rotation_levels(rotation: FloatArray) -> FloatArray:
-    """Quaternions as whole numbers up to ROTATION_LEVELS; q and -q turn alike, so a sign that would jump is changed."""
+    """Quaternions as integers up to ROTATION_LEVELS, with continuous signs: q and -q are the same rotation."""
     largest = np.abs(rotation).max(axis=0)
     levels = np.rint(rotation / np.where(largest > 0, largest, 1) * ROTATION_LEVELS)
     for k in range(1, levels.shape[1]):
@@ -87,9 +87,9 @@ def rotation_levels(rotation: FloatArray) -> FloatArray:
 
 
 def packed(found: Trajectories) -> bytes:
-    """The rounded numbers as compressed bytes: for each row the low bytes and, of words, the high bytes, (K, N) each.
+    """The trajectories as compressed bytes: for each row the low bytes and, of words, the high bytes, (K, N) each.
 
-    A key time is stored as the difference to the one before, modulo 256 or 65536: what does not move is zero.
+    Each key time is stored as the difference to the previous one, modulo 256 or 65536; static values are zero.
     """
     planes = []
     for row in found.words:
@@ -100,7 +100,7 @@ def packed(found: Trajectories) -> bytes:
 
 
 def header(found: Trajectories) -> dict[str, Any]:
-    """What the page needs to unpack the numbers."""
+    """The input of the page for unpacking the numbers."""
     return {
         "count": found.words.shape[2],
         "times": found.times.tolist(),

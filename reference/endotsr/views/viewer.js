@@ -1,6 +1,6 @@
 "use strict";
-// The moving scene, drawn with WebGL 2: every Gaussian is a rectangle around its ellipse alpha >= cutoff, drawn from far
-// to near. The formulas are those of the specification: B2 covariance, B3 projection, B5 compositing.
+// The moving scene in WebGL 2: every Gaussian is a rectangle around its ellipse alpha >= cutoff, drawn back to front by
+// the formulas of the specification: B2 covariance, B3 projection, B5 compositing.
 (async function () {
 const element = (id) => document.getElementById(id);
 const about = JSON.parse(element("about").textContent);
@@ -20,7 +20,7 @@ async function unpack(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-function summed(planes, row, words, K, N) {  // one row (K, N): differences between key times added up
+function summed(planes, row, words, K, N) {  // one row (K, N): cumulative sum of the differences between key times
   const size = K * N, out = words ? new Uint16Array(size) : new Uint8Array(size);
   for (let i = 0; i < size; i++) {
     const step = words ? planes[row * size + i] | (planes[(row + 1) * size + i] << 8) : planes[row * size + i];
@@ -36,7 +36,7 @@ canvas.height = about.height;
 element("stage").style.setProperty("--widest", `calc(72vh * ${about.width / about.height})`);  // no scrolling
 element("stage").style.setProperty("--whole", `calc(94vh * ${about.width / about.height})`);  // of a full screen
 const gl = canvas.getContext("webgl2", {antialias: false, preserveDrawingBuffer: true});
-if (!gl) return fail("This page needs WebGL 2, which this browser does not offer.");
+if (!gl) return fail("This page requires WebGL 2, which this browser does not support.");
 const precise = gl.getExtension("EXT_color_buffer_float") !== null;
 
 const SPLAT_VERTEX = `#version 300 es
@@ -148,7 +148,7 @@ let splat, show;
 try {
   splat = program(SPLAT_VERTEX, SPLAT_FRAGMENT);
   show = program(SHOW_VERTEX, SHOW_FRAGMENT);
-} catch (error) { return fail("The shaders cannot be compiled: " + error.message); }
+} catch (error) { return fail("Compiling the shaders failed: " + error.message); }
 
 // ---------------------------------------------------------------- parts: one set of Gaussians each
 function layered({count: N, K, rows}, format, inside, type, fill, Kind) {
@@ -196,7 +196,7 @@ function flat(unit) {
   for (const key of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, key, gl.CLAMP_TO_EDGE);
   return texture;
 }
-const buffers = [3, 6].map((unit) => {  // one picture, and that of the window it is blended with
+const buffers = [3, 6].map((unit) => {  // the picture, and the picture of a second window to blend with
   const texture = flat(unit), buffer = gl.createFramebuffer();
   if (precise) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, about.width, about.height, 0, gl.RGBA, gl.HALF_FLOAT, null);
   else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, about.width, about.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
@@ -223,13 +223,13 @@ gl.vertexAttribIPointer(item, 1, gl.UNSIGNED_INT, 0, 0);
 gl.vertexAttribDivisor(item, 1);
 const nothing = gl.createVertexArray();
 
-// ---------------------------------------------------------------- windows: parts that are loaded when they are played
-// A page of one run has one part, whose numbers stand in the page. That of a recording has a script file for each window.
-const MOST_PARTS = 4;  // held at a time
+// ---------------------------------------------------------------- windows: parts loaded on demand
+// The page of a run embeds its only part. The page of a recording has a script file for each window.
+const MOST_PARTS = 4;  // in memory
 const spans = about.windows || [{begin: 0, end: 1}];
-const loaded = new Map();  // number of a window -> its part, or the promise of it; the one used last comes last
+const loaded = new Map();  // number of a window -> its part or a promise, least recently used first
 
-function shows(time) {  // numbers of the windows that show a time: none in a gap, two in an overlap
+function shows(time) {  // numbers of the windows at a time: none in a gap, two in an overlap
   const found = [];
   spans.forEach((span, k) => {
     if (span.begin <= time && (time < span.end || time === span.end && !(spans[k + 1] && spans[k + 1].begin <= time)))
@@ -242,7 +242,7 @@ function fetched(k) {  // a promise of window k
   if (!loaded.has(k)) loaded.set(k, about.windows ? new Promise((done, failed) => {
     const script = document.createElement("script");
     script.src = spans[k].file;
-    script.onerror = () => failed(new Error(spans[k].file + " is missing; it belongs beside the page."));
+    script.onerror = () => failed(new Error(spans[k].file + " is missing; it must be next to the page."));
     window.endotsr_window = window.endotsr_window || {};
     window.endotsr_window[k] = (numbers, text) => part(numbers, text).then(done, failed);
     document.head.append(script);
@@ -258,7 +258,7 @@ function fetched(k) {  // a promise of window k
   return Promise.resolve(loaded.get(k));
 }
 
-function forget() {  // textures of the windows that were not used for longest
+function forget() {  // delete the textures of the least recently used windows
   const ready = [...loaded.keys()].filter((k) => loaded.get(k).textures && !shows(state.time).includes(k));
   for (const k of ready.slice(0, Math.max(0, loaded.size - MOST_PARTS))) {
     loaded.get(k).textures.forEach((texture) => gl.deleteTexture(texture));
@@ -266,12 +266,12 @@ function forget() {  // textures of the windows that were not used for longest
   }
 }
 
-function partsNow() {  // the loaded parts of this time with their weights; what is missing is fetched
+function partsNow() {  // the loaded parts of this time with their weights; fetches missing parts
   const wanted = shows(state.time), found = [];
   for (const k of wanted) {
     const here = loaded.get(k);
     if (here && here.textures) {
-      loaded.delete(k);  // the last one of the map is the one used last
+      loaded.delete(k);  // move to the end: most recently used
       loaded.set(k, here);
       found.push([here, 1]);
     } else if (!here) fetched(k).then(() => draw(), () => stop());
@@ -287,7 +287,7 @@ function partsNow() {  // the loaded parts of this time with their weights; what
 }
 const waiting = () => shows(state.time).some((k) => !(loaded.get(k) && loaded.get(k).textures));
 
-function markWindows() {  // the strip below the slider: which windows there are, and which are loaded
+function markWindows() {  // the strip below the slider: all windows, with the loaded ones marked
   for (const [k, mark] of [...element("windows").children].entries())
     mark.classList.toggle("on", Boolean(loaded.get(k) && loaded.get(k).textures));
 }
@@ -306,7 +306,7 @@ if (about.windows) {
 
 // ---------------------------------------------------------------- time, camera, order
 const state = {time: 0, yaw: 0, pitch: 0, closer: 1, right: 0, down: 0, layer: 0, playing: false, orbiting: false,
-  phase: 0, speed: 1, clock: 0};  // right, down: shift of the picture, pixels; clock: time while the error layer waits
+  phase: 0, speed: 1, clock: 0};  // right, down: shift of the picture, pixels; clock: playing time in the error layer
 
 function keysAt({times, K}, time) {
   let k = 0;
@@ -333,9 +333,9 @@ function apply(a, v) {
   return [0, 3, 6].map((r) => a[r] * v[0] + a[r + 1] * v[1] + a[r + 2] * v[2]);
 }
 
-function cameraNow() {  // the observed camera, turned about the pivot on its axis, and moved along the axis
+function cameraNow() {  // the observed camera, rotated about the pivot on its axis, zoomed and shifted
   const {cameras, first} = shownPart, frame = nearestFrame(state.time) - (first || 0);
-  const numbers = cameras[Math.min(Math.max(frame, 0), cameras.length - 1)];  // a camera at rest is written once
+  const numbers = cameras[Math.min(Math.max(frame, 0), cameras.length - 1)];  // a static camera is stored once
   const [sy, cy, sp, cp] = [Math.sin(state.yaw), Math.cos(state.yaw), Math.sin(state.pitch), Math.cos(state.pitch)];
   const turn = multiply([1, 0, 0, 0, cp, sp, 0, -sp, cp], [cy, 0, sy, 0, 1, 0, -sy, 0, cy]);
   const pivot = [0, 0, about.pivot_depth], t = numbers.slice(9, 12);
@@ -348,7 +348,7 @@ function cameraNow() {  // the observed camera, turned about the pivot on its ax
 
 const counts = new Uint32Array(65537);
 
-function sortByDepth(of, camera, [k0, k1, f]) {  // from far to near: two passes of 16 bits over the bits of the depth
+function sortByDepth(of, camera, [k0, k1, f]) {  // back to front: radix sort of the depth bits, two passes of 16 bits
   const {count: N, ranges, low, depth, order: [sorted, other]} = of, depthBits = new Uint32Array(depth.buffer);
   const r = camera.rotation, scale = [0, 1, 2].map((c) => r[6 + c] * ranges[c] / 65535);
   const base = camera.translation[2] + r[6] * low[0] + r[7] * low[1] + r[8] * low[2];
@@ -357,7 +357,7 @@ function sortByDepth(of, camera, [k0, k1, f]) {  // from far to near: two passes
     const value = base + scale[0] * (g * x[a + i] + f * x[b + i]) + scale[1] * (g * y[a + i] + f * y[b + i])
       + scale[2] * (g * z[a + i] + f * z[b + i]);
     depth[i] = value > 0 ? value : 0;
-    other[i] = N - 1 - i;  // of two at one depth the later one is farther back
+    other[i] = N - 1 - i;  // at equal depth, the later Gaussian is farther back
   }
   for (const [from, to, shift] of [[other, sorted, 0], [sorted, other, 16]]) {
     counts.fill(0);
@@ -369,7 +369,7 @@ function sortByDepth(of, camera, [k0, k1, f]) {  // from far to near: two passes
 }
 
 // ---------------------------------------------------------------- a picture
-function splats(of, camera, layer) {  // one part, into the buffer that is bound
+function splats(of, camera, layer) {  // draw one part into the bound buffer
   const keys = keysAt(of, state.time), {made, at} = splat, raster = about.raster, size = [about.width, about.height];
   gl.viewport(0, 0, ...size);
   gl.clearColor(0, 0, 0, 0);
@@ -405,10 +405,10 @@ function splats(of, camera, layer) {  // one part, into the buffer that is bound
   gl.disable(gl.BLEND);
 }
 
-let shownPart = null, weight = 0;  // the part whose camera is used; weight of the later of two that are blended
+let shownPart = null, weight = 0;  // the part whose camera is used; weight of the later of two blended parts
 function draw(layer = state.layer) {
   const parts = partsNow();
-  if (!parts.length) return describe();  // its numbers are on their way; the last picture stays
+  if (!parts.length) return describe();  // still loading: keep the last picture
   weight = parts.length > 1 ? parts[1][1] : 0;
   shownPart = parts[weight > 0.5 ? 1 : 0][0];
   const camera = cameraNow();
@@ -432,7 +432,7 @@ function draw(layer = state.layer) {
 
 // ---------------------------------------------------------------- the page
 const LAYERS = ["colour", "depth", "opacity", "error"];
-let held = null;  // the held-out frame that is shown beside the scene
+let held = null;  // the held-out frame shown next to the scene
 const moved = () => state.yaw !== 0 || state.pitch !== 0 || state.closer !== 1 || state.right !== 0 || state.down !== 0;
 const short = (number) => Number(number.toPrecision(4)).toString();
 
@@ -441,9 +441,9 @@ function describe() {
   const i = nearestFrame(state.time), frame = about.frames.names[i];
   element("time").textContent = "frame " + (i + 1) + " of " + about.frames.names.length + ", t = " + state.time.toFixed(3)
     + (about.duration ? ", " + (state.time * about.duration).toFixed(2) + " s" : "");
-  const gap = shows(state.time).length ? null : "No window shows this time" + gapReason(state.time);
+  const gap = shows(state.time).length ? null : "No window covers this time" + gapReason(state.time);
   element("shown").textContent = gap || (waiting() ? "Loading window " + shows(state.time).map((k) => spans[k].name).join(" and ")
-    : (moved() ? "Turned view" : "View of the camera") + ", nearest frame " + frame);
+    : (moved() ? "Free view" : "Camera view") + ", nearest frame " + frame);
   chips();
   clearTimeout(addressed);
   addressed = setTimeout(address, 200);
@@ -455,13 +455,13 @@ function gapReason(time) {
 }
 
 let addressed = 0;
-function address() {  // the address opens the page at this view
+function address() {  // store this view in the address of the page
   const view = new URLSearchParams({t: state.time.toFixed(4)});
   if (state.layer) view.set("layer", LAYERS[state.layer]);
   for (const [name, rest] of [["yaw", 0], ["pitch", 0], ["closer", 1], ["right", 0], ["down", 0]])
     if (state[name] !== rest) view.set(name, short(state[name]));
   if (held) view.set("held_out", about.held_out.indexOf(held));
-  try { history.replaceState(null, "", "#" + view); } catch (refused) { /* the page works without */ }
+  try { history.replaceState(null, "", "#" + view); } catch (refused) { /* optional */ }
 }
 
 const nearestHeld = (time) => about.held_out.reduce((a, b) => Math.abs(b.time - time) < Math.abs(a.time - time) ? b : a);
@@ -481,15 +481,15 @@ function choose(layer) {
   }
 }
 
-function leave() {  // no frame has this time and camera
+function leave() {  // hide the held-out frame: it has another time or camera
   held = null;
-  element("beside").hidden = true;
+  element("held_out").hidden = true;
   element("stage").classList.remove("two");
   if (state.layer === 3) choose(0);
   for (const chip of element("chips").querySelectorAll("button")) chip.classList.remove("on");
 }
 
-function go(time) {  // in the error layer: to the nearest held-out frame, which alone has an error
+function go(time) {  // in the error layer: to the nearest held-out frame, because only these have an error
   if (state.layer === 3) {
     const frame = nearestHeld(time);
     if (frame !== held) visit(frame, true);
@@ -507,17 +507,17 @@ async function visit(frame, error = false) {
   unmark();
   state.time = frame.time;
   held = frame;
-  draw();  // the chips of this time
+  draw();  // updates the chips
   for (const chip of element("chips").querySelectorAll("button")) chip.classList.toggle("on", chip.title === frame.name);
   const source = frame.picture || (await fetched(frame.window)).held_out[frame.place].picture;
   if (held !== frame) return;
   element("truth").src = source;
-  element("truth_name").textContent = "Held-out frame " + frame.name + "; grey is excluded";
-  element("beside").hidden = false;
+  element("truth_name").textContent = "Held-out frame " + frame.name + "; grey: excluded";
+  element("held_out").hidden = false;
   element("stage").classList.add("two");
   const bytes = await (await fetch(source)).blob();
   const picture = await createImageBitmap(bytes, {premultiplyAlpha: "none", colorSpaceConversion: "none"});
-  if (held !== frame) return;  // another one was chosen meanwhile
+  if (held !== frame) return;  // another frame was chosen in the meantime
   gl.activeTexture(gl.TEXTURE5);
   gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
@@ -589,11 +589,11 @@ element("picture").onclick = () => {
 };
 
 // ---------------------------------------------------------------- a distance
-let marks = null;  // points of a measurement in the world of the scene, or null
+let marks = null;  // points of a measurement in world coordinates, or null
 function unmark() {
   if (!marks) return;
   marks = [];
-  element("length").textContent = "Measure: click two points of the surface.";
+  element("length").textContent = "Click two points on the surface.";
 }
 
 function surface(x, y) {  // the point of the rendered surface at a pixel of the picture, or null
@@ -622,10 +622,10 @@ function mark(x, y) {
   const point = surface(x, y);
   if (marks.length === 2) marks = [];
   if (point) marks.push(point);
-  element("length").textContent = !point ? "No surface there: click a point of the tissue."
-    : marks.length < 2 ? "First point set: click the second one."
+  element("length").textContent = !point ? "No surface there: click a point on the tissue."
+    : marks.length < 2 ? "First point set: click the second point."
     : "Distance " + short(Math.hypot(...marks[0].map((v, k) => v - marks[1][k]))) + " " + about.unit +
-      " on the rendered surface at this time. It is as accurate as the depth that the scene was trained with, and no measurement.";
+      " on the rendered surface at this time. An estimate: it is only as accurate as the prior depth used in training.";
 }
 
 element("measure").onclick = () => {
@@ -643,7 +643,7 @@ canvas.onclick = (event) => {
 };
 canvas.oncontextmenu = (event) => event.preventDefault();
 
-const fingers = new Map();  // pointers that are down: one turns the scene, two bring it closer
+const fingers = new Map();  // active pointers: one rotates, two zoom
 const apart = () => { const [a, b] = [...fingers.values()]; return Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1])); };
 canvas.onpointerdown = (event) => {
   canvas.setPointerCapture(event.pointerId);
@@ -669,7 +669,7 @@ canvas.addEventListener("wheel", (event) => {
   look(state.yaw, state.pitch, state.closer * Math.exp(event.deltaY * 0.001));
   draw();
 }, {passive: false});
-function step(frames) {  // to the frame before or after the nearest one
+function step(frames) {  // to the previous or next frame
   const times = about.frames.times, count = times.length;
   stop();
   go(times[(nearestFrame(state.time) + frames + count) % count]);
@@ -679,7 +679,7 @@ const TURNS = {ArrowLeft: [-0.05, 0, 1], ArrowRight: [0.05, 0, 1], ArrowUp: [0, 
   "+": [0, 0, 0.95], "-": [0, 0, 1 / 0.95]};
 const KEYS = {" ": () => toggle("playing"), o: () => toggle("orbiting"), ",": () => step(-1), ".": () => step(1),
   0: () => element("reset").onclick()};
-document.onkeydown = (event) => {  // buttons, slider and list keep their own keys
+document.onkeydown = (event) => {  // buttons, slider and lists handle their own keys
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName)) return;
   const turn = TURNS[event.key];
@@ -691,7 +691,7 @@ document.onkeydown = (event) => {  // buttons, slider and list keep their own ke
   else KEYS[event.key]();
   draw();
 };
-let chipped = "";  // the windows whose held-out frames have a button
+let chipped = "";  // the windows whose held-out frames have buttons
 function chips() {
   const now = shows(state.time), frames = about.held_out.filter((frame) => !about.windows || now.includes(frame.window));
   if (chipped === now.join()) return;
@@ -709,13 +709,13 @@ function chips() {
 }
 element("layer").options[3].disabled = about.held_out.length === 0;
 element("note").textContent = about.count.toLocaleString("en") + " Gaussians" +
-  (about.windows ? " at most in each of " + spans.length + " windows, which are loaded as they are played, lengths in "
-    : ", " + about.times.length + " key times, lengths in ") + about.unit +
-  ". Between key times the page interpolates. Drag to turn the scene; the wheel or two fingers bring it closer. " +
-  "Shift or the right button moves it. Keys: space plays, arrows turn, with shift they move, + and - bring it closer, comma and full stop change the frame, o orbits, 0 resets.";
+  (about.windows ? " at most in each of " + spans.length + " windows, loaded on demand; lengths in "
+    : ", " + about.times.length + " key times; lengths in ") + about.unit +
+  ". The page interpolates between key times. Drag to rotate; use the wheel or two fingers to zoom, Shift or the right " +
+  "button to pan. Keys: space plays, arrows rotate, Shift and arrows pan, + and - zoom, comma and full stop step by one frame, o orbits, 0 resets.";
 if (!about.windows && about.times.length < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
 
-// `#t=0.4&layer=depth&yaw=0.2` opens the page at a moment; `probe` adds the drawn picture and its time as text.
+// `#t=0.4&layer=depth&yaw=0.2` opens the page at a view; `probe` adds the drawn picture and its duration as text.
 const asked = new URLSearchParams(location.hash.slice(1));
 state.time = Math.max(0, Math.min(1, Number(asked.get("t")) || 0));
 const wish = (name, rest = 0) => Number(asked.get(name)) || rest;
