@@ -1,1 +1,1 @@
-"""Benchmarks on a fixed workload, which is the same for every version of the software and for every peer."""
+"""Benchmarks on a fixed workload, common to all versions of the software and to peers."""

@@ -1,7 +1,7 @@
-"""One point of a benchmark: sizes in, times by stage, pairs and memory out. Runs in a process of its own.
+"""One case of a benchmark, measured in its own process: times by stage, pairs and memory for given sizes.
 
-The timed iteration is one of the published schedule at which everything is active: all components, all losses, the
-statistics of density control. Densification, which runs once an interval, is timed after the others.
+The timed iteration is one of the published schedule with all components, all losses and the statistics of density
+control. Densification, which runs once per interval, is timed afterwards.
 """
 
 import multiprocessing
@@ -23,10 +23,10 @@ from endotsr.scene.gaussians import Gaussians, arrays
 
 Precision = Literal["float32", "float64"]
 
-WARM_UP = 2  # iterations after the compiling one
-DEPTH = 4.0  # scene units of the middle of a trained scene, that of the common workload
+WARM_UP = 2  # iterations after the first one, which compiles
+DEPTH = 4.0  # depth of the middle of a trained scene, scene units; as in the common workload
 SEED = 7  # of the time-dependent parameters of a trained scene
-PERCENTILES = (1, 99)  # of the positions of a trained scene: the range that is scaled to the picture
+PERCENTILES = (1, 99)  # of the positions of a trained scene: the range scaled to the picture
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class BenchCase:
     frequencies: int = PAPER.model.frequencies
     frames: int = workload.FRAMES
     size: float = 1.0  # factor on the semi-axes of the Gaussians
-    scene: str | None = None  # file of a trained scene instead of the common workload; `gaussians` is then ignored
-    densifications: int = 2  # timed after the iterations, 0 = none
+    scene: str | None = None  # file of a trained scene instead of the common workload; ignores `gaussians`
+    densifications: int = 2  # timed densifications after the iterations
 
     def config(self) -> Config:
         """The published settings with the sizes of this case."""
@@ -53,19 +53,19 @@ class BenchCase:
 
 
 def apart(function: Callable[..., Any], *arguments: Any) -> Any:
-    """The result of `function(*arguments)` from a fresh process, so that its peak memory is its own."""
+    """The result of `function(*arguments)` in a new process, which has its own peak memory."""
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=spawn) as pool:
         return pool.submit(function, *arguments).result()
 
 
 def measure(case: BenchCase) -> dict[str, Any]:
-    """Times of the stages and of the iteration, pairs, memory. Call it through `apart`.
+    """Measure a case. Call it through `apart`.
 
-    returns  JSON-able: "case"; "stages" {name: spread}; "splat" and "iteration", the same for the sum of the four
-             splatting stages and for everything; "first_iteration_s", compilation or loading of compiled code
-             included; "view" {"visible", "listed", "blended"}; "parameters" a Gaussian; "peak_memory_bytes";
-             "densification" {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was timed
+    returns  JSON-able: "case"; "stages" {name: spread}; "splat" and "iteration": spread of the sum of the four
+             splatting stages and of all stages; "first_iteration_s", with compilation or loading of compiled code;
+             "view" {"visible", "listed", "blended"}; "parameters" per Gaussian; "peak_memory_bytes"; "densification"
+             {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was timed
     """
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.machine import peak_memory_bytes
@@ -90,7 +90,7 @@ def measure(case: BenchCase) -> dict[str, Any]:
 
 
 def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
-    """State and constants of a case, at the timed iteration, with every target computed."""
+    """State and constants of a case at the timed iteration, with precomputed targets."""
     from endotsr.fitting.state import bench_state, training_constants
 
     constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
@@ -104,15 +104,15 @@ def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
 
 
 def trained_gaussians(path: Path, config: Config) -> Gaussians:
-    """A trained scene, moved and scaled to fill the common camera's picture, with small time-dependent parameters.
+    """A trained scene, scaled to fill the picture of the common camera, with small random time-dependent parameters.
 
     path   npz, see `export.npz`
-    Raises: InputError naming the file and what is missing.
+    Raises: InputError naming the file and the missing array.
     """
     found = read_arrays(path)
     position, log_scale = found["xyz"].T.astype(np.float64), found["log_scale"].T.astype(np.float64)
     low, high = np.percentile(position, PERCENTILES, axis=1)
-    across = max((high - low)[0] / workload.WIDTH, (high - low)[1] / workload.HEIGHT)  # scene units a pixel
+    across = max((high - low)[0] / workload.WIDTH, (high - low)[1] / workload.HEIGHT)  # scene units per pixel
     factor = DEPTH / workload.FOCAL / across
     middle = (low + high)[:, None] / 2
     opacity = np.clip(found["opacity"].astype(np.float64), 1e-4, 1 - 1e-4)
@@ -134,8 +134,8 @@ def trained_gaussians(path: Path, config: Config) -> Gaussians:
 def time_iterations(state: Any, constants: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
     """Repeat the same iteration of the schedule, after warm-up.
 
-    returns  seconds of the very first iteration (compilation or loading of compiled code included); of each of the
-             `repeats`, seconds by stage, whose sum is the iteration
+    returns  seconds of the first iteration, with compilation or loading of compiled code; and for each repeat the
+             seconds by stage, whose sum is the iteration
     """
     from endotsr.fitting.trainer import training_step
 
@@ -158,7 +158,7 @@ def representative(config: Config) -> int:
 
 
 def _view(state: Any, constants: Any) -> dict[str, int]:
-    """Gaussians on the screen, entries of the tile lists and blended pairs of the first training view."""
+    """Visible Gaussians, entries of the tile lists and blended pairs of the first training view."""
     from endotsr.bench.pairs import count_pairs
     from endotsr.fitting.model import raster_settings, scene_at
     from endotsr.splatting.render import render_forward
@@ -172,13 +172,13 @@ def _view(state: Any, constants: Any) -> dict[str, int]:
 
 
 def _densification(state: Any, constants: Any, repeats: int) -> dict[str, Any] | None:
-    """Time of the densification within an iteration; the scene changes, so there are few repeats."""
+    """Time of the densification within an iteration. It changes the scene, hence few repeats."""
     from endotsr.fitting.trainer import training_step
 
     if repeats == 0:
         return None
     interval, clock = constants.config.density.interval, StageClock()
-    for _ in range(1 + repeats):  # the first one loads its kernels
+    for _ in range(1 + repeats):  # the first one loads the kernels
         state.iteration = -(-state.iteration // interval) * interval - 1
         with clock.iteration():
             training_step(state, constants, clock)

@@ -1,10 +1,9 @@
-"""Time of an iteration by stage: the timer that a benchmark passes to the training step; and spreads of repeated times.
+"""Time of an iteration by stage, measured by a timer passed to the training step; median and quartiles of repeats.
 
-In: the stages that the training announces (`endotsr.kernels.timer`). Out: seconds by stage, one entry a repeat.
-Stages may nest: a stage is assigned its own time, not that of a stage inside it. While several threads are in stages,
-each stage is assigned an equal part of the time. The remainder (the log entry, additions between stages) is "rest".
-Cost: about 2 us per stage, some twenty stages an iteration. On a shared machine a mean would follow the largest
-disturbance, so that repeated times are given as median and quartiles.
+In: the stages reported by the training (`endotsr.kernels.timer`). Out: seconds by stage, one entry per repeat. Stages
+may nest; the time of an inner stage is not part of the outer one. Concurrent stages split the elapsed time equally. The
+remainder (log entry, additions between stages) is "rest". Overhead: about 2 us per stage, for about twenty stages per
+iteration. Results are medians and quartiles, because the largest disturbance dominates a mean on a shared machine.
 """
 
 import threading
@@ -18,7 +17,7 @@ import numpy as np
 REST = "rest"
 SPLAT = ("projection", "binning", "blend forward", "blend reverse")
 STAGES: dict[str, str] = {
-    "FDM": "offsets of the time bases; in reverse one sweep: gradient, Adam step, offsets of the next iteration",
+    "FDM": "offsets of the time bases; reverse in one sweep: gradient, Adam step, offsets of the next iteration",
     "Fourier": "atoms, colour residual, spectral motion, Matern penalty",
     "projection": "covariance, projection and harmonics, forward and reverse",
     "binning": "boxes, depth order, tile lists, records, gather of the pairs' gradients",
@@ -27,23 +26,23 @@ STAGES: dict[str, str] = {
     "L1 and SSIM": "forward and reverse",
     "pyramid": "Laplacian loss, forward and reverse",
     "depth and smoothness": "forward and reverse, edge detection included",
-    "Adam": "every other array; the Fourier coefficients with their reverse pass in the same sweep",
-    "density control": "its statistics; in an iteration that densifies, the densification",
+    "Adam": "all other arrays; Fourier coefficients in one sweep with their reverse pass",
+    "density control": "statistics; the densification in an iteration that densifies",
 }
 
 
 class StageClock:
-    """A timer: seconds by stage, a list with one entry a repeat; a stage that did not run has 0."""
+    """A timer: seconds by stage, one entry per repeat; 0 for a stage that did not run."""
 
     def __init__(self) -> None:
         self.repeats: list[dict[str, float]] = []
-        self._stacks: dict[int, list[str]] = {}  # of each thread: the stages that it is in
+        self._stacks: dict[int, list[str]] = {}  # thread -> its open stages
         self._since = 0.0
         self._lock = threading.Lock()
 
     @contextmanager
     def iteration(self) -> Iterator[None]:
-        """Time one repeat; the time of the block is divided among the stages and "rest"."""
+        """Time one repeat: split the time of the block among the stages and "rest"."""
         self.repeats.append(dict.fromkeys((*STAGES, REST), 0.0))
         self._since = time.perf_counter()
         self._stacks = {}
@@ -53,7 +52,7 @@ class StageClock:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Assign the time of the block to the stage `name`. Raises: KeyError for a name that is not in STAGES."""
+        """Assign the time of the block to the stage `name`. Raises: KeyError for an unknown stage."""
         if name not in STAGES:
             raise KeyError(f"unknown stage {name!r}; allowed: {', '.join(STAGES)}")
         thread = threading.get_ident()
@@ -68,7 +67,7 @@ class StageClock:
                 self._stacks[thread].pop()
 
     def _charge(self) -> None:
-        """Divide the time since the last event equally among the innermost stages of all threads."""
+        """Split the time since the last event equally among the innermost stages of all threads."""
         now = time.perf_counter()
         active = [stack[-1] for stack in self._stacks.values() if stack] or [REST]
         for stage in active:
@@ -83,7 +82,7 @@ def spread(seconds: Sequence[float]) -> dict[str, Any]:
 
 
 def repeated(work: Callable[[], object], repeats: int, warm_up: int = 1) -> list[float]:
-    """Seconds of each of `repeats` calls, after `warm_up` calls that compile, load and touch memory."""
+    """Seconds of each of `repeats` calls, after `warm_up` calls for compilation and first memory access."""
     seconds = []
     for repeat in range(-warm_up, repeats):
         began = time.perf_counter()

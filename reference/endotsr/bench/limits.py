@@ -1,10 +1,9 @@
-"""Lower bounds on the time of a stage: the work in its formulas, at the measured peaks of the machine.
+"""Lower bounds on the time of each stage, from its work and the measured peaks of the machine.
 
-For each stage, floating-point operations and bytes. Operations are counted in the forward and reverse formulas (a
-fused multiply-add is two, so is a division); bytes are compulsory traffic: every large array is read once and
-written once, nothing is read twice. The limit is the longer of the two times, so a stage exceeds 100 % of its limit
-only where data stay in a cache between stages. Sorting and bookkeeping have almost no arithmetic, so their limit is
-set by traffic alone.
+The work is a number of floating-point operations and of bytes. Operations are counted in the forward and reverse
+formulas; a fused multiply-add and a division count as two. Bytes are compulsory traffic: every large array is read once
+and written once. The limit is the longer of the two times; a stage can exceed 100 % of it only if data stay in a cache
+between stages. Sorting and bookkeeping have almost no arithmetic and are bounded by traffic.
 """
 
 from collections.abc import Mapping
@@ -26,21 +25,21 @@ DEPTH_SMOOTHNESS = 60  # per pixel, forward and reverse, edge detection included
 
 
 class Work(NamedTuple):
-    """The least work of a stage in one iteration."""
+    """The minimum work of a stage per iteration."""
 
     flop: float
     bytes: float
 
 
 def work(result: Mapping[str, Any]) -> dict[str, Work]:
-    """Work of every stage of a measured case (`endotsr.bench.case.measure`); "rest" has none."""
+    """Work of every stage of a measured case (`endotsr.bench.case.measure`), except "rest"."""
     case, view = result["case"], result["view"]
     n, pixels = case["gaussians"], case["width"] * case["height"]
     size = 8 if case["precision"] == "float64" else 4
     fdm = 3 * DEFORMATION_CHANNELS * case["bases"] * n  # numbers of the three arrays
     spectral = 6 * case["frequencies"] * n  # numbers of A, and of C
     harmonics = 3 * (PAPER.model.harmonics_degree + 1) ** 2  # coefficients
-    base = 11 + harmonics  # numbers of a Gaussian beside its time bases and residuals
+    base = 11 + harmonics  # numbers per Gaussian without time bases and residuals
     seen, listed, blended = view["visible"], view["listed"], view["blended"]
     digits = -(-8 * size // RADIX_BITS)
     gathered = RECORD * seen * size + GRADIENT * listed * size + 12 * seen * size
@@ -62,7 +61,7 @@ def work(result: Mapping[str, Any]) -> dict[str, Work]:
 def limits(result: Mapping[str, Any], peaks: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """For each stage {"limit_ms", "bound": "arithmetic" or "memory", "fraction": limit / measured median}.
 
-    peaks   of `endotsr.bench.peaks.measure_peaks`, with the threads of the case
+    peaks   from `endotsr.bench.peaks.measure_peaks` with the threads of the case
     """
     flop_rate = peaks["flop_per_second"][result["case"]["precision"]]
     byte_rate = max(peaks["bytes_per_second"].values())

@@ -1,8 +1,8 @@
-"""Numbers of pixel-Gaussian pairs that a frame visits and blends: costs independent of machine, path, tile and threads.
+"""Numbers of visited and blended pixel-Gaussian pairs of a frame: costs independent of machine, path, tile and threads.
 
-A visit is a pair whose alpha must be evaluated: the pixel lies in the support of the Gaussian and is not yet finished
-by the Gaussians in front. The support is alpha >= cutoff (`ellipse`), the tiles of the 3-sigma square
-(`three_sigma_tiles`) or the whole picture (`everywhere`). A pair is blended when it also changes the pixel.
+A pair is visited if its alpha must be evaluated: the pixel is in the support of the Gaussian, and the Gaussians in
+front have not terminated it. The support is alpha >= cutoff (`ellipse`), the tiles of the 3-sigma square
+(`three_sigma_tiles`) or the whole picture (`everywhere`). A pair is blended if it also changes the pixel.
 """
 
 from typing import NamedTuple
@@ -56,7 +56,7 @@ _count_kernel = jit(_count)
 
 
 def count_pairs(saved: RenderSaved) -> PairCount:
-    """Pairs of the frame that `render_forward` has just rendered. It is slow and must not be part of a timed block."""
+    """Pairs of a frame rendered by `render_forward`. Slow: do not include it in a timed block."""
     composite, camera = saved.composite, saved.camera
     module = compositing_blocks if isinstance(composite, compositing_blocks.BlocksSaved) else compositing
     ellipse = saved.settings.support == "ellipse" and saved.settings.alpha_cutoff > 0

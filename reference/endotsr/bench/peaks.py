@@ -1,8 +1,7 @@
-"""Peaks of this machine: fused multiply-adds per second, and bytes to and from memory per second.
+"""Peaks of this machine: floating-point operations per second, and memory traffic in bytes per second.
 
-The peaks are measured, not looked up, because the capacity of a virtual machine depends on the load of its host. The
-kernels are compiled with contraction, like the fast path. A stage of the training is then compared with these peaks
-(see `endotsr.bench.limits`).
+The peaks are measured, because the capacity of a virtual machine depends on the load of its host. The kernels are
+compiled with contraction, like the fast path. `endotsr.bench.limits` compares the training stages with these peaks.
 """
 
 from typing import Any
@@ -14,17 +13,17 @@ from endotsr.bench.clock import repeated
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for, use_threads
 
-STEPS = 16  # multiply-adds of one chain, each waiting for the one before
-CHAINS = 8  # of one number, independent: enough to hide the latency of an FMA
-FMA_NUMBERS_PER_TASK = 4096  # they stay in the first-level cache
+STEPS = 16  # dependent multiply-adds of one chain
+CHAINS = 8  # independent chains per number: enough to hide the latency of an FMA
+FMA_NUMBERS_PER_TASK = 4096  # fit into the first-level cache
 MEMORY_NUMBERS_PER_TASK = 1 << 16
-ARRAY_BYTES = 96 << 20  # of each array of a memory kernel, beyond any cache of the machine
+ARRAY_BYTES = 96 << 20  # of each array of a memory kernel, larger than the caches
 
 
 def _multiply_add(first, stop, values, f):
-    """STEPS steps x <- f x + f of CHAINS chains for every number: 2 operations each, without memory traffic.
+    """STEPS steps x <- f x + f in CHAINS chains for every number: 2 operations each, without memory traffic.
 
-    With plain names, one array and a fixed count of steps, the loop over the numbers is vectorised.
+    Scalar names, a single array and a constant number of steps let the compiler vectorise the loop over the numbers.
     """
     real = values.dtype.type
     for task in range(first, stop):
@@ -54,7 +53,7 @@ def triad(first, stop, out, left, right, factor):
 
 
 def update(first, stop, out, left, right, factor):
-    """out <- right + factor out, in place, like the step of an optimiser; `left` is not read."""
+    """out <- right + factor out, in place, like an optimiser step; `left` is not read."""
     begin, end = first * MEMORY_NUMBERS_PER_TASK, min(out.size, stop * MEMORY_NUMBERS_PER_TASK)
     o, y = out[begin:end], right[begin:end]
     for i in range(o.size):
@@ -67,7 +66,7 @@ _update_kernel = jit(update, contract=True)
 
 
 def fma_peak(precision: str, repeats: int = 7) -> float:
-    """Floating-point operations per second with the threads in use; a fused multiply-add counts as two."""
+    """Floating-point operations per second with the current threads; a fused multiply-add counts as two."""
     real = np.dtype(precision).type
     tasks = 64 * numba.get_num_threads()
     values = np.ones((tasks, FMA_NUMBERS_PER_TASK), real)
@@ -76,10 +75,9 @@ def fma_peak(precision: str, repeats: int = 7) -> float:
 
 
 def bandwidths(repeats: int = 7, array_bytes: int = ARRAY_BYTES) -> dict[str, float]:
-    """Bytes per second with the threads in use: "triad" (two arrays read, one written), "update"
-    (one read, one changed).
+    """Bytes per second with the current threads: "triad" (two reads, one write), "update" (one read, one update).
 
-    Most processors first read a cache line that is only written; that traffic is not counted, as in STREAM.
+    As in STREAM, the read of a written cache line (write-allocate) is not counted.
     """
     out, left, right = (np.ones(array_bytes // 4, np.float32) for _ in range(3))
     tasks, factor = -(-out.size // MEMORY_NUMBERS_PER_TASK), np.float32(0.5)
@@ -98,6 +96,6 @@ def measure_peaks(threads: int) -> dict[str, Any]:
 
 
 def higher(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
-    """The higher of two measurements of each peak."""
+    """The maximum of two measurements for each peak."""
     rates = ("flop_per_second", "bytes_per_second")
     return before | {kind: {name: max(v, after[kind][name]) for name, v in before[kind].items()} for kind in rates}

@@ -1,4 +1,4 @@
-"""Every stage of a training iteration over sizes, precisions and threads, beside its limit."""
+"""Time of every stage of a training iteration for sizes, precisions and threads, with its lower bound."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -16,7 +16,7 @@ Say = Callable[[str], None]
 def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
     """{"peaks": one per number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
 
-    Raises: InputError before anything is measured, if the file of a case is not a trained scene.
+    Raises: InputError before any measurement, if the file of a case is not a trained scene.
     """
     cases = list(cases)
     for scene in {case.scene for case in cases if case.scene}:
@@ -27,7 +27,7 @@ def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
     for case in cases:
         results.append(apart(measure, case))
         say(line(results[-1]))
-    after = [apart(measure_peaks, threads) for threads in numbers]  # the first may have been disturbed
+    after = [apart(measure_peaks, threads) for threads in numbers]  # the first measurement may have been disturbed
     peaks = {threads: higher(a, b) for threads, a, b in zip(numbers, before, after)}
     for result in results:
         result["limits"] = limits(result, peaks[result["case"]["threads"]])
@@ -36,7 +36,7 @@ def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
 
 
 def ns_per_pair(result: dict[str, Any]) -> dict[str, float | None]:
-    """Nanoseconds per blended pair of both blending stages and of all splatting; None if nothing was blended."""
+    """Nanoseconds per blended pair of both blending stages and of all splatting stages; None without pairs."""
     pairs = result["view"]["blended"]
     medians = {name: result["stages"][name]["median_ms"] for name in ("blend forward", "blend reverse")}
     medians["splat"] = result["splat"]["median_ms"]
@@ -44,13 +44,13 @@ def ns_per_pair(result: dict[str, Any]) -> dict[str, float | None]:
 
 
 def name_of(case: dict[str, Any]) -> str:
-    """A case in words."""
+    """A case as text."""
     what = case["scene"] or f"{case['gaussians']} Gaussians"
     return f"{what}, {case['width']}x{case['height']}, {case['precision']}, {case['threads']} threads"
 
 
 def line(result: dict[str, Any]) -> str:
-    """One case in a line."""
+    """One case as a line of text."""
     pairs = result["view"]["blended"]
     return (
         f"{name_of(result['case'])}: iteration {result['iteration']['median_ms']:.1f} ms, splat "
@@ -66,17 +66,17 @@ def table(result: dict[str, Any]) -> str:
     dense = result["densification"]
     if dense:
         per = f"{dense['per_iteration_ms']:.2f} ms per iteration"
-        lines.append(f"densification, once an interval: {dense['median_ms']:.2f} ms, or {per}")
-    lines.append(f"first iteration, compiled code loaded or made: {result['first_iteration_s']:.1f} s")
+        lines.append(f"densification, once per interval: {dense['median_ms']:.2f} ms, or {per}")
+    lines.append(f"first iteration, with loading or compilation: {result['first_iteration_s']:.1f} s")
     ns = result["ns_per_pair"]
     if ns["splat"] is not None:
         each = ", ".join(f"{name} {value:.2f}" for name, value in ns.items())
-        lines.append(f"{result['view']['blended'] / 1e6:.2f} M blended pairs; ns a pair: {each}")
+        lines.append(f"{result['view']['blended'] / 1e6:.2f} M blended pairs; ns per pair: {each}")
     return "\n".join(lines)
 
 
 def _row(name: str, spread: dict[str, Any], result: dict[str, Any]) -> list[str]:
-    """One line of the table; a stage without a limit has none."""
+    """One row of the table; limit cells are empty for a stage without a limit."""
     low, high = spread["quartiles_ms"]
     fraction = spread["median_ms"] / result["iteration"]["median_ms"]
     cells = [name, f"{spread['median_ms']:.2f}", f"{low:.2f} - {high:.2f}", f"{fraction:.0%}"]
