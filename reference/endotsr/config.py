@@ -33,7 +33,7 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     masks: Literal["masks", "gt_masks", "none"] = "masks"
     """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only, `none`"""
     excluded_value: Literal["white", "black"] = "white"
-    """polarity on disk: which mask value is excluded (EndoNeRF: white)"""
+    """mask value of excluded pixels on disk (EndoNeRF: white)"""
     allow_tissue_fraction: bool = False
     """accept a tissue fraction below 5 % or of exactly 100 %, and masks that the pictures or other masks contradict"""
     frames: str = ""
@@ -47,7 +47,7 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     depth_percentiles: tuple[float, float] = (3.0, 99.8)
     """per-frame clip of the non-zero prior depth, percent"""
     memory: NonNegative = 0.0
-    """GB for frames and what is computed from them; more lies in a file; 0 = half of this machine's memory"""
+    """limit in GB for frames and derived data, the rest is kept in a file; 0 = half of this machine's memory"""
 
 
 class ModelConfig(Section, frozen=True, kw_only=True):
@@ -89,13 +89,13 @@ class RasterConfig(Section, frozen=True, kw_only=True):
     """The rasteriser preset used in training and rendering."""
 
     preset: Literal["paper", "legacy", "exact"] = "paper"
-    """`exact` evaluates every Gaussian at every pixel and is for small scenes"""
+    """rasteriser preset; `exact` evaluates every Gaussian at every pixel, for small scenes"""
     near: Positive = 0.2
     """near plane, scene units"""
     alpha_cutoff: Fraction | Literal["preset"] = "preset"
     """a smaller alpha contributes nothing; 0 = no cutoff"""
     transmittance_stop: Fraction | Literal["preset"] = "preset"
-    """a pixel ends before its transmittance falls below; 0 = never"""
+    """a pixel ends before its transmittance falls below this; 0 = never"""
     alpha_max: Fraction | Literal["preset"] = "preset"
     """clamp of alpha; 1 = none"""
 
@@ -163,7 +163,7 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     annealing_from: Count = 4500
     """last iteration with the constant rates"""
     restart_residual_schedule: bool = True
-    """residual rates decay over the steps that remain after activation"""
+    """residual rates decay over the steps after activation"""
     beta1: Fraction = 0.9
     """Adam first-moment decay"""
     beta2: Fraction = 0.999
@@ -184,9 +184,9 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     until: Count = 4000
     """densify at iterations < until"""
     growth: Literal["threshold", "budget"] = "threshold"
-    """what is cloned or split: all above `gradient_threshold`, or the steepest, up to `maximum` at the end"""
+    """candidates: all above `gradient_threshold`, or those with the largest gradients, up to `maximum` at the end"""
     gradient_threshold: Positive = 2e-4
-    """mean screen gradient from which a Gaussian is cloned or split, NDC units; without effect on a budget"""
+    """smallest mean screen gradient of a cloned or split Gaussian, NDC units; not used with a budget"""
     extent: Positive | Literal["cameras"] = 10.0
     """scene extent, scene units; `cameras` = 1.1 x the largest camera distance from their mean"""
     dense_fraction: Positive = 0.01
@@ -194,7 +194,7 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     prune_opacity: Fraction = 0.005
     """remove Gaussians with a lower opacity"""
     maximum: PositiveCount = 400_000
-    """no clone or split beyond this count; as a budget, the count that the last densification reaches"""
+    """largest number of Gaussians; with a budget, the number after the last densification"""
 
 
 class InitialisationConfig(Section, frozen=True, kw_only=True):
@@ -205,26 +205,26 @@ class InitialisationConfig(Section, frozen=True, kw_only=True):
     other_frame_points: Count = 5_000
     """number of pixels drawn from the other training frames together"""
     motion_threshold: Positive = 40.0
-    """a pixel of another frame counts as moved when its depth differs by more, scene units"""
+    """a pixel of another frame counts as moved if its depth differs by more than this, scene units"""
     motion: Literal["none", "flow"] = "none"
-    """motion at the start: none, or coefficients of S that are fitted to the points' tracks along optical flow"""
+    """initial motion: none, or coefficients of S fitted to the tracks of the points along optical flow"""
 
 
 class TrainingConfig(Section, frozen=True, kw_only=True):
     """Length, seed and bookkeeping of a run."""
 
     iterations: PositiveCount = 6000
-    """number of iterations, each of which renders one view; the milestones are written for it"""
+    """number of iterations, one view each; the milestones refer to it"""
     visits_per_frame: Count = 0
-    """least iterations a training frame, up to 64 of them: more than `iterations` stretch the run; 0 = exactly those"""
+    """minimum iterations per training frame, up to 64 frames; lengthens the run beyond `iterations`; 0 = no minimum"""
     residual_activation: Count = 3000
     """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
     """iterations between raises of the active harmonic degree"""
     coarse_start: bool = False
-    """start on frames of half size, until their fit is as near to them as they are to the full frames"""
+    """start on half-size frames, until the fit error is below the detail that they lack"""
     bridge_fraction: Fraction = 0.0
-    """fraction of iterations that render a time between two training frames, made of both along optical flow"""
+    """fraction of iterations at a time between two training frames, with a target made from both by optical flow"""
     seed: Count = 0
     """seed of every random draw"""
     threads: Count = 0
@@ -232,7 +232,7 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     precision: Literal["float32", "float64"] = "float32"
     """floating-point precision of the run"""
     checkpoint_every: PositiveCount = 1000
-    """most iterations between checkpoints; time decides when they come sooner"""
+    """largest number of iterations between checkpoints; elapsed time may trigger them earlier"""
 
 
 Preset = Literal["paper", "sharp", "quick", "demo"]
