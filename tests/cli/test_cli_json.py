@@ -78,6 +78,6 @@ def test_a_page_refuses_a_choice_of_times_or_content(words, finished_run, tmp_pa
 @pytest.mark.parametrize("words", [["--keys", "9"], ["--title", "mine"], ["--sequence", "elsewhere"]])
 def test_options_of_a_page_are_refused_elsewhere(words, finished_run, tmp_path, capsys):
     file = tmp_path / "scene.ply"
-    said = f"{words[0]} belongs to a page; allowed: with --out PAGE.html"
+    said = f"{words[0]} applies to a page only; allowed: with --out PAGE.html"
     assert_refused(capsys, ["export", str(finished_run), "--out", str(file), *words], said)
     assert not file.exists()

@@ -43,7 +43,7 @@ def found() -> tuple[Inspection, Plan]:
 
 def test_headline_separates_what_was_found_from_what_is_open(found):
     inspection, plan = found
-    for kind, said in (("suspected", "Found: motion, occluders."), ("unknown", "Found: motion. Left open: occluders.")):
+    for kind, said in (("suspected", "Found: motion, occluders."), ("unknown", "Found: motion. Undecided: occluders.")):
         verdict = inspection.verdicts["occluders"]._replace(present=True, kind=kind)
         changed = inspection._replace(verdicts=inspection.verdicts | {"occluders": verdict})
         assert said in Reader(inspection_html("clip", changed, plan)).words
@@ -52,7 +52,14 @@ def test_headline_separates_what_was_found_from_what_is_open(found):
 def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found):
     page = inspection_html("clip & <b>", *found)
     words = Reader(page).words
-    for word in ("clip & <b>", "periodic", "It <moves>.", "model.appearance", "Kept as given. Slow motion.", "Remark."):
+    for word in (
+        "clip & <b>",
+        "periodic",
+        "It <moves>.",
+        "model.appearance",
+        "Set explicitly, kept. Slow motion.",
+        "Remark.",
+    ):
         assert any(word in said for said in words), word
     assert "http" not in without_pictures(page) and "<script" not in page
     assert page.count("data:image/png") == 4  # frame, map, and the chart for either colour scheme
@@ -63,7 +70,7 @@ def test_text_says_what_the_page_says(found):
     assert "noise: 2.55 grey levels" in text
     assert "rate: 5 cycles per sequence, 1500 per minute, 2 harmonics" in text
     assert "model.appearance = false (now true), saves 5% time, 7% memory: Steady light." in text
-    assert "model.bases = 5 (now 17): Slow motion." in text and "model.deformation stays: It <moves>." in text
+    assert "model.bases = 5 (now 17): Slow motion." in text and "model.deformation is kept: It <moves>." in text
 
 
 @pytest.mark.slow

@@ -126,8 +126,8 @@ def test_the_page_says_whether_the_motion_carries_information(faded, said):
         Reader(report_html(made_up_data(evaluation=evaluation | {"cross_fade": row, "trajectories": motion}))).words
     )
     assert "Blend of its own renders" in words and said in words
-    assert ("carries information" if faded < 30.25 else "does not carry information") in words
-    assert "mean trajectory error 0.250 mm (0.50 px), where the tissue moves 1.000 mm (2.00 px)" in words
+    assert ("adds information" if faded < 30.25 else "adds no information") in words
+    assert "Mean trajectory error 0.250 mm (0.50 px); mean tissue motion 1.000 mm (2.00 px)" in words
 
 
 def test_tables_hold_the_numbers(page):
@@ -189,7 +189,7 @@ def test_a_frame_without_tissue_is_named():
     rows = [{"frame": 3, "name": "right", "psnr_tissue": 30.0}, {"frame": 5, "name": "covered", "psnr_tissue": None}]
     evaluation = {"held_out": {"mean": {"psnr_tissue": 30.0}, "per_frame": rows}, "baselines": {}}
     page = report_html(ReportData(title="x", evaluation=evaluation))
-    assert "left out of the means of the tissue, without a finite value there: covered." in page
+    assert "excluded from the tissue means (no finite value): covered." in page
 
 
 def test_text_cannot_break_the_page():
@@ -231,8 +231,8 @@ def test_columns_of_8_bits_are_folded():
     data = made_up_data()
     data.evaluation["held_out"]["mean"] |= {"psnr_full_8bit": 31.71, "psnr_tissue_8bit": 30.19}
     page = report_html(data)
-    shown, _, folded = page.partition("<summary>The same of pictures rounded to 8 bits")
-    table = shown[shown.index("Held-out frames against baselines") :]
+    shown, _, folded = page.partition("<summary>With renders rounded to 8 bits")
+    table = shown[shown.index("Held-out frames, compared with baselines") :]
     assert "8‑bit" not in table and "31.71" not in table and "30.25" in table
     opened = folded[: folded.index("</details>")]
     assert "31.71" in opened and "30.19" in opened and "30.25" not in opened
@@ -241,4 +241,6 @@ def test_columns_of_8_bits_are_folded():
 def test_the_report_says_that_it_shows_the_worst_of_more_frames():
     data = made_up_data()
     assert "worst of" not in report_html(data)
-    assert "The 2 worst of 4 frames; renders/ has all of them." in report_html(replace(data, frames=data.frames[:2]))
+    assert "The 2 worst of 4 frames; see renders/ for all of them." in report_html(
+        replace(data, frames=data.frames[:2])
+    )

@@ -1,1 +1,1 @@
-"""The HTML report of a run: parts, figures, page."""
+"""Reports as HTML and text: the report of a run, the progress page, `check`, `inspect` and comparisons."""

@@ -4,16 +4,16 @@ from endotsr.report import parts
 from endotsr.sequences.checks.check import Checked
 from endotsr.sequences.checks.kinds import KINDS
 
-TITLES = {"refusal": "A training refuses this", "warning": "Warnings", "note": "Notes"}
+TITLES = {"refusal": "Refusals: training is not possible", "warning": "Warnings", "note": "Notes"}
 
 
 def check_page(checked: Checked) -> str:
-    """The page as text: the findings by level with remedy, and a few pictures."""
+    """The page as text: findings by level with remedies, and example pictures."""
     counts = {level: sum(f.level == level for f in checked.findings) for level in TITLES}
-    verdict = "can be trained on" if not checked.refused else "is refused by a training"
+    verdict = "is ready for training" if not checked.refused else "is refused"
     lead = (
-        f"{counts['refusal']} refusals, {counts['warning']} warnings, {counts['note']} notes, of"
-        f" {len(KINDS)} findings that the check knows"
+        f"{counts['refusal']} refusals, {counts['warning']} warnings, {counts['note']} notes;"
+        f" {len(KINDS)} kinds of findings were checked"
     )
     body = [
         f'<p class="eyebrow">endotsr check</p><h1>{parts.text(checked.source)} {verdict}</h1><p class="lead">{lead}</p>'

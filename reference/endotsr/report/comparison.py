@@ -1,8 +1,8 @@
-"""Measured numbers as text: a comparison of methods for the terminal, and CSV for a spreadsheet or a plot.
+"""Metrics as text: a comparison of methods for the terminal, and CSV for a spreadsheet or a plot.
 
 In: the dictionary of metrics.json, or the rows of `evaluation.compare.compare`. Out: a table of means and paired
 differences; or a CSV file (RFC 4180, `.` in numbers, an empty cell for no value) with one row per method and frame or
-per method and metric. Its numbers keep every digit, so that they read back as the same numbers.
+per method and metric. Its numbers have all digits and are read back exactly.
 """
 
 import csv
@@ -21,7 +21,7 @@ COMPARED = ("method", "metric", "mean", "difference", "low", "high", "frames_bet
 
 
 def comparison_table(rows: list[Row]) -> str:
-    """One line a method with its means, then one per method and metric with the difference to the first method."""
+    """A line of means per method, then a line per method and metric with the difference to the first method."""
     labels = list(dict.fromkeys(row.label for row in rows))
     metrics = list(dict.fromkeys(row.metric for row in rows))
     found = {(row.label, row.metric): row for row in rows}
@@ -42,10 +42,10 @@ def comparison_table(rows: list[Row]) -> str:
 
 
 def frames_csv(metrics: EvaluationRecord, label: str) -> str:
-    """Every held-out frame of a method and of the baselines beside it.
+    """CSV of every held-out frame of a method and of the baselines.
 
     metrics   dictionary of metrics.json
-    label     name of the method in the first column
+    label     name of the method, for the first column
     """
     methods = [(label, metrics["held_out"]["per_frame"])]
     methods += [(entry["label"], entry["per_frame"]) for entry in metrics["baselines"].values()]
@@ -55,7 +55,7 @@ def frames_csv(metrics: EvaluationRecord, label: str) -> str:
 
 
 def comparison_csv(rows: Iterable[Row]) -> str:
-    """Every method and metric of a comparison."""
+    """CSV of every method and metric of a comparison."""
     body = []
     for row in rows:
         d = row.difference
@@ -65,7 +65,7 @@ def comparison_csv(rows: Iterable[Row]) -> str:
 
 
 def csv_text(columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """A head and rows; None is an empty cell, a float is written with every digit."""
+    """A header and rows; None is an empty cell, floats have all digits."""
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)

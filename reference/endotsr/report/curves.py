@@ -1,7 +1,7 @@
-"""Charts of a run from its log (one JSON object per line) and its evaluation.
+"""Charts of a run from its log and its evaluation.
 
-Every chart exists for a light and for a dark page (transparent background). A curve whose key is missing in the log is
-not drawn; a chart without any curve is left out.
+Every chart has a light and a dark version with transparent background. Curves without values in the log are not drawn;
+charts without curves are left out.
 """
 
 import math
@@ -24,15 +24,15 @@ TERMS = ("l1", "ssim", "depth", "smoothness", "matern_penalty", "laplacian")
 
 @dataclass(frozen=True)
 class Chart:
-    """A titled chart; `draw(axes, theme)` puts the curves on matplotlib axes."""
+    """A titled chart; `draw(axes, theme)` draws the curves on matplotlib axes."""
 
     title: str
     draw: Callable[[Any, Theme], None]
-    along: str = "iteration"  # unit of the horizontal axis
+    along: str = "iteration"  # label of the horizontal axis
 
 
 def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(iterations, values) of the entries that hold a finite number under `key`, both (n,)."""
+    """(iterations, values) of the entries with a finite number under `key`, both (n,)."""
     pairs = [
         (entry.get("iteration", position + 1), value)
         for position, entry in enumerate(log)
@@ -43,7 +43,7 @@ def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Centred running mean over `window` entries, shorter at both ends. (n,) -> (n,)."""
+    """Centred running mean over `window` entries, fewer at both ends. (n,) -> (n,)."""
     half = window // 2
     sums = np.concatenate([[0.0], np.cumsum(values)])
     positions = np.arange(values.size)
@@ -52,7 +52,7 @@ def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
 
 
 def charts(log: LogEntries, evaluation: EvaluationRecord | None = None) -> list[Chart]:
-    """All charts the given data allows: loss, PSNR, loss terms, Gaussians."""
+    """All charts with data: loss, PSNR, loss terms, Gaussians."""
     found = []
     if series(log, "loss")[0].size:
         found.append(Chart("Loss", lambda axes, theme: _draw_loss(axes, theme, log)))
@@ -66,7 +66,7 @@ def charts(log: LogEntries, evaluation: EvaluationRecord | None = None) -> list[
 
 
 def frame_chart(evaluation: EvaluationRecord | None, key: str) -> Chart | None:
-    """Held-out PSNR of the model and of the interpolating baselines, frame by frame; None without frames."""
+    """Held-out PSNR per frame of the model and of the interpolating baselines; None without frames."""
     lines = frame_lines(evaluation, key)
     if not lines:
         return None
@@ -74,7 +74,7 @@ def frame_chart(evaluation: EvaluationRecord | None, key: str) -> Chart | None:
 
 
 def frame_lines(evaluation: EvaluationRecord | None, key: str) -> list[tuple[str, NDArray, NDArray]]:
-    """(name, frame numbers, values) of the model and the two strongest kinds of baseline, null values left out."""
+    """(name, frame numbers, values) of the model and the two interpolating baselines, without null values."""
     baselines = (evaluation or {}).get("baselines") or {}
     sources = [("Model", ((evaluation or {}).get("held_out") or {}).get("per_frame"))]
     for name, label in (("two_neighbours", "Two neighbours"), ("flow_interpolation", "Optical flow")):
@@ -97,7 +97,7 @@ def chart_png(chart: Chart, theme: str, dots: int = 220) -> bytes:
 
 
 def chart_figure(chart: Chart) -> str:
-    """A chart as HTML with its title, for a light and for a dark page."""
+    """A chart as HTML with its title, in a light and a dark version."""
     light, dark = chart_png(chart, "light"), chart_png(chart, "dark")
     return parts.figure(chart.title, parts.themed_image(light, dark, chart.title))
 
@@ -144,14 +144,14 @@ def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
             for entry in log
             if (value := minimised(entry, key)) is not None and value > 0
         ]
-        if positive:  # a weight that is still zero cannot be drawn on a logarithmic axis
+        if positive:  # a logarithmic axis has no zero
             label = "1 − ssim" if key == "ssim" else key
             _curve(axes, positive, key, theme.colours[position], label, raw=False)
     _log_scale(axes, log, TERMS)
 
 
 def minimised(entry: LogEntry, key: str) -> float | None:
-    """The value that is minimised: the log holds SSIM itself."""
+    """The minimised value of a loss term: 1 - SSIM for SSIM, which the log stores unchanged."""
     value = entry.get(key)
     if not isinstance(value, int | float):
         return None

@@ -1,4 +1,4 @@
-"""The input of a report: plain arrays, dictionaries and text. This module handles no file, picture or HTML."""
+"""The input of a report: plain arrays, dictionaries and text."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple, cast
@@ -10,7 +10,7 @@ from endotsr.evaluation.records import EvaluationRecord, FrameMetrics
 from endotsr.fitting.records import LogEntry
 from endotsr.kernels.arrays import FloatArray
 
-# key in metrics.json, heading, decimals, +1 if larger is better and -1 if smaller is
+# key in metrics.json, heading, decimals, +1 if larger is better, -1 if smaller is better
 COLUMNS = (
     ("psnr_full", "PSNR full, dB", 2, 1),
     ("psnr_tissue", "PSNR tissue, dB", 2, 1),
@@ -21,22 +21,22 @@ COLUMNS = (
     ("lpips", "LPIPS [0,1]", 4, -1),
     ("lpips_symmetric", "LPIPS [−1,1]", 4, -1),
 )
-DECIDING = tuple(column for column in COLUMNS if not column[0].endswith("_8bit"))  # shown without unfolding anything
+DECIDING = tuple(column for column in COLUMNS if not column[0].endswith("_8bit"))  # the others are folded
 
 
 class Preview(NamedTuple):
-    """A small moving picture of the scene."""
+    """A small animation of the scene."""
 
     moving: bytes  # animated WebP
-    still: bytes  # WebP, its first picture, for readers who asked for no motion
+    still: bytes  # WebP, its first picture, for readers who prefer reduced motion
     width: int  # pixels
     height: int
-    words: str  # what it shows, one sentence
+    words: str  # caption, one sentence
 
 
 @dataclass(frozen=True)
 class FramePictures:
-    """One held-out frame to show."""
+    """A held-out frame of the report."""
 
     index: int  # frame number
     name: str  # file name or other label
@@ -50,7 +50,7 @@ class FramePictures:
 
 @dataclass(frozen=True)
 class ReportData:
-    """The contents of the page. Every part but the title may be empty and is then left out."""
+    """The content of the report. Empty parts are left out; the title is required."""
 
     title: str
     evaluation: EvaluationRecord = field(default_factory=lambda: cast(EvaluationRecord, {}))  # metrics.json
@@ -59,4 +59,4 @@ class ReportData:
     configuration: str = ""  # TOML
     depth_unit: str = "scene units"
     preview: Preview | None = None
-    viewer: str = ""  # file name of the viewer page beside the report
+    viewer: str = ""  # file name of the viewer page in the folder of the report

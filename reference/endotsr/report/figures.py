@@ -1,8 +1,7 @@
-"""Pictures of a run as 8-bit RGB arrays: render / truth / error with a 4x inset, depth in colours, encoders.
+"""Pictures of a run as 8-bit RGB arrays: render / truth / error with a 4x inset, colour-mapped depth, encoders.
 
-Colours come from perceptually uniform maps (error: magma, depth: viridis). Excluded pixels are neutral grey;
-a value that is not a finite number is painted magenta, so that it cannot be mistaken for a dark pixel.
-matplotlib and Pillow are imported when a picture is made, not before.
+Colour maps are perceptually uniform (error: magma, depth: viridis). Excluded pixels are neutral grey; values that are
+not finite are magenta, to distinguish them from dark pixels. matplotlib and Pillow are imported on first use.
 """
 
 import base64
@@ -22,28 +21,28 @@ EXCLUDED = (96, 96, 102)
 NOT_FINITE = (255, 0, 255)
 INSET_FACTOR = 4
 GAP = 6  # pixels between the pictures of one frame
-ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few steps, so that similar runs have the same scale
+ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few values: similar runs get the same scale
 
 
 class Triptych(NamedTuple):
-    """Three pictures of one frame and the window that is shown enlarged."""
+    """Three pictures of one frame and the window to enlarge."""
 
     render: ByteImage  # (H, W, 3)
     truth: ByteImage  # (H, W, 3)
-    error: ByteImage  # (H, W, 3), colours from 0 to `scale`
+    error: ByteImage  # (H, W, 3), colour map from 0 to `scale`
     row: int  # top edge of the window, pixels
     column: int  # left edge of the window
     height: int  # a quarter of H, at least 1
     width: int  # a quarter of W, at least 1
-    scale: float  # error shown in the brightest colour, display units [0, 1]
+    scale: float  # error of the brightest colour, display units [0, 1]
 
     def window(self, image: ByteImage) -> ByteImage:
-        """The part of `image` inside the window, not enlarged."""
+        """The part of `image` in the window, at its original size."""
         return image[self.row : self.row + self.height, self.column : self.column + self.width]
 
 
 def bytes_image(image: FloatArray) -> ByteImage:
-    """Planar (3, H, W) in display units -> (H, W, 3) uint8: clipped to [0, 1], rounded to the nearest level."""
+    """(3, H, W) in display units -> (H, W, 3) uint8, clipped and rounded; values that are not finite are magenta."""
     rounded = np.rint(np.clip(np.nan_to_num(image, nan=0.0), 0, 1) * 255).astype(np.uint8)
     out = np.ascontiguousarray(rounded.transpose(1, 2, 0))
     out[~np.isfinite(image).all(axis=0)] = NOT_FINITE
@@ -51,7 +50,7 @@ def bytes_image(image: FloatArray) -> ByteImage:
 
 
 def tissue_error(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
-    """Absolute difference of the clipped render, mean over the channels, (H, W); 0 outside the mask.
+    """Absolute error of the clipped render, averaged over the channels, (H, W); 0 outside the mask.
 
     render, truth   (3, H, W) display units [0, 1];  mask (H, W), True = tissue.  NaN in the render stays NaN.
     """
@@ -59,7 +58,7 @@ def tissue_error(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_])
 
 
 def error_scale(errors: list[FloatArray]) -> float:
-    """The step of ERROR_SCALES at or above the 99th percentile of all non-zero errors (1 frame or many)."""
+    """The smallest ERROR_SCALES value at or above the 99th percentile of all non-zero errors of one or more frames."""
     found = [e[np.isfinite(e) & (e > 0)] for e in errors]
     values = np.concatenate([np.zeros(1), *found])
     level = float(np.percentile(values[1:], 99)) if values.size > 1 else 0.0
@@ -67,9 +66,9 @@ def error_scale(errors: list[FloatArray]) -> float:
 
 
 def worst_window(error: FloatArray, height: int, width: int) -> tuple[int, int]:
-    """Top-left corner of the height x width window with the largest sum of `error` (ties: topmost, then leftmost).
+    """Top-left corner (row, column) of the height x width window with the largest error sum; ties: top, then left.
 
-    A value that is not finite outweighs every window of errors <= 1.
+    A value that is not finite counts more than any window of errors <= 1.
     """
     finite = np.nan_to_num(error.astype(np.float64), nan=error.size, posinf=error.size)
     table = np.pad(finite.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
@@ -79,10 +78,10 @@ def worst_window(error: FloatArray, height: int, width: int) -> tuple[int, int]:
 
 
 def triptych(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], scale: float | None = None) -> Triptych:
-    """Render, truth and error map of one frame, with the window where the tissue error is largest.
+    """Render, truth and error map of one frame, with the window of the largest tissue error.
 
     render, truth   (3, H, W) display units [0, 1];  mask (H, W), True = tissue
-    scale           error of the brightest colour; None = chosen from this frame by `error_scale`
+    scale           error of the brightest colour; None = `error_scale` of this frame
     """
     error = tissue_error(render, truth, mask)
     scale = error_scale([error]) if scale is None else scale
@@ -94,7 +93,7 @@ def triptych(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], sca
 
 
 def triptych_picture(panels: Triptych) -> ByteImage:
-    """One picture to save: the three images, the window framed in each, and below them the window enlarged 4x."""
+    """One picture: the three images with the window framed, and the window enlarged 4x below each."""
     columns = []
     for image in (panels.render, panels.truth, panels.error):
         enlarged = panels.window(image).repeat(INSET_FACTOR, axis=0).repeat(INSET_FACTOR, axis=1)
@@ -107,7 +106,7 @@ def triptych_picture(panels: Triptych) -> ByteImage:
 
 
 def framed(image: ByteImage, panels: Triptych) -> ByteImage:
-    """A copy of `image` with the window's border drawn in white on black, visible on any background and when shrunk."""
+    """A copy of `image` with a white and black border around the window."""
     out = image.copy()
     thick = max(1, image.shape[1] // 320)
     for grow, colour in ((2 * thick, 0), (thick, 255)):
@@ -120,7 +119,7 @@ def framed(image: ByteImage, panels: Triptych) -> ByteImage:
 
 
 def depth_range(depth: FloatArray, mask: NDArray[np.bool_] | None = None) -> tuple[float, float]:
-    """1st and 99th percentile of the positive finite depths inside the mask; (0, 1) if there are none."""
+    """1st and 99th percentile of the positive finite depths in the mask; (0, 1) if there are none."""
     known = np.isfinite(depth) & (depth > 0)
     values = depth[known if mask is None else known & mask]
     if values.size == 0:
@@ -130,7 +129,7 @@ def depth_range(depth: FloatArray, mask: NDArray[np.bool_] | None = None) -> tup
 
 
 def depth_picture(depth: FloatArray, low: float, high: float, mask: NDArray[np.bool_] | None = None) -> ByteImage:
-    """Depth (H, W) in colours from `low` (near, dark) to `high` (far, bright); no depth (<= 0) and excluded: grey."""
+    """Depth (H, W), colour-mapped from `low` (near, dark) to `high` (far, bright); grey if excluded or <= 0."""
     colours = colour_mapped(depth, low, high, DEPTH_MAP)
     absent = depth <= 0
     colours[absent if mask is None else absent | ~mask] = EXCLUDED
@@ -138,7 +137,7 @@ def depth_picture(depth: FloatArray, low: float, high: float, mask: NDArray[np.b
 
 
 def colour_mapped(values: FloatArray, low: float, high: float, name: str) -> ByteImage:
-    """(H, W) -> (H, W, 3): colour map `name` from low to high, values outside take the end colours."""
+    """(H, W) -> (H, W, 3): colour map `name` from low to high, clipped; values that are not finite are magenta."""
     finite = np.isfinite(values)
     level = np.clip((np.where(finite, values, low) - low) / (high - low), 0, 1)
     colours = colour_table(name)[np.rint(level * 255).astype(np.intp)]
@@ -154,9 +153,9 @@ def colour_table(name: str) -> ByteImage:
 
 
 def encode(image: ByteImage, kind: str = "png") -> bytes:
-    """File bytes of an (H, W, 3) image, or of one with opacity, (H, W, 4).
+    """An (H, W, 3) image, or (H, W, 4) with opacity, as the bytes of a file.
 
-    kind   `png` (lossless) or `webp` (quality 90, about a tenth of the size)
+    kind   `png` (lossless) or `webp` (quality 90, about 10 % of the size)
     """
     from PIL import Image
 

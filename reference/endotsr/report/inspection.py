@@ -1,4 +1,4 @@
-"""One self-contained page about a clip: what was found, how sure that is, the plan, and a picture of every test.
+"""The inspection of a clip as a self-contained page: verdicts, confidence, plan, and a picture of every test.
 
 In: an `Inspection` and its `Plan`. Out: HTML, or lines for a terminal.
 """
@@ -39,9 +39,9 @@ def inspection_text(inspection: Inspection, plan: Plan) -> str:
         f"  {c.key} = {_value(c.value)} (now {_value(c.before)}){_saving(c.time, c.memory)}: {c.reason}"
         for c in plan.changes
     ]
-    lines += [f"  {key} stays: {reason}" for key, reason in plan.kept]
+    lines += [f"  {key} is kept: {reason}" for key, reason in plan.kept]
     lines += [f"  {remark}" for remark in plan.remarks]
-    lines.append(f"expected saving: {plan.time:.0%} of the time and {plan.memory:.0%} of the memory of an iteration")
+    lines.append(f"expected saving: {plan.time:.0%} of the time and {plan.memory:.0%} of the memory per iteration")
     return "\n".join(lines)
 
 
@@ -62,14 +62,14 @@ def _value(value: Any) -> str:
 def _headline(title: str, inspection: Inspection, plan: Plan) -> str:
     verdicts = inspection.verdicts.values()
     present = [v.effect for v in verdicts if v.present and v.kind not in (UNKNOWN, *SMALL)]
-    found = f"Found: {', '.join(present)}." if present else "Nothing was found beyond still tissue."
+    found = f"Found: {', '.join(present)}." if present else "No effect was found: the tissue is static."
     unknown = [v.effect for v in verdicts if v.kind == UNKNOWN]
-    found += f" Left open: {', '.join(unknown)}." if unknown else ""
+    found += f" Undecided: {', '.join(unknown)}." if unknown else ""
     cards = [
         (f"{255 * inspection.noise.level:.2f}", "grey levels", "noise, standard deviation"),
         (str(inspection.clip.count), "", f"training frames of {inspection.clip.frames}"),
-        (f"{plan.time:.0%}", "", "expected saving of time"),
-        (f"{plan.memory:.0%}", "", "expected saving of memory"),
+        (f"{plan.time:.0%}", "", "expected time saving"),
+        (f"{plan.memory:.0%}", "", "expected memory saving"),
     ]
     boxes = "".join(parts.card(parts.text(value), unit, label) for value, unit, label in cards)
     return (
@@ -83,34 +83,34 @@ def _verdicts(inspection: Inspection) -> str:
         [
             parts.text(v.effect), f'<b class="{"good" if v.kind in SMALL else "bad"}">{parts.text(v.kind)}</b>',
             parts.cell(float(v.statistic)), parts.cell(float(v.threshold)), parts.text(v.unit),
-            "fact" if v.false_positive_rate == 0 else f"{v.false_positive_rate:.0%}", f"{v.confidence:.2f}",
+            "exact" if v.false_positive_rate == 0 else f"{v.false_positive_rate:.0%}", f"{v.confidence:.2f}",
         ]
         for v in inspection.verdicts.values()
     ]  # fmt: skip
-    columns = ("Effect", "Found", "Statistic", "Threshold", "Unit", "False positives by design", "Confidence")
+    columns = ("Effect", "Found", "Statistic", "Threshold", "Unit", "False-positive rate", "Confidence")
     reasons = parts.definitions(
         (parts.text(v.effect), f"{parts.text(v.reason)} <small>{parts.text(v.test)}</small>")
         for v in inspection.verdicts.values()
     )
     note = (
-        "Every test reads training frames only. Confidence is the distance of the statistic from its threshold: 0.5 at "
-        "the threshold, 1 far from it or where the answer is a fact."
+        "Every test uses training frames only. Confidence measures the distance of the statistic from its threshold: "
+        "0.5 at the threshold, 1 far from it or for an exact answer."
     )
-    return parts.section("What was found", tables.html_table(columns, rows), reasons, note=note)
+    return parts.section("Findings", tables.html_table(columns, rows), reasons, note=note)
 
 
 def _plan(plan: Plan) -> str:
     rows = [
         [f"<code>{parts.text(c.key)}</code>", _value(c.before), f"<b>{_value(c.value)}</b>", f"{c.time:.0%}",
-         f"{c.memory:.0%}", parts.text(f"Kept as given. {c.reason}" if c.given else c.reason)]
+         f"{c.memory:.0%}", parts.text(f"Set explicitly, kept. {c.reason}" if c.given else c.reason)]
         for c in plan.changes
     ]  # fmt: skip
     table = tables.html_table(("Setting", "Now", "Plan", "Time saved", "Memory saved", "Reason"), rows) if rows else ""
     kept = parts.definitions((f"<code>{parts.text(key)}</code>", parts.text(reason)) for key, reason in plan.kept)
-    stays = f"<h3>What stays</h3>{kept}" if kept else ""
+    stays = f"<h3>Kept settings</h3>{kept}" if kept else ""
     remarks = "".join(f'<p class="note">{parts.text(remark)}</p>' for remark in plan.remarks)
-    note = "<code>endotsr train --effects auto</code> follows this plan; a setting that is given explicitly stays."
-    return parts.section("The plan", table or "<p>Nothing to switch off.</p>", stays, remarks, note=note)
+    note = "<code>endotsr train --effects auto</code> applies this plan; explicit settings take precedence."
+    return parts.section("Plan", table or "<p>Nothing to switch off.</p>", stays, remarks, note=note)
 
 
 def _dictionary(inspection: Inspection, plan: Plan) -> str:
@@ -118,8 +118,8 @@ def _dictionary(inspection: Inspection, plan: Plan) -> str:
     facts = [
         ("Rates found", "; ".join(_rate(inspection, x.cycles, x.harmonics) for x in inspection.lines) or "none"),
         ("Configured dictionary", f"rank {configured.rank}, condition {configured.condition:.3g}"),
-        ("Dictionary that the stamps carry", f"{d.frequencies} frequencies up to {d.frequency_max:g} cycles, rank "
-                                             f"{d.rank}, condition {d.condition:.3g}"),
+        ("Dictionary identifiable from the time stamps", f"{d.frequencies} frequencies up to {d.frequency_max:g}"
+                                                         f" cycles, rank {d.rank}, condition {d.condition:.3g}"),
     ]  # fmt: skip
     return parts.section("Rates and time stamps", parts.definitions((name, parts.text(value)) for name, value in facts))
 
@@ -128,7 +128,7 @@ def _pictures(inspection: Inspection) -> str:
     shown = [_panel(v) for v in inspection.verdicts.values()]
     frame = inspection.clip.images[inspection.clip.reference]
     first = parts.figure("Reference frame", parts.image(figures.bytes_image(frame), "the reference frame"))
-    return parts.section("What the tests saw", f'<div class="charts">{first}{"".join(shown)}</div>')
+    return parts.section("Maps and curves of the tests", f'<div class="charts">{first}{"".join(shown)}</div>')
 
 
 def _panel(verdict: EffectVerdict) -> str:

@@ -1,7 +1,7 @@
-"""A small chart of curves as SVG text, for a page that is written again and again.
+"""A small line chart as SVG text, for a page that is rewritten frequently.
 
-Points in, SVG out, in a millisecond; the charts of a finished run are drawn by matplotlib (`curves.py`), which takes
-two hundred. Colours are those of the page that holds the chart, in a light and in a dark scheme.
+It takes about 1 ms; matplotlib, which draws the charts of a finished run (`curves.py`), takes about 200 ms. The
+surrounding page defines the colours, in a light and a dark scheme.
 """
 
 import math
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from endotsr.report.parts import text
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 460.0, 240.0, 52.0, 10.0, 30.0, 30.0  # pixels; the last four are margins
-MOST_POINTS = 300  # of a curve: more are averaged in groups
+MOST_POINTS = 300  # per curve; more points are averaged in groups
 COLOURS = ("var(--accent)", "var(--bad)", "var(--good)")
-LINES = 4  # of the grid, about
+LINES = 4  # approximate number of grid lines
 
 
 class ChartCurve(NamedTuple):
-    """A named curve; x ascends."""
+    """A named curve with ascending x."""
 
     name: str
     x: list[float]
@@ -27,10 +27,10 @@ class ChartCurve(NamedTuple):
 
 
 def chart_svg(title: str, curves: list[ChartCurve], end: float, *, logarithmic: bool = False) -> str:
-    """The chart, or "" where no curve has a finite value (on a logarithmic axis: one above 0).
+    """The chart; "" if no curve has a finite value (on a logarithmic axis: a positive one).
 
-    end           the largest x of the axis, which begins at 0
-    logarithmic   whether the vertical axis is
+    end           upper end of the horizontal axis, which begins at 0
+    logarithmic   use a logarithmic vertical axis
     """
     shown = [(curve.name, points) for curve in curves if (points := _points(curve, logarithmic)).size]
     if not shown:
@@ -59,7 +59,7 @@ def chart_svg(title: str, curves: list[ChartCurve], end: float, *, logarithmic: 
 
 
 def _points(curve: ChartCurve, logarithmic: bool) -> NDArray[np.float64]:
-    """(n, 2) finite points, averaged in groups to at most `MOST_POINTS`; y as its logarithm to base 10."""
+    """(n, 2) finite points, averaged in groups to at most `MOST_POINTS`; for a logarithmic axis y is log10."""
     table = np.array([curve.x, curve.y], np.float64).T.reshape(-1, 2)
     table = table[np.isfinite(table).all(axis=1)]
     if logarithmic:
@@ -70,7 +70,7 @@ def _points(curve: ChartCurve, logarithmic: bool) -> NDArray[np.float64]:
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Multiples of 1, 2 or 5 times a power of ten from low to high; both ends where there is none between."""
+    """Multiples of 1, 2 or 5 times a power of ten from low to high; both ends if there are none."""
     step = (high - low) / LINES
     if not step > 0:
         return [low]
@@ -80,7 +80,7 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def _decades(low: float, high: float) -> list[float]:
-    """Logarithms of the powers of ten, or of their multiples by 1, 2 and 5 on a short axis, from low to high."""
+    """log10 of the powers of ten from low to high; on a short axis also of their multiples by 2 and 5."""
     factors = (1, 2, 5) if high - low < 2 else (1,)
     found = [k + math.log10(factor) for k in range(math.floor(low), math.ceil(high) + 1) for factor in factors]
     return [at for at in found if low <= at <= high] or [low, high]

@@ -1,9 +1,9 @@
-"""The page of a training that runs: how far it is, how long it will take, its curves, and one frame as it is now.
+"""The progress page of a training: iterations, time left, curves, and a render of one frame.
 
-`training.html` is written beside the log from time to time and tells the browser to read it again: files alone, no
-server and no script. It computes a render of one frame with the parameters of the moment and changes none of them.
-It takes at most `LARGEST_FRACTION` of the time, unless it would then be older than `MOST_SECONDS`, and a page that
-cannot be written stops no training. Once the run is evaluated, the page leads to the report.
+`training.html` is rewritten in the run folder during training, and the browser reloads it: no server and no script. The
+page renders one frame with the current parameters, without changing them. It takes at most `LARGEST_FRACTION` of the
+time, but is rewritten at least every `MOST_SECONDS`. A page that cannot be written does not stop the training. After
+the evaluation the page redirects to the report.
 """
 
 import contextlib
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 LIVE_PAGE, REPORT = "training.html", "report.html"  # in a run folder
 FEWEST_SECONDS, MOST_SECONDS = 5.0, 60.0  # between two pages
-LARGEST_FRACTION = 0.01  # of the time, which pages may take
-KEPT = ("iteration", "loss", "psnr")  # keys of the log that the page shows
+LARGEST_FRACTION = 0.01  # fraction of the time that pages may take
+KEPT = ("iteration", "loss", "psnr")  # keys of the log shown on the page
 
 
 class LivePage:
-    """Writes `training.html` of a run folder while the run is trained."""
+    """Writes `training.html` of a run folder during training."""
 
     def __init__(self, folder: RunFolder, sequence: Sequence, config: Config) -> None:
         frames = sequence.test_index if len(sequence.test_index) else sequence.train_index
@@ -49,26 +49,26 @@ class LivePage:
         self._due = 0.0
 
     def begin(self, state: "TrainingState") -> None:
-        """The training begins with `state`, which it changes in place. Nothing is rendered yet: kernels compile now."""
+        """The training begins; it updates `state` in place. Writes a page without a render: kernels compile now."""
         self._state = state
         self._log = [_kept(entry) for entry in log_until(self._folder.log, state.iteration)]
         self._write("running", None, picture=False)
         self._due = 0.0
 
     def update(self, entry: LogEntry, left: Callable[[], str | None]) -> None:
-        """An iteration has ended. entry: its line of the log; left: tells the time left, None = not known yet."""
+        """An iteration has ended. entry: its line of the log; left: returns the time left, None if unknown."""
         self._log.append(_kept(entry))
         if time.monotonic() >= self._due:
             self._write("running", left())
 
     def close(self) -> None:
-        """The training has ended, in the way that run.json says."""
+        """The training has ended; write the page with the status of run.json."""
         with contextlib.suppress(OSError, InputError):
             self._write(str(self._folder.record().get("status")), None)
 
     def _write(self, status: str, left: str | None, picture: bool = True) -> None:
         began = time.monotonic()
-        with contextlib.suppress(OSError):  # a disk without space: the training itself says so
+        with contextlib.suppress(OSError):  # the training itself reports a full disk
             replace_text(self._folder.path / LIVE_PAGE, self._html(status, left, picture))
         done = time.monotonic()
         self._due = done + min(max(FEWEST_SECONDS, (done - began) / LARGEST_FRACTION), MOST_SECONDS)
@@ -77,7 +77,7 @@ class LivePage:
         done, planned = self._state.iteration, self._config.training.iterations
         name, shown = self._folder.path.absolute().name, ""
         if picture:
-            with contextlib.suppress(ValueError):  # a number that is not finite: the training itself says so
+            with contextlib.suppress(ValueError):  # the training itself reports numbers that are not finite
                 shown = self._picture()
         loss = self._log[-1].get("loss") if self._log else None
         psnr = self._psnr.y[-1] if self._psnr.y else None
@@ -92,13 +92,13 @@ class LivePage:
         body = (
             f'<header><p class="eyebrow">Endo-TSR · training</p><h1>{parts.text(name)}</h1>'
             f'<div class="cards">{"".join(boxes)}</div></header>{shown}{self._curves(planned)}'
-            f"<footer>Written at {now()}. {_advice(status, self._folder.path)}</footer>"
+            f"<footer>Updated at {now()}. {_advice(status, self._folder.path)}</footer>"
         )
         again = f"{FEWEST_SECONDS:.0f}" if status in ("running", "finished") else ""
         return parts.page(f"{done} of {planned}: {name}", body, again)
 
     def _picture(self) -> str:
-        """The frame as the model of the moment renders it, beside the truth; its PSNR joins the curve."""
+        """The current render of the frame, and the truth; appends its PSNR to the curve."""
         state, index, time_ = self._state, self._frame, float(self._sequence.times[self._frame])
         camera = camera_at(state.frames, self._sequence.cameras[index], time_)
         out = render_at(state.gaussians, self._spectral, self._config, camera, time_, frames=state.frames)
@@ -113,7 +113,7 @@ class LivePage:
         return parts.section(title, f'<div class="charts">{shown}</div>')
 
     def _curves(self, planned: int) -> str:
-        """Loss, and PSNR of the training views and of the frame, over the iterations."""
+        """Loss and PSNR (training views and the frame) over the iterations."""
         loss, views = (
             ChartCurve(label, [e["iteration"] for e in self._log if e.get(key) is not None],
                   [float(v) for e in self._log if (v := e.get(key)) is not None])
@@ -128,21 +128,21 @@ class LivePage:
 
 
 def lead_to_report(folder: Path) -> None:
-    """Let the page of a training show the report, once there is one; a run without the page gets none."""
+    """Redirect an existing progress page to the report."""
     if (folder / LIVE_PAGE).is_file():
         page = parts.page("Endo-TSR", f'<p><a href="{REPORT}">The report</a></p>', f"0; url={REPORT}")
         replace_text(folder / LIVE_PAGE, page)
 
 
 def _kept(entry: LogEntry) -> LogEntry:
-    """The keys of a line of the log that the page shows."""
+    """The entry with the keys shown on the page."""
     return cast(LogEntry, {key: entry.get(key) for key in KEPT if key in entry})
 
 
 def _advice(status: str, folder: Path) -> str:
-    """What a reader of the page can do next."""
+    """The next step for the reader of the page."""
     if status == "running":
-        return "The page is written again from time to time, and the browser reads it again by itself."
+        return "This page updates itself during training."
     if status == "finished":
-        return "The report follows here once the run is evaluated."
+        return "After the evaluation, this page redirects to the report."
     return f"Continue with <code>endotsr train --out {parts.text(folder)} --resume</code>."

@@ -1,7 +1,6 @@
-"""Pieces of the report as HTML text: escaping, numbers, pictures, and the one style sheet.
+"""HTML elements of the report: escaping, numbers, pictures, and the style sheet.
 
-Everything that comes from a run passes through `text`, so that no name can break the page. No script, and no link but
-that to the viewer page beside the report.
+All text from a run is escaped by `text`. The pages have no script, and link only to the viewer page.
 """
 
 import html
@@ -18,19 +17,19 @@ LOSSLESS_BYTES = 200_000  # raw size up to which an embedded picture is a PNG
 
 
 def text(value: Any) -> str:
-    """`value` as text that is safe between tags and inside double-quoted attributes."""
+    """`value` escaped for use between tags and inside double-quoted attributes."""
     return html.escape(str(value), quote=True)
 
 
 def number(value: Any, digits: int) -> str:
-    """A number with fixed decimals; a dash for None and for what is not a finite number."""
+    """A number with fixed decimals; a dash for None and for anything but a finite number."""
     if value is None or isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return ABSENT
     return f"{value:.{digits}f}".replace("-", "&minus;")
 
 
 def cell(value: Any) -> str:
-    """A table cell of a free table: short for floats, grouped digits for integers, text as it is."""
+    """A value as a table cell: floats with 4 digits, integers with digit groups, escaped text."""
     if value is None:
         return ABSENT
     if isinstance(value, bool):
@@ -43,7 +42,7 @@ def cell(value: Any) -> str:
 
 
 def section(title: str, *content: str, note: str = "") -> str:
-    """A headed section; empty when there is no content."""
+    """A section with a heading; "" without content."""
     body = "\n".join(part for part in content if part)
     if not body:
         return ""
@@ -52,23 +51,23 @@ def section(title: str, *content: str, note: str = "") -> str:
 
 
 def details(summary: str, content: str, opened: bool = False) -> str:
-    """A part that can be folded. Both arguments are HTML already."""
+    """A collapsible part. Both arguments are HTML."""
     return f"<details{' open' if opened else ''}><summary>{summary}</summary>{content}</details>"
 
 
 def definitions(pairs: Iterable[tuple[str, str]]) -> str:
-    """A list of names with what belongs to each, both HTML already; empty without one."""
+    """A list of names and contents, both HTML; "" without one."""
     rows = "".join(f"<dt>{name}</dt><dd>{content}</dd>" for name, content in pairs)
     return f"<dl>{rows}</dl>" if rows else ""
 
 
 def figure(caption: str, content: str) -> str:
-    """HTML with a caption above it."""
+    """HTML content with a caption above it."""
     return f"<figure><figcaption>{text(caption)}</figcaption>{content}</figure>"
 
 
 def image(picture: ByteImage, alternative: str, css: str = "") -> str:
-    """An embedded picture with its size, so that the layout is stable while it loads; small ones are lossless."""
+    """An embedded picture with its size, which keeps the layout stable; small pictures are lossless."""
     kind = "webp" if picture.size > LOSSLESS_BYTES else "png"
     address = figures.data_uri(figures.encode(picture, kind), kind)
     style = f' class="{css}"' if css else ""
@@ -77,7 +76,7 @@ def image(picture: ByteImage, alternative: str, css: str = "") -> str:
 
 
 def themed_image(light: bytes, dark: bytes, alternative: str) -> str:
-    """A PNG chart in two versions; the page shows the one of the reader's colour scheme."""
+    """A PNG chart in two versions; the page shows the one for the reader's colour scheme."""
     return (
         f'<picture><source media="(prefers-color-scheme: dark)" srcset="{figures.data_uri(dark, "png")}">'
         f'<img class="chart" src="{figures.data_uri(light, "png")}" alt="{text(alternative)}"></picture>'
@@ -85,7 +84,7 @@ def themed_image(light: bytes, dark: bytes, alternative: str) -> str:
 
 
 def moving_image(moving: bytes, still: bytes, alternative: str, width: int, height: int) -> str:
-    """An animated WebP; readers whose system asks for little motion see its first picture."""
+    """An animated WebP; readers who prefer reduced motion see its first picture."""
     return (
         f'<picture><source media="(prefers-reduced-motion: reduce)" srcset="{figures.data_uri(still, "webp")}">'
         f'<img src="{figures.data_uri(moving, "webp")}" alt="{text(alternative)}" width="{width}" height="{height}">'
@@ -94,7 +93,7 @@ def moving_image(moving: bytes, still: bytes, alternative: str, width: int, heig
 
 
 def colour_bar(name: str, low: str, high: str) -> str:
-    """The colour map as a strip with its two end values."""
+    """A colour map as a strip between its two end values."""
     colours = figures.colour_table(name)[::17]
     stops = ",".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in colours)
     strip = f'<i style="background:linear-gradient(90deg,{stops})"></i>'
@@ -102,15 +101,15 @@ def colour_bar(name: str, low: str, high: str) -> str:
 
 
 def card(value: str, unit: str, label: str) -> str:
-    """A number in a box with its name below; `value` is HTML already."""
+    """A number in a box with a label below; `value` is HTML."""
     suffix = f"<small>{unit}</small>" if unit and "absent" not in value else ""
     return f'<div class="card"><b>{value}{suffix}</b><span>{text(label)}</span></div>'
 
 
 def page(title: str, body: str, refresh: str = "") -> str:
-    """The whole document.
+    """The complete document.
 
-    refresh   seconds after which a browser reads it again, or "0; url=NAME" of the page that it is to show instead
+    refresh   seconds until the browser reloads the page, or "0; url=NAME" to redirect
     """
     again = f'<meta http-equiv="refresh" content="{text(refresh)}">' if refresh else ""
     return (
@@ -136,7 +135,7 @@ h3{font-size:1rem;margin:1.1rem 0 .4rem}
 section{margin-top:2.6rem}
 .eyebrow{color:var(--accent);font-size:.8rem;font-weight:600;letter-spacing:.06em;text-transform:uppercase;margin:0}
 .lead{font-size:1.06rem;max-width:46rem;margin:.3rem 0 0;text-wrap:pretty}
-.note,figcaption,caption{color:var(--soft);font-size:.88rem}
+.note,figcaption{color:var(--soft);font-size:.88rem}
 .note{max-width:52rem;margin:.2rem 0 .8rem;text-wrap:pretty}
 .good{color:var(--good)}.bad{color:var(--bad)}.absent{color:var(--soft)}
 .cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(9.2rem,1fr));gap:.7rem;margin-top:1.5rem}
@@ -147,7 +146,6 @@ font-variant-numeric:tabular-nums}
 .card span{color:var(--soft);font-size:.82rem}
 .scroll{overflow-x:auto;background:var(--panel);border:1px solid var(--line);border-radius:10px;margin:.5rem 0}
 table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}
-caption{text-align:left;padding:.6rem .9rem 0}
 th,td{padding:.5rem .9rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}
 tbody th,td.words{white-space:normal}.words{text-align:left}td.words{min-width:11rem}
 h1,h2,p,dt{overflow-wrap:anywhere}
@@ -190,7 +188,7 @@ footer{margin-top:3rem;border-top:1px solid var(--line);padding-top:1rem;color:v
 .views{grid-auto-flow:row;grid-template-rows:none;grid-template-columns:1fr 1fr}
 .cards{grid-template-columns:1fr 1fr}th,td{padding:.45rem .65rem}tbody th{min-width:8.5rem}
 dl{grid-template-columns:minmax(0,1fr)}dd{margin-bottom:.4rem}
-.few table,.few thead,.few tbody,.few caption{display:block}
+.few table,.few thead,.few tbody{display:block}
 .few tr{display:grid;grid-template-columns:var(--columns);border-bottom:1px solid var(--line)}
 .few tbody tr:last-child{border-bottom:0}
 .few th:first-child{grid-column:1/-1;position:static;padding-bottom:0}
@@ -198,7 +196,7 @@ dl{grid-template-columns:minmax(0,1fr)}dd{margin-bottom:.4rem}
 .few tr>:first-child,.few tr>:nth-child(2){padding-left:.5rem}.few tr>:last-child{padding-right:.5rem}
 .few thead th{font-size:.72rem}}
 @media(max-width:800px){.listed thead{display:none}
-.listed table,.listed tbody,.listed caption,.listed th,.listed tr{display:block}
+.listed table,.listed tbody,.listed th,.listed tr{display:block}
 .listed tr{border-bottom:1px solid var(--line);padding:.4rem .7rem}.listed tbody tr:last-child{border-bottom:0}
 .listed th,.listed td,.listed td.words{padding:.15rem 0;border-bottom:0;white-space:normal;text-align:left;min-width:0}
 .listed td{display:grid;grid-template-columns:8.5rem minmax(0,1fr);gap:.6rem;overflow-wrap:anywhere}

@@ -1,6 +1,6 @@
 """The files of an evaluation in a run folder: metrics.json, renders/, test/, curves.png and report.html.
 
-In: the metrics of a run and the renders of its held-out frames. Each file and folder is replaced whole.
+In: the metrics of a run and the renders of its held-out frames. Files and folders are replaced atomically.
 """
 
 import math
@@ -26,7 +26,7 @@ from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.names import file_name
 from endotsr.untrusted.writing import replace_file, replace_text, replacing_folder
 
-MOST_SHOWN = 24  # of the held-out frames, the worst, with their pictures in the report: some 0.25 MB each
+MOST_SHOWN = 24  # the worst held-out frames, shown in the report; about 0.25 MB each
 
 
 def write_evaluation(
@@ -37,12 +37,12 @@ def write_evaluation(
     preview: Preview | None = None,
     viewer: str = "",
 ) -> None:
-    """Write the files of `endotsr evaluate` in a run folder.
+    """Write the files of `endotsr evaluate` into a run folder.
 
-    metrics     of `evaluation.run.measure_folder`
+    metrics     from `evaluation.run.measure_folder`
     held_out    number of a held-out frame -> render
-    preview     moving picture of the report
-    viewer      name of the viewer page in the folder, which the report links to; "" = there is none
+    preview     animation for the report
+    viewer      name of the viewer page in the folder, to link from the report; "" = none
     """
     _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
     write_json(folder.path / "metrics.json", metrics)
@@ -68,7 +68,7 @@ def write_evaluation(
 def _write_pictures(
     folder: RunFolder, iteration: int, sequence: Sequence, held_out: Callable[[int], RenderOut]
 ) -> None:
-    """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} as the peers name them."""
+    """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} with the peers' names."""
     peers = folder.path / "test" / f"ours_{iteration}"
     if peers.parent.is_symlink():
         raise InputError(f"{peers.parent}: is a link; allowed: a folder of the run")
@@ -113,7 +113,7 @@ def _worst_frames(
 
 
 def worst_first(rows: dict[int, FrameMetrics]) -> list[int]:
-    """Frame numbers, the lowest `psnr_tissue` first; a frame without a value, whose render is not finite, is worst."""
+    """Frame numbers by ascending `psnr_tissue`; frames without a value (render not finite) come first."""
 
     def order(frame: int) -> float:
         value = rows[frame].get("psnr_tissue")

@@ -1,6 +1,6 @@
-"""The numbers of an evaluated run as text: facts, sentences, and the table on the terminal.
+"""The metrics of an evaluated run as text: facts, sentences, and the table for the terminal.
 
-In: the dictionary of metrics.json. Out: text; no file, no HTML.
+In: the dictionary of metrics.json. Out: plain text.
 """
 
 from endotsr.evaluation.evaluate import left_out
@@ -12,13 +12,13 @@ TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
 
 
 def iterations(run: RunPart) -> str:
-    """Iteration of the measured checkpoint: "6000", or "2000 of 6000, the run is not finished"."""
+    """Iteration of the evaluated checkpoint: "6000", or "2000 of 6000, the run is not finished"."""
     done, planned = run["iteration"], run["iterations_planned"]
     return f"{done}" if done >= planned else f"{done} of {planned}, the run is not finished"
 
 
 def facts(run: RunPart) -> dict[str, str | int | float | None]:
-    """The facts about the run that the report lists, by their labels."""
+    """Label -> value for the facts listed in the report."""
     about, machine = run["input"], run["machine"]
     peak, memory = run["peak_memory_bytes"], machine.get("memory_bytes")
     size = f"{about.get('width')}x{about.get('height')}"
@@ -32,9 +32,9 @@ def facts(run: RunPart) -> dict[str, str | int | float | None]:
         "Seed": run["seed"],
         "Threads": run["threads"],
         "Training time": duration(run["seconds"] or 0.0),
-        "Peak memory": f"{peak / 1e9:.2f} GB" if peak else "not known",
+        "Peak memory": f"{peak / 1e9:.2f} GB" if peak else "unknown",
         "Machine": f"{machine.get('processor')}, {machine.get('cores')} cores, "
-        + (f"{memory / 1e9:.0f} GB" if memory else "memory not known"),
+        + (f"{memory / 1e9:.0f} GB" if memory else "memory unknown"),
         "System": machine.get("system"),
     }
 
@@ -42,7 +42,7 @@ def facts(run: RunPart) -> dict[str, str | int | float | None]:
 def held_out_table(metrics: EvaluationRecord) -> str:
     """The held-out means of model and baselines as text.
 
-    metrics   of a run, or of `evaluation.pictures.measure_pictures`, which has a `label`
+    metrics   of a run, or from `evaluation.pictures.measure_pictures` (with `label`)
     """
     rows = [(metrics.get("label", "this model"), metrics["held_out"]["mean"])]
     rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
@@ -60,7 +60,7 @@ def held_out_table(metrics: EvaluationRecord) -> str:
     if change := metrics.get("pose_correction"):
         lines.append(pose_sentence(change))
     if frames := left_out(metrics):
-        lines.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
+        lines.append(f"excluded from the tissue means (no finite value): {', '.join(frames)}")
     if run is not None and run["iteration"] < run["iterations_planned"]:
         lines.append(f"checkpoint of iteration {iterations(run)}")
     if metrics["lpips_reason"]:
@@ -69,17 +69,16 @@ def held_out_table(metrics: EvaluationRecord) -> str:
 
 
 def trajectory_sentence(motion: MotionPart) -> str:
-    """The error of the motion beside the motion itself."""
+    """The mean trajectory error, compared with the mean motion."""
     return (
-        f"True motion: mean trajectory error {motion['scene_units']:.3f} {motion['unit']} "
-        f"({motion['pixels']:.2f} px), where the tissue moves {motion['motion_scene_units']:.3f} {motion['unit']} "
-        f"({motion['motion_pixels']:.2f} px)."
+        f"Mean trajectory error {motion['scene_units']:.3f} {motion['unit']} ({motion['pixels']:.2f} px); mean tissue "
+        f"motion {motion['motion_scene_units']:.3f} {motion['unit']} ({motion['motion_pixels']:.2f} px)."
     )
 
 
 def pose_sentence(change: PosePart) -> str:
-    """How far the cameras were moved."""
+    """The mean pose correction."""
     return (
-        f"Poses: corrected by {change['degrees']:.2f} degrees and {change['scene_units']:.2f} {change['unit']} in the "
-        f"mean, which moves the picture by {change['pixels']:.2f} px."
+        f"Mean pose correction {change['degrees']:.2f} degrees and {change['scene_units']:.2f} {change['unit']}; it "
+        f"moves the picture by {change['pixels']:.2f} px."
     )

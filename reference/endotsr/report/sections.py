@@ -1,8 +1,8 @@
-"""One self-contained HTML page about a run: numbers, baselines, pictures, curves, and how it was made.
+"""The report of a run as one self-contained HTML page: metrics, baselines, pictures, curves, settings.
 
-Its sections stand here from top to bottom; each is a function of the data and is empty when its data is missing. The
-page embeds every picture, needs no script and no other file, follows the reader's light or dark colour scheme and is
-readable on a phone. It links to the viewer page beside it, if there is one.
+The functions follow the order of the sections; each returns "" if its data is missing. The page embeds all pictures and
+needs no script and no other file. It follows the reader's light or dark colour scheme and is readable on a phone. It
+links to the viewer page, if there is one.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from endotsr.report.tables import duration, html_table
 
 Column = tuple[str, str, int, int]  # of COLUMNS
 MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
-OPENED_FRAMES = 3  # the worst frames are shown unfolded
+OPENED_FRAMES = 3  # the worst frames are unfolded
 
 
 def _mean(data: ReportData, key: str) -> Means:
@@ -32,7 +32,7 @@ def _baseline_rows(data: ReportData) -> list[tuple[str, Means]]:
 
 
 def headline(data: ReportData) -> str:
-    """Title, one sentence against the baselines, the headline numbers."""
+    """Title, a sentence comparing the model with the baselines, the headline numbers."""
     mean = _mean(data, "held_out")
     count = len((data.evaluation.get("held_out") or {}).get("per_frame") or [])
     cards = [
@@ -57,31 +57,31 @@ def headline(data: ReportData) -> str:
     )
 
 
-BESIDE_BASELINES = (
-    "A baseline makes one picture from its neighbours. It gives no geometry, no other viewpoint, no depth and no tissue"
-    " behind the instrument, and for a single missing frame it can still predict the pixels better."
+ABOUT_BASELINES = (
+    "A baseline interpolates the neighbouring pictures. It provides no geometry, no other viewpoint, no depth and no"
+    " tissue behind the instrument, but can predict the pixels of a single missing frame better."
 )
 
 
 def _verdict(data: ReportData) -> str:
-    """One sentence: the tissue PSNR of the model above or below the best baseline."""
+    """The tissue PSNR of the model compared with the best baseline, as a paragraph."""
     ours = _mean(data, "held_out").get("psnr_tissue")
     means = _baseline_rows(data)
     rows = [(label, value) for label, mean in means if (value := mean.get("psnr_tissue")) is not None]
     if ours is None or not rows or len(rows) < len(means):
-        return ""  # a baseline without a value may be a perfect one
+        return ""  # a baseline without a finite PSNR may be exact
     label, best = max(rows, key=lambda row: row[1])
     kind, word = ("good", "above") if ours >= best else ("bad", "below")
     beaten = sum(ours >= value for _, value in rows)
     return (
-        f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the strongest '
-        f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB); "
-        f"it is above {beaten} of {len(rows)} baselines. {BESIDE_BASELINES}</p>"
+        f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the best '
+        f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB). "
+        f"It is above {beaten} of {len(rows)} baselines. {ABOUT_BASELINES}</p>"
     )
 
 
 def moving(data: ReportData) -> str:
-    """The scene in motion, and the page on which it can be turned."""
+    """The animation of the scene, and the link to the viewer."""
     blocks = []
     if data.preview:
         preview = data.preview
@@ -89,12 +89,12 @@ def moving(data: ReportData) -> str:
         blocks.append(f'<figure class="preview">{picture}<figcaption>{parts.text(preview.words)}</figcaption></figure>')
     if data.viewer:
         link = f'<a href="{parts.text(data.viewer)}">Open the viewer</a>'
-        blocks.append(f"<p>{link}: play the scene, turn it, and lay its depth and its error over it.</p>")
+        blocks.append(f"<p>{link} to play and rotate the scene, and to show its depth and error.</p>")
     return parts.section("The scene", *blocks)
 
 
 def held_out(data: ReportData) -> str:
-    """The table of held-out metrics: model and baselines; values of 8 bits are folded."""
+    """The table of held-out metrics of model and baselines; 8-bit values are folded."""
     rows: list[MetricsRow] = []
     if mean := _mean(data, "held_out"):
         rows.append(("This model", mean, "model"))
@@ -104,9 +104,9 @@ def held_out(data: ReportData) -> str:
     columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
     if not columns:
         return ""
-    note = "Mean over the held-out frames. Baselines use training frames only. Best value of a column in colour."
+    note = "Means over the held-out frames. Baselines use training frames only. The best value per column is coloured."
     table = _held_out_table(rows, [c for c in columns if c in DECIDING] or columns)
-    title = "Held-out frames against baselines without a model"
+    title = "Held-out frames, compared with baselines without a model"
     return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
 
 
@@ -123,12 +123,12 @@ def _held_out_table(rows: list[MetricsRow], columns: list[Column]) -> str:
 
 
 def _eight_bit(rows: list[MetricsRow], columns: list[Column]) -> str:
-    """The columns of pictures rounded to 8 bits, folded; they differ from the others in the second decimal."""
+    """The folded table for pictures rounded to 8 bits; the values differ from the others in the second decimal."""
     rounded = [c for c in columns if c not in DECIDING]
     if not rounded or len(rounded) == len(columns):
         return ""
     measured = [row for row in rows if any(row[1].get(c[0]) is not None for c in rounded)]
-    summary = "The same of pictures rounded to 8 bits<small>as programs that read PNG files measure</small>"
+    summary = "With renders rounded to 8 bits<small>as measured from PNG files</small>"
     return parts.details(summary, _held_out_table(measured, rounded))
 
 
@@ -147,14 +147,14 @@ def _absent_reasons(data: ReportData) -> str:
     if reason := data.evaluation.get("lpips_reason"):
         reasons.append(f"LPIPS: {reason}")
     if frames := left_out(data.evaluation):
-        reasons.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
+        reasons.append(f"excluded from the tissue means (no finite value): {', '.join(frames)}")
     if count := data.evaluation.get("not_finite"):
-        reasons.append(f"{count} value(s) were not finite numbers and are shown as a dash")
+        reasons.append(f"{count} value(s) were not finite and are shown as a dash")
     return f'<p class="note">{parts.text("; ".join(reasons))}.</p>' if reasons else ""
 
 
 def temporal_gap(data: ReportData) -> str:
-    """Training frames beside held-out frames, and the held-out frames one by one."""
+    """Means over training and held-out frames, and a chart of the held-out frames."""
     held_out, training = _mean(data, "held_out"), _mean(data, "training")
     table = ""
     if held_out and training:
@@ -169,19 +169,19 @@ def temporal_gap(data: ReportData) -> str:
     chart = curves.frame_chart(data.evaluation, "psnr_tissue")
     pair = f'<div class="charts">{table}{curves.chart_figure(chart)}</div>' if chart else table
     note = (
-        "A model that reproduces its training frames better than the frames between them is limited by time, "
-        "not by capacity: the difference is the temporal gap."
+        "The temporal gap is the difference between training and held-out frames. A large gap means that interpolation "
+        "in time, not capacity, limits the model."
     )
     return parts.section("Temporal gap", pair, _motion(data), note=note)
 
 
 def _motion(data: ReportData) -> str:
-    """Whether the motion of the model carries information: against its own cross-fade, and against the truth."""
+    """Sentences on the motion, compared with the cross-fade and with the truth, and on the pose correction."""
     sentences = []
     faded = ((data.evaluation.get("cross_fade") or {}).get("mean") or {}).get("psnr_tissue")
     ours = _mean(data, "held_out").get("psnr_tissue")
     if faded is not None and ours is not None:
-        word, what = ("above", "carries") if ours > faded else ("below", "does not carry")
+        word, what = ("above", "adds") if ours > faded else ("below", "adds no")
         sentences.append(
             f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "
             f"two neighbouring training times: its motion {what} information between the training frames."
@@ -202,7 +202,7 @@ def training(data: ReportData) -> str:
 
 
 def pictures(data: ReportData) -> str:
-    """Render, truth, error and depth of the held-out frames that the report was given, worst first."""
+    """Render, truth, error and depth of the given held-out frames, worst first."""
     if not data.frames:
         return ""
     errors = [figures.tissue_error(f.render, f.truth, f.mask) for f in data.frames]
@@ -215,13 +215,13 @@ def pictures(data: ReportData) -> str:
         bar = parts.colour_bar(figures.DEPTH_MAP, f"{span[0]:.4g}", f"{span[1]:.4g} {data.depth_unit}")
         legend.append(f"Rendered depth {bar}")
     note = (
-        "Worst first. Error: absolute difference, mean over the colour channels, in display units from 0 to 1; "
-        "the same scale in all frames. Grey: excluded or without depth. The frame marks the window with the largest "
-        "tissue error, shown 4× next to it or below."
+        "Worst first. Error: absolute difference, averaged over the colour channels, in display units from 0 to 1, "
+        "with the same scale for all frames. Grey: excluded or without depth. The white border marks the window with "
+        "the largest tissue error, enlarged 4×."
     )
     frames = len(data.evaluation.get("held_out", {}).get("per_frame", ()))
     if frames > len(data.frames):
-        note = f"The {len(data.frames)} worst of {frames} frames; renders/ has all of them. {note}"
+        note = f"The {len(data.frames)} worst of {frames} frames; see renders/ for all of them. {note}"
     blocks = [_frame(data.frames[i], scale, span, position < OPENED_FRAMES) for position, i in enumerate(order)]
     return parts.section(
         "Pictures of the held-out frames", f'<div class="legend">{"".join(legend)}</div>', *blocks, note=note
@@ -229,7 +229,7 @@ def pictures(data: ReportData) -> str:
 
 
 def _squared(frame: FramePictures) -> float:
-    """Mean squared tissue error: the order of the frames; a render that is not finite counts as the worst."""
+    """Mean squared tissue error, for the order of the frames; infinite for a render that is not finite."""
     error = np.where(frame.mask, np.clip(frame.render, 0, 1) - frame.truth, 0.0)
     value = float(np.square(error, dtype=np.float64).sum() / max(3 * frame.mask.sum(), 1))
     return value if np.isfinite(value) else np.inf
@@ -261,7 +261,7 @@ def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened
 
 
 def components(data: ReportData) -> str:
-    """Held-out means of the model rendered without one component at a time."""
+    """Held-out means of the model, rendered without one component at a time."""
     found, rows = data.evaluation.get("components", []), []
     for row in found:
         ours, whole = row.get("psnr_tissue"), found[0].get("psnr_tissue")
@@ -270,7 +270,7 @@ def components(data: ReportData) -> str:
         rows.append([parts.text(row["label"]), *(parts.number(row.get(key), n) for key, _, n in SHOWN), change])
     note = (
         "Held-out means of the trained model, rendered with the named residual set to zero. Component L, the Laplacian "
-        "loss, acts in training only; to see it, train with --model.no-laplacian."
+        "loss, affects training only; to measure it, train with --model.no-laplacian."
     )
     table = html_table(["Rendered", *(label for _, label, _ in SHOWN), "Change, PSNR tissue"], rows) if rows else ""
     return parts.section("Contribution of each component", table, note=note)
@@ -300,10 +300,10 @@ def the_run(data: ReportData) -> str:
 def footer(data: ReportData) -> str:
     """Definitions of the metrics."""
     return (
-        "<footer><p>PSNR and SSIM are computed frame by frame and averaged over frames. <em>Full</em>: all pixels, "
-        "excluded ones set to zero in render and truth. <em>Tissue</em>: tissue pixels only. <em>8-bit</em>: the "
-        "render rounded to 256 levels first. LPIPS: AlexNet, version 0.1, on pictures with values in the interval "
-        "named, excluded pixels zero.</p></footer>"
+        "<footer><p>PSNR and SSIM are computed per frame and averaged over frames. <em>Full</em>: all pixels, excluded "
+        "ones set to zero in render and truth. <em>Tissue</em>: tissue pixels only. <em>8-bit</em>: render rounded to "
+        "256 levels first. LPIPS: AlexNet, version 0.1, excluded pixels zero, values scaled to the given "
+        "interval.</p></footer>"
     )
 
 

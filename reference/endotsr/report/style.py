@@ -1,8 +1,7 @@
-"""The one style of every chart, drawn with matplotlib on Agg: colours, sizes, axes, files.
+"""The common style of all charts, drawn with matplotlib on Agg: colours, sizes, axes, files.
 
-In: a matplotlib figure or axes with curves on it. Out: the same in this style, or the bytes of a file.
-Equal numbers give equal bytes: a picture holds no date, no version and no random identifier. This module is independent
-of the data drawn. matplotlib is imported when a picture is made, not before.
+In: a matplotlib figure or axes with curves. Out: the same in this style, or the bytes of a file. Equal data give equal
+bytes: files have no date, version or random identifier. matplotlib is imported on first use.
 """
 
 import io
@@ -13,15 +12,15 @@ from endotsr.untrusted.writing import replace_file
 
 
 class Theme(NamedTuple):
-    """Colours on one background."""
+    """The colours for a light or dark background."""
 
-    ink: str  # words and numbers
+    ink: str  # text
     grey: str  # reference lines and baselines
     faint: str  # grid
-    colours: tuple[str, ...]  # of curves, in their order
+    colours: tuple[str, ...]  # of curves, in order
 
 
-# The first four are of Okabe and Ito (2008), which readers with any common colour blindness tell apart.
+# The first four are from Okabe and Ito (2008): distinguishable with all common types of colour blindness.
 BLUE, ORANGE, GREEN, PINK, OCHRE, GREY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a07c00", "#6b7680"
 LIGHT = Theme("#24303a", GREY, "#c9d1d8", (BLUE, ORANGE, GREEN, PINK, OCHRE, GREY))
 DARK = Theme("#d7dee4", "#9aa6b0", "#414c55", ("#56b4e9", "#f0894a", "#3fcf9f", "#e3a2c8", "#e6c14a", "#9aa6b0"))
@@ -33,20 +32,20 @@ class Sizes(NamedTuple):
     """Font sizes, points."""
 
     title: float
-    text: float  # labels of axes, numbers, legends
+    text: float  # axis labels, tick labels, legends
 
 
 NORMAL, SMALL = Sizes(11, 9), Sizes(9.5, 8)
 
 DOTS_PER_INCH = 160
-METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # metadata that matplotlib would add
-HASH_SALT = "endotsr"  # of the names inside an svg file, instead of a random one
+METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # suppressed metadata of matplotlib
+HASH_SALT = "endotsr"  # makes the identifiers in an svg file deterministic
 
 
 def new_figure(width: float, height: float, *, constrained: bool = True) -> Any:
-    """A figure of the given size in inches on white, drawn without a display.
+    """A white figure of the given size in inches; needs no display.
 
-    constrained   the layout reserves space for labels; with False the caller sets the margins
+    constrained   reserve space for labels automatically; False: the caller sets the margins
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -58,7 +57,7 @@ def new_figure(width: float, height: float, *, constrained: bool = True) -> Any:
 
 
 def plain_axes(axes: Any, theme: Theme = LIGHT, sizes: Sizes = NORMAL, grid: str = "both") -> None:
-    """A faint grid below the curves, numbers without ticks, no frame.
+    """Style axes: a faint grid below the curves, labels without tick marks, no frame.
 
     grid   "both", "x" or "y": the axes with grid lines
     """
@@ -72,7 +71,7 @@ def plain_axes(axes: Any, theme: Theme = LIGHT, sizes: Sizes = NORMAL, grid: str
 def name_axes(
     axes: Any, x: str = "", y: str = "", title: str = "", theme: Theme = LIGHT, sizes: Sizes = NORMAL
 ) -> None:
-    """Names of the axes and a title at the left; an empty one is left out."""
+    """Set axis labels and a left-aligned title; empty ones are left out."""
     if x:
         axes.set_xlabel(x, color=theme.ink, fontsize=sizes.text)
     if y:
@@ -82,7 +81,7 @@ def name_axes(
 
 
 def legend(owner: Any, theme: Theme = LIGHT, sizes: Sizes = NORMAL, **where: Any) -> None:
-    """A legend without a frame, of axes or of a whole figure; `where` as matplotlib takes it (loc, ncols)."""
+    """A legend without a frame for axes or a whole figure; `where`: matplotlib's options (loc, ncols)."""
     owner.legend(frameon=False, fontsize=sizes.text, labelcolor=theme.ink, **where)
 
 
@@ -97,6 +96,6 @@ def encoded(figure: Any, kind: str = "png", dots: int = DOTS_PER_INCH, *, transp
 
 
 def save(figure: Any, path: Path) -> None:
-    """Write the picture, png or svg by the ending of `path`, complete or not at all."""
+    """Write the picture atomically; the extension of `path` selects png or svg."""
     content = encoded(figure, path.suffix.removeprefix(".").lower())
     replace_file(path, lambda temporary: temporary.write_bytes(content))
