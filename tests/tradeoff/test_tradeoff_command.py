@@ -34,7 +34,7 @@ def test_files(measured):
 
 def test_a_measurement_is_not_overwritten(measured, capsys):
     assert main(["tradeoff", "--out", str(measured / "out")]) == 2
-    assert "holds a measurement already" in capsys.readouterr().err
+    assert "already contains a measurement" in capsys.readouterr().err
 
 
 def test_budget_reads_the_measurement(measured, capsys):
@@ -51,7 +51,7 @@ def test_budget_reads_the_measurement(measured, capsys):
         (["--budget", "soon"], 'allowed: a time per frame ("10 ms"'),
         (["--budget", "1 us"], "the fastest is"),
         (["--budget", "5 min"], 'allowed: a time per frame ("10 ms"'),
-        (["--run", "a", "--splats", "b"], "give one of --run and --splats"),
+        (["--run", "a", "--splats", "b"], "--run with --splats is not allowed"),
         (["--scale", "0"], "allowed: a number > 0"),
         (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
     ],
@@ -87,7 +87,7 @@ def test_a_measurement_without_its_keys_is_refused(tmp_path, capsys):
     (tmp_path / "tradeoff.json").write_text('{"format": 1}')
     assert main(["tradeoff", "--out", str(tmp_path), "--budget", "1/255"]) == 2
     said = capsys.readouterr().err
-    assert "tradeoff.json: not a whole measurement" in said and "missing required field `scene`" in said
+    assert "tradeoff.json: incomplete measurement" in said and "missing required field `scene`" in said
 
 
 def test_keys_that_are_missing_deeper_are_named_too(measured, tmp_path, capsys):
@@ -96,7 +96,7 @@ def test_keys_that_are_missing_deeper_are_named_too(measured, tmp_path, capsys):
     for change, said in (
         ({"points": [without]}, "missing required field `both` - at `$.points[0]`"),
         ({"points": 3}, "Expected `array`, got `int` - at `$.points`"),
-        ({"points": whole["points"][:0]}, "which is not among the points"),
+        ({"points": whole["points"][:0]}, "which is no point"),
         ({"fronts": {"forward": []}}, "fronts.forward"),
     ):
         (tmp_path / "tradeoff.json").write_text(json.dumps(whole | change))

@@ -1,6 +1,7 @@
-"""Accuracy against time: errors against the exact renderer, beside seconds and visits.
+"""Accuracy against time: error relative to the exact renderer, against seconds and visits.
 
-`scenes` are the rendered scenes; `settings` the measured ones; `measure` gives errors and costs of one setting; `study`
-runs the measurement and finds the settings that are not dominated; `budget` chooses among them; `text` puts the results
-into words.
+scenes    the rendered scenes                     settings  the measured settings
+measure   errors and costs of one setting         study     the whole measurement and its Pareto fronts
+budget    the best setting within a budget        text      results as text
+results   tradeoff.json, checked
 """

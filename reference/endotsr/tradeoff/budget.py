@@ -1,4 +1,4 @@
-"""`--budget`: a limit on time or error as text, and the best measured setting within it.
+"""`--budget`: a limit on time or error, and the best measured setting within it.
 
 Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), or an error (`1/255`, `0.5/255`, `1e-3`, in display units).
 """
@@ -18,7 +18,7 @@ FACTORS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 class Budget(NamedTuple):
-    """A limit: seconds per frame, or a largest error in display units."""
+    """A limit: seconds per frame, or largest error in display units."""
 
     kind: Kind
     amount: float
@@ -33,7 +33,7 @@ class Advice(NamedTuple):
 
 
 def parse_budget(text: str) -> Budget:
-    """Raises InputError naming the allowed forms."""
+    """Parse a budget. Raises InputError naming the allowed forms."""
     plain = " ".join(text.lower().split())
     found = None
     if fraction := re.fullmatch(rf"{NUMBER} ?/ ?{NUMBER}", plain):
@@ -52,15 +52,15 @@ def parse_budget(text: str) -> Budget:
 
 
 def _quotient(numerator: float, denominator: float) -> float:
-    """Infinite, which is refused, where a denominator is 0."""
+    """The quotient; infinity, which `parse_budget` refuses, for a denominator of 0."""
     return numerator / denominator if denominator else math.inf
 
 
 def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
-    """The setting of the front, by time of a frame, that is within the budget.
+    """The best setting within the budget, on the Pareto front of error against forward time.
 
-    For a time, it is the most accurate one whose upper quartile is within the budget; for an error, the fastest one
-    whose largest error is within it. Raises InputError with the reason when none is.
+    For a time budget: the most accurate setting with its upper quartile within the budget. For an error budget: the
+    fastest setting with its largest error within the budget. Raises InputError with the reason if there is none.
     """
     by_name = {p["name"]: p for p in result["points"]}
     front = [by_name[name] for name in result["fronts"]["forward"]]
@@ -72,7 +72,7 @@ def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
             least = min(front, key=lambda p: p["forward"]["high"])
             raise InputError(
                 f"--budget {budget.text}: no measured setting renders {where} that fast; the fastest is "
-                f"{least['name']} with {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels cost less"
+                f"{least['name']} with {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels are faster"
             )
         chosen = min(kept, key=lambda p: p["error"]["max"])
     else:
@@ -92,14 +92,14 @@ def _expectation(point: dict[str, Any]) -> list[str]:
     return [
         f"expected error: largest {levels(error['max'])}, RMS {levels(error['rms'])}, "
         f"worst gradient block {error['gradient']:.2g} (relative)",
-        f"expected time: {milliseconds(point['forward']['median'])} a frame, "
+        f"expected time: {milliseconds(point['forward']['median'])} per frame, "
         f"{milliseconds(point['both']['median'])} with the reverse pass",
         f"as settings: {settings_words(point['setting'])}",
     ]
 
 
 def settings_words(setting: dict[str, Any]) -> str:
-    """The options of `endotsr train` for this setting."""
+    """The options of `endotsr train` for a setting."""
     raster = setting["raster"]
     words = [
         f"--raster.alpha-cutoff {raster['alpha_cutoff']:.4g}",

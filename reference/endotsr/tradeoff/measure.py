@@ -1,7 +1,7 @@
-"""One setting on one scene: image and gradients, their costs and their errors against the reference.
+"""One setting on one scene: image and gradients, their costs, and their errors relative to the reference.
 
-Errors are taken at full resolution in float64. The gradients are those of one fixed linear functional of colour and
-depth with random weights (as the signs of an L1 loss are), so that every setting differentiates the same number.
+Errors are computed at full resolution in float64. The gradients are those of a fixed linear functional of colour and
+depth with random weights, which resemble the signs of an L1 loss. Every setting differentiates the same functional.
 """
 
 import time
@@ -27,7 +27,7 @@ WEIGHT_SEED = 5
 
 
 class Prepared(NamedTuple):
-    """A setting applied to a scene: everything that is computed once, not in every frame."""
+    """A setting applied to a scene: everything computed once, not per frame."""
 
     scene: StudyScene
     setting: Setting
@@ -42,24 +42,24 @@ class RenderedFrame(NamedTuple):
     """Image and gradients of a setting, at full resolution in float64."""
 
     colour: FloatArray  # (3, H, W) display units
-    gradients: dict[str, FloatArray]  # by block, of the parameters at this moment
+    gradients: dict[str, FloatArray]  # by block, with respect to the deformed scene
 
 
 class RenderErrors(NamedTuple):
-    """Errors of a frame against the reference."""
+    """Errors of a frame relative to the reference."""
 
     max: float  # of the colour, display units
     rms: float
-    gradients: dict[str, float]  # relative L2 by block
+    gradients: dict[str, float]  # relative L2 error by block
 
     @property
     def gradient(self) -> float:
-        """Of the worst block."""
+        """Relative error of the worst block."""
         return max(self.gradients.values(), default=0.0)
 
 
 def prepare(scene: StudyScene, setting: Setting) -> Prepared:
-    """Cast the scene, drop the terms that the setting leaves out, and draw the weights of the functional."""
+    """Cast the scene, remove the terms that the setting omits, and draw the weights of the functional."""
     gaussians, spectral = _reduced(scene, setting)
     camera = scaled(scene.camera, setting.scale)
     d_colour, d_depth = _weights(scene)
@@ -71,7 +71,7 @@ def prepare(scene: StudyScene, setting: Setting) -> Prepared:
 
 
 def _weights(scene: StudyScene) -> tuple[FloatArray, FloatArray]:
-    """Standard normal over pixels and channels; for depth divided by the distance of the scene."""
+    """Standard normal weights, divided by the number of values; for depth also by the distance of the scene."""
     rng = np.random.default_rng(WEIGHT_SEED)
     height, width = scene.camera.height, scene.camera.width
     count = 3 * height * width
@@ -81,7 +81,7 @@ def _weights(scene: StudyScene) -> tuple[FloatArray, FloatArray]:
 
 
 def _reduced(scene: StudyScene, setting: Setting) -> tuple[Gaussians, Any]:
-    """The strongest `bases` of the FDM and the lowest `frequencies`, of all Gaussians alike."""
+    """The Gaussians with the strongest `bases` of the FDM and the lowest `frequencies`, the same for all."""
     g, spectral = scene.gaussians, scene.spectral
     if setting.bases is not None and g.fdm_weight is not None:
         strength = np.abs(g.fdm_weight).sum(axis=(0, 2), dtype=np.float64)
@@ -101,7 +101,7 @@ def _reduced(scene: StudyScene, setting: Setting) -> tuple[Gaussians, Any]:
 
 
 def upsampling(small: int, large: int) -> FloatArray:
-    """(large, small): linear interpolation between pixel centres, the border repeated."""
+    """Matrix (large, small) of the linear interpolation between pixel centres, with repeated borders."""
     at = np.clip((np.arange(large) + 0.5) * small / large - 0.5, 0, small - 1)
     left = np.minimum(at.astype(int), max(small - 2, 0))
     out = np.zeros((large, small))
@@ -112,7 +112,7 @@ def upsampling(small: int, large: int) -> FloatArray:
 
 
 def forward(prepared: Prepared) -> tuple[RenderOut, RenderSaved, SceneSaved]:
-    """One frame: the scene at its time, then the render."""
+    """Deform the scene and render it."""
     p, setting = prepared, prepared.setting
     scene, scene_saved = scene_at(p.gaussians, p.spectral, p.scene.model, p.scene.time)
     out, saved = render_forward(scene, p.camera, setting.raster, degree=setting.degree, compositor=setting.compositor)
@@ -120,7 +120,7 @@ def forward(prepared: Prepared) -> tuple[RenderOut, RenderSaved, SceneSaved]:
 
 
 def reverse(prepared: Prepared, saved: RenderSaved, scene_saved: SceneSaved) -> RenderGrads:
-    """The reverse pass to the parameters (that of the FDM is part of the optimiser's step and is left out)."""
+    """The reverse pass to the parameters, without the FDM's, which is part of the optimiser step."""
     grads = render_reverse(prepared.d_colour, prepared.d_depth, None, saved)
     scene_reverse(grads, scene_saved)
     return grads
@@ -141,9 +141,9 @@ def frame(prepared: Prepared) -> tuple[RenderedFrame, int]:
 
 
 def errors(found: RenderedFrame, reference: RenderedFrame) -> RenderErrors:
-    """Colour: largest and root mean square difference; gradients: relative L2 of every block the reference has.
+    """Largest and root mean square error of the colour; relative L2 error of every gradient block of the reference.
 
-    Edges: a block without gradient in the reference is left out; a block that the setting lacks counts as zeros.
+    Edges: a block with zero reference gradient is left out; a block missing from `found` counts as zeros.
     """
     difference = found.colour - reference.colour
     gradients = {}
@@ -156,7 +156,7 @@ def errors(found: RenderedFrame, reference: RenderedFrame) -> RenderErrors:
 
 
 def terms(prepared: Prepared) -> int:
-    """Basis terms evaluated a frame: 10 B of the FDM and 2F for each channel of the Fourier residuals, by Gaussian."""
+    """Basis terms evaluated per frame: per Gaussian 10 B of the FDM, and 2F per channel of the Fourier residuals."""
     g = prepared.gaussians
     present = (g.fdm_weight, g.appearance_coefficients, g.motion_coefficients)
     return sum(a.size for a in present if a is not None)
@@ -174,7 +174,7 @@ def seconds(prepared: Prepared) -> tuple[float, float]:
 
 @contextmanager
 def threads(count: int | None) -> Iterator[None]:
-    """Run kernels with this number of threads within the block (None = unchanged)."""
+    """Set the number of kernel threads for the block (None = unchanged)."""
     before = numba.get_num_threads()
     if count is not None:
         use_threads(count)

@@ -12,14 +12,14 @@ FORMAT = 1  # raised when a key changes its name or meaning
 
 
 class Seconds(msgspec.Struct):
-    """Of a frame."""
+    """Quartiles of the seconds per frame."""
 
     median: float
     high: float
 
 
 class Errors(msgspec.Struct):
-    """Of a setting."""
+    """Errors of a setting."""
 
     max: float
     rms: float
@@ -27,7 +27,7 @@ class Errors(msgspec.Struct):
 
 
 class Raster(msgspec.Struct):
-    """The compositing rules of a setting that are options of the command line."""
+    """The rasteriser settings that are command-line options."""
 
     alpha_cutoff: float
     transmittance_stop: float
@@ -36,7 +36,7 @@ class Raster(msgspec.Struct):
 
 
 class ChosenSetting(msgspec.Struct):
-    """The chosen setting."""
+    """A setting, as far as it consists of command-line options."""
 
     raster: Raster
     precision: str
@@ -54,7 +54,7 @@ class Point(msgspec.Struct):
 
 
 class Front(msgspec.Struct):
-    """Names of the points that no other dominates."""
+    """Names of the undominated points."""
 
     forward: Annotated[list[str], msgspec.Meta(min_length=1)]
 
@@ -77,14 +77,14 @@ class Measurement(msgspec.Struct):
 
     def __post_init__(self) -> None:
         if unknown := sorted(set(self.fronts.forward) - {point.name for point in self.points}):
-            raise ValueError(f"fronts.forward names {unknown[0]!r}, which is not among the points")
+            raise ValueError(f"fronts.forward contains {unknown[0]!r}, which is no point")
 
 
 def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[str, Any]:
-    """An existing measurement.
+    """Read a measurement.
 
-    needed   the required keys with their types; None = only the format of the file is checked
-    Raises:  InputError if it cannot be read, is of another format, or lacks a key.
+    needed   the required keys with their types; None = check the format only
+    Raises:  InputError if it cannot be read, has another format, or lacks a key.
     """
     found = read_json(file)
     if found.get("format") != FORMAT:
@@ -93,5 +93,5 @@ def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[
         try:
             msgspec.convert(found, needed)
         except msgspec.ValidationError as error:
-            raise InputError(f"{file}: not a whole measurement: {error}; measure again with another --out") from None
+            raise InputError(f"{file}: incomplete measurement: {error}; measure again with another --out") from None
     return found

@@ -1,6 +1,6 @@
-"""The rendered scene: one moment of a simulated scene, of a trained run, or of a file of Gaussians.
+"""The rendered scene: a simulated scene or a trained run at one time, or a file of Gaussians.
 
-A file is a 3DGS `.ply` (`export.ply`) or the `.npz` of `export.npz`.
+A file is a 3DGS `.ply` (`export.ply`) or an `.npz` (`export.npz`).
 """
 
 from collections.abc import Callable
@@ -20,25 +20,25 @@ from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera, scale_camera
 
 SIMULATED_WIDTH, SIMULATED_HEIGHT = 128, 96
-ITERATIONS = 150  # of the training that gives the simulated scene its Gaussians
+ITERATIONS = 150  # of the training on the simulated sequence
 POINTS = {"first_frame_points": 2500, "other_frame_points": 400}
-SIDE = 320  # pixels of the picture of a file
-OPACITY_STEP = 1 / 255  # of 8-bit files: an opacity of 0 or 1 means half a step from it
+SIDE = 320  # side of the picture for a file, pixels
+OPACITY_STEP = 1 / 255  # of 8-bit opacities; 0 and 1 are replaced by values half a step inside
 
 
 @dataclass(frozen=True)
 class StudyScene:
-    """Gaussians, a moment and a camera."""
+    """Gaussians, a time and a camera."""
 
     name: str
-    about: str  # one sentence
+    about: str  # description, one sentence
     gaussians: Gaussians
     spectral: Any  # `fitting.model.Spectral`; None without Fourier components
     model: ModelConfig
     time: float
     camera: Camera
     near: float  # scene units
-    noise: float | None  # standard deviation of the sensor noise of the pictures, display units; None = not known
+    noise: float | None  # standard deviation of the sensor noise, display units; None = unknown
 
     @property
     def degree(self) -> int:
@@ -64,9 +64,9 @@ def simulated_scene(
     width: int = SIMULATED_WIDTH,
     step: Callable[[], None] = lambda: None,
 ) -> StudyScene:
-    """The simulated sequence after a short training with every component, in a picture `width` wide.
+    """A model of the simulated sequence after a short training with every component, at picture width `width`.
 
-    step   is called after every iteration
+    step   called after every iteration
     """
     from endotsr.fitting.model import spectral_from
     from endotsr.fitting.state import new_training
@@ -77,7 +77,7 @@ def simulated_scene(
     height = width * SIMULATED_HEIGHT // SIMULATED_WIDTH
     simulator = SimulatorSettings(width=width, height=height)
     sequence = simulate(simulator).sequence
-    fraction = (width / SIMULATED_WIDTH) ** 2  # of the pixels, and so of the points
+    fraction = (width / SIMULATED_WIDTH) ** 2  # the number of points is proportional to the number of pixels
     points = {name: max(4, round(count * fraction)) for name, count in POINTS.items()}
     config = with_settings(with_iterations(DEMO, iterations), initialisation=points)
     state = new_training(sequence, config)
@@ -97,7 +97,7 @@ def simulated_scene(
 
 
 def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
-    """The latest checkpoint of a run at its middle held-out frame. Raises InputError for a run that has none."""
+    """The latest checkpoint of a run at its middle held-out frame. Raises InputError for a run without checkpoint."""
     from endotsr.fitting.model import corrected_cameras
     from endotsr.runs.folder import open_run
     from endotsr.runs.model import load_model
@@ -121,7 +121,7 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
 
 
 def splat_scene(path: Path, side: int = SIDE) -> StudyScene:
-    """The Gaussians of a file in a square picture, seen from the front. Raises InputError naming file and reason."""
+    """The Gaussians of a file, in a square picture from the front. Raises InputError naming file and reason."""
     path = Path(path)
     gaussians = read_splats(path)
     camera = facing_camera(gaussians.position, side)
@@ -134,7 +134,7 @@ def splat_scene(path: Path, side: int = SIDE) -> StudyScene:
 
 
 def read_splats(path: Path) -> Gaussians:
-    """The Gaussians, float32; those with a number that is not finite are left out. Raises InputError."""
+    """The Gaussians of a file, float32, without those that are not finite. Raises InputError."""
     kind = path.suffix.lower()
     if kind not in (".ply", ".npz"):
         raise InputError(f"{path}: not a splat file; allowed: a name that ends in .ply or .npz")
@@ -148,10 +148,10 @@ def read_splats(path: Path) -> Gaussians:
 
 
 def scaled(camera: Camera, scale: float) -> Camera:
-    """The camera with a picture `scale` times as wide and high, in whole pixels."""
+    """The camera with its picture scaled by `scale` and rounded to whole pixels."""
     return scale_camera(camera, max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
 
 
 def in_precision(gaussians: Gaussians, dtype: str) -> Gaussians:
-    """Every array in another precision."""
+    """The Gaussians with all arrays cast to `dtype`."""
     return gaussians._replace(**{name: np.ascontiguousarray(a, dtype) for name, a in arrays(gaussians).items()})

@@ -1,4 +1,4 @@
-"""The settings between exact and fast: a joint sweep of the three most important dials, and the presets."""
+"""The settings between exact and fast: a joint sweep of precision, cutoff and transmittance stop, and the presets."""
 
 import itertools
 from collections.abc import Callable
@@ -17,15 +17,15 @@ class Setting(NamedTuple):
     precision: Precision = "float64"
     raster: RasterSettings = EXACT
     degree: int = 3  # highest harmonic degree
-    scale: float = 1.0  # of the picture that is rendered; it is then up-sampled
-    bases: int | None = None  # time bases of the FDM that are kept; None = all
-    frequencies: int | None = None  # Fourier frequencies that are kept, lowest first; None = all
+    scale: float = 1.0  # of the rendered picture, which is then upsampled
+    bases: int | None = None  # time bases of the FDM to keep; None = all
+    frequencies: int | None = None  # Fourier frequencies to keep, lowest first; None = all
     compositor: Compositor = "auto"
-    threads: int | None = None  # None = those of the run
-    kernels: Callable[[], AbstractContextManager[object]] = nullcontext  # a frame is rendered within this block
+    threads: int | None = None  # None = unchanged
+    kernels: Callable[[], AbstractContextManager[object]] = nullcontext  # context of every frame
 
 
-CLOSE = EXACT._replace(support="ellipse", alpha_cutoff=1e-9, alpha_max=1 - 2**-20)  # exact but for a 1e-9 cutoff
+CLOSE = EXACT._replace(support="ellipse", alpha_cutoff=1e-9, alpha_max=1 - 2**-20)  # exact except for the cutoff
 ACCURATE = Setting(raster=CLOSE)
 CUTOFFS = {"1e-12": 1e-12, "1e-9": 1e-9, "1e-7": 1e-7, "1e-5": 1e-5, "1e-4": 1e-4, "1/1024": 1 / 1024, "1/255": 1 / 255,
            "1/64": 1 / 64}  # fmt: skip
@@ -33,7 +33,7 @@ STOPS = {"0": 0.0, "1e-8": 1e-8, "1e-6": 1e-6, "1e-4": 1e-4, "1e-3": 1e-3, "1e-2
 
 
 def joint(degree: int, near: float) -> dict[str, Setting]:
-    """Precision x cutoff x stop, and the coarsest of them once more at half resolution."""
+    """Precision x cutoff x stop; the coarsest settings also at half resolution."""
     found = {}
     stops = {name: STOPS[name] for name in ("1e-6", "1e-4", "1e-3", "1e-2")}
     for precision, cutoff, stop in itertools.product(("float64", "float32"), CUTOFFS, stops):

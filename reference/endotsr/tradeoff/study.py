@@ -1,6 +1,6 @@
-"""The measurement of one scene: the reference, the joint sweep, the presets, the fronts.
+"""The measurement of one scene: reference, joint sweep, presets, Pareto fronts.
 
-The result is one JSON-able dictionary, `tradeoff.json`; `text` and `budget` read nothing else.
+The result is one JSON-able dictionary, `tradeoff.json`, the only input of `text` and `budget`.
 """
 
 import math
@@ -19,14 +19,14 @@ from endotsr.tradeoff.settings import CLOSE, Setting, joint, presets
 from endotsr.tradeoff.text import LEVELS
 
 REPEATS = 7
-EXACT_PAIRS = 150e6  # Gaussians x pixels up to which the reference is the exact path itself
+EXACT_PAIRS = 150e6  # maximum Gaussians x pixels for the exact path as reference
 COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse", "visits": "pixel-Gaussian pairs"}
 
 Progress = Callable[[int], None]  # called with the number of completed steps
 
 
 class NamedSettings:
-    """Every setting once, under a name: those of the presets and of the joint sweep."""
+    """The distinct settings of the presets and the joint sweep, with names."""
 
     def __init__(self, scene: StudyScene) -> None:
         self.names: dict[Setting, str] = {}
@@ -37,17 +37,17 @@ class NamedSettings:
         self.joint = [self.add(label, setting) for label, setting in joint(scene.degree, scene.near).items()]
 
     def add(self, name: str, setting: Setting) -> str:
-        """The name of a setting, the given one if it is new."""
+        """Add a setting; returns its name, which is `name` if the setting is new."""
         return self.names.setdefault(setting, name)
 
 
 def exact_is_possible(scene: StudyScene) -> bool:
-    """Whether the exact path visits few enough pairs to be timed; else a cutoff of 1e-14 is the reference."""
+    """Whether the scene is small enough for the exact path."""
     return scene.gaussians.count * scene.camera.width * scene.camera.height <= EXACT_PAIRS
 
 
 def reference_setting(scene: StudyScene) -> Setting:
-    """The setting against which errors are measured."""
+    """The reference for errors: the exact path, or a cutoff of 1e-14 for large scenes."""
     if exact_is_possible(scene):
         return presets(scene.degree, scene.near)["exact"]
     return Setting(raster=CLOSE._replace(near=scene.near, alpha_cutoff=1e-14), degree=scene.degree)
@@ -62,12 +62,12 @@ def run_study(
     begin: Callable[[int], None] = lambda steps: None,
     step: Progress = lambda steps: None,
 ) -> dict[str, Any]:
-    """Measure everything.
+    """Measure errors and costs of every setting.
 
-    repeats   timed frames of every setting, after one that warms up
+    repeats   timed frames per setting, after one warm-up frame
     plan      the settings; None = presets and joint sweep
-    keep      is called with image and gradients of every setting, under the `file` of its point or "reference"
-    begin     is called once with the number of steps, `step` with the number of completed ones
+    keep      called with image and gradients of every setting, and the `file` of its point or "reference"
+    begin     called once with the number of steps; `step` is called with the number of completed ones
     returns   tradeoff.json without date and machine (`described` adds them)
     """
     plan = plan or NamedSettings(scene)
@@ -124,9 +124,9 @@ def setting_dict(setting: Setting) -> dict[str, Any]:
 
 
 def _timed(prepared: list[Prepared], repeats: int, step: Progress) -> NDArray[np.float64]:
-    """(settings, repeats, 2) seconds.
+    """(settings, repeats, 2) seconds: forward, forward + reverse.
 
-    All settings are timed once, then all again, so that a disturbance of the machine affects all of them alike.
+    The outer loop is over repeats, so background load affects all settings equally.
     """
     times = np.empty((len(prepared), repeats, 2))
     for repeat in range(repeats):
@@ -155,7 +155,7 @@ class Ranked(NamedTuple):
 
 
 def non_dominated(points: Iterable[Ranked]) -> list[Ranked]:
-    """The Pareto front in cost and first error, cheapest first: what no other point matches at less cost or error."""
+    """The Pareto front in cost and first error, cheapest first."""
     front: list[Ranked] = []
     for point in sorted(points, key=lambda p: (p.cost, p.errors[0])):
         if not front or point.errors[0] < front[-1].errors[0]:
@@ -164,7 +164,7 @@ def non_dominated(points: Iterable[Ranked]) -> list[Ranked]:
 
 
 def _front(points: list[dict[str, Any]], candidates: set[str], cost: str) -> list[str]:
-    """Names of the settings of the joint sweep and of the presets that nothing among them dominates, cheapest first."""
+    """Names of the undominated settings among `candidates`, cheapest first."""
     ranked = [Ranked(p["name"], cost_of(p, cost), (p["error"]["max"],)) for p in points if p["name"] in candidates]
     return [p.name for p in non_dominated(ranked)]
 

@@ -1,12 +1,12 @@
-"""The results in `tradeoff.json` as rows of a table, and numbers in words."""
+"""The results in `tradeoff.json` as table rows, and quantities as text."""
 
 from typing import Any
 
-LEVELS = 255.0  # steps of an 8-bit picture
+LEVELS = 255.0  # levels of an 8-bit picture
 
 
 def levels(error: float) -> str:
-    """An error in steps of an 8-bit picture."""
+    """An error in 8-bit levels."""
     return f"{error * LEVELS:.2g}/255"
 
 
@@ -16,7 +16,7 @@ def milliseconds(seconds: float) -> str:
 
 
 def front_rows(result: dict[str, Any]) -> list[list[str]]:
-    """The settings that are not dominated, fastest first: name, times, visits, errors."""
+    """The undominated settings, fastest first: name, times, visits, errors."""
     by_name = {p["name"]: p for p in result["points"]}
     return [_row(by_name[name]) for name in result["fronts"]["forward"]]
 
@@ -38,7 +38,7 @@ def _row(point: dict[str, Any]) -> list[str]:
 
 
 def made(result: dict[str, Any]) -> str:
-    """Date, machine, versions and scene of the measurement."""
+    """A sentence with date, machine, version and scene of the measurement."""
     m, about = result["machine"], result["scene"]
     return (
         f"Measured {result['date'][:10]} on {result['threads']} threads of {m['processor']} ({m['cores']} cores), "
