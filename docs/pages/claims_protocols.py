@@ -17,9 +17,9 @@ from endotsr.sweeps.execute import FINISHED
 
 Record = Any  # what a file of docs/results holds
 WHOLE = next(c for c in COMPARISONS if c.claim == "all three")  # the whole method against the base
-DETAIL = Contrast("L beside A and S, fixed count", f"A+S+L{FIXED}", f"A+S{FIXED}")
+DETAIL = Contrast("L added to A and S, fixed count", f"A+S+L{FIXED}", f"A+S{FIXED}")
 PROTOCOLS = (  # what is held out, comparison, split, metric
-    ("Laplacian detail gains at a fixed number of Gaussians", DETAIL, "every_eighth", "psnr_full"),
+    ("Laplacian detail improves with a fixed number of Gaussians", DETAIL, "every_eighth", "psnr_full"),
     ("Every second frame held out", WHOLE, "every_second", "psnr_full"),
     ("The view of the right eye, at held-out times", WHOLE, "every_second", "held_out_psnr"),
     ("The view of the right eye, at training times", WHOLE, "every_second", "training_psnr"),

@@ -92,9 +92,9 @@ def made_up_record(gain: float) -> dict:
 
 
 def test_a_measured_claim_has_verdict_number_and_interval():
-    line = row_of(verdicts(made_up_record(0.28), [], []), "Temporal appearance gains")
+    line = row_of(verdicts(made_up_record(0.28), [], []), "Temporal appearance improves")
     assert "| A+S - S | +0.29 dB, mean over EndoNeRF | reproduced | +0.290 dB | +0.265 to +0.315 dB |" in line
-    line = row_of(verdicts(made_up_record(-0.5), [], []), "Temporal appearance gains")
+    line = row_of(verdicts(made_up_record(-0.5), [], []), "Temporal appearance improves")
     assert "| not reproduced: the opposite |" in line
     assert "6 of 6 runs" in tables(made_up_record(0.28))
 
@@ -156,9 +156,9 @@ def psnr(record: dict, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "words, with_, without",
-    [("Spectral motion", "S", "base"), ("Temporal appearance gains", "A+S", "S"), ("Laplacian detail", "A+S+L", "A+S"),
-     ("At a fixed number", "A+S+L fixed", "S fixed"), ("The Matérn prior", "S", "S without prior"),
-     ("The same at a fixed", "S fixed", "S without prior fixed")],
+    [("Spectral motion", "S", "base"), ("Temporal appearance improves", "A+S", "S"), ("Laplacian detail", "A+S+L", "A+S"),
+     ("With a fixed number", "A+S+L fixed", "S fixed"), ("The Matérn prior", "S", "S without prior"),
+     ("The same with a fixed", "S fixed", "S without prior fixed")],
 )  # fmt: skip
 def test_a_claim_is_about_the_pair_of_the_paper(words, with_, without):
     """The page against SciPy on the stored runs: the pairs stand here once more, apart from the code."""

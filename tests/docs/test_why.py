@@ -28,7 +28,7 @@ def test_the_loss_of_a_on_the_simulated_clip():
 
 
 def test_the_gain_of_a_on_the_real_clip():
-    gain = float(row(block("claims", "claims:pulling"), "A beside S", "PSNR full, dB")[2])
+    gain = float(row(block("claims", "claims:pulling"), "A added to S", "PSNR full, dB")[2])
     assert f"adding A to S gains {gain:.2f} dB" in WORDS
 
 

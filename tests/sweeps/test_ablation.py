@@ -45,7 +45,7 @@ def test_a_difference_is_paired_by_seed():
     """The levels of the seeds are far apart, the differences are not."""
     rows = [row("S", s, 30.0 + 5 * s) for s in range(3)] + [row("A+S", s, 30.2 + 5 * s + 0.1 * s) for s in range(3)]
     found = next(f for f in increments(rows) if f.metric == "psnr_full")
-    assert found.comparison.claim == "A beside S" and found.comparison.published == 0.29
+    assert found.comparison.claim == "A added to S" and found.comparison.published == 0.29
     assert found.estimate.mean == pytest.approx(0.3) and found.estimate.median == pytest.approx(0.3)
     assert 0.199 <= found.estimate.mean_low < 0.3 < found.estimate.mean_high <= 0.401
     assert [p.seed for p in found.pairs] == [0, 1, 2]
@@ -173,7 +173,7 @@ def test_the_picture_has_a_mark_for_every_mean_pair_and_published_value(tmp_path
     (axes,) = drawn[0].axes
     marks = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
     assert [name.get_text() for name in axes.get_yticklabels()] == [
-        "S", "A beside S", "A and S together (ours)"
+        "S", "A added to S", "A and S together (ours)"
     ]  # fmt: skip
     np.testing.assert_allclose(marks["mean"], [(0.25, 0), (0.0, 1), (0.25, 2)], atol=1e-12)
     assert len(marks["one pair"]) == 9 and marks["as published"].tolist() == [[0.04, 0.0], [0.29, 1.0]]

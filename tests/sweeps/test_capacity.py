@@ -53,4 +53,4 @@ def test_memory_of_this_machine_is_found():
 def test_where_memory_is_unknown_little_is_assumed_and_said(monkeypatch):
     monkeypatch.setattr("endotsr.sweeps.place.free_memory", lambda: None)
     found = capacity([RUN] * 9, cores=64)
-    assert found.workers == 1 and found.reason.endswith("4.0 GB assumed: the system does not say what is free")
+    assert found.workers == 1 and found.reason.endswith("4.0 GB assumed: free memory is unknown")

@@ -94,7 +94,7 @@ def test_a_worker_that_takes_several_runs_is_one_line(cluster, capsys, tmp_path)
     cluster.worker("wide", "--nthreads", "3")
     spec = write_spec(tmp_path)
     said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", cluster.address)
-    assert "takes 3 runs at a time; allowed: --nthreads 1" in said
+    assert "has 3 threads; allowed: --nthreads 1" in said
 
 
 def test_no_scheduler_option_without_dask_is_one_line(capsys, tmp_path, monkeypatch):

@@ -53,7 +53,7 @@ def test_names_of_splits_read_back(split):
 REFUSED = {
     "no such key": ("colour = 1", "unknown key colour; allowed: sequences, seeds"),
     "seeds": ("seeds = [-1]", "seeds = [-1] is not allowed; allowed: a list, each an integer >= 0 and <= "),
-    "seed twice": ("seeds = [1, 1]", "seeds: one is named twice"),
+    "seed twice": ("seeds = [1, 1]", "seeds: duplicate entry"),
     "no seed": ("seeds = []", " at least 1 of them"),
     "sequence": ('sequences = ["nowhere"]', "sequences = 'nowhere' is not allowed; allowed: a folder, or simulated"),
     "no sequence": ("sequences = []", "sequences = [] is not allowed; allowed: a list, each text, at least 1 of them"),
@@ -91,7 +91,7 @@ REFUSED = {
     "chain": (
         "[configurations.A]\n[configurations.B]\nstart = { configuration = 'A', iteration = 3 }\n"
         "[configurations.C]\nstart = { configuration = 'B', iteration = 3 }",
-        "configurations.C.start: B has a start itself",
+        "configurations.C.start: B has its own start",
     ),
     "not TOML": ("seeds = [", "not valid TOML"),
 }

@@ -138,7 +138,7 @@ def test_a_finished_run_of_other_settings_is_refused(whole):
     spec, out, _, _ = whole
     other = spec.parent / "other.toml"
     other.write_text(spec.read_text().replace("other_frame_points = 40", "other_frame_points = 41"))
-    with pytest.raises(InputError, match=r"other_frame_points = 40, the sweep asks for 41; allowed: .* another --out"):
+    with pytest.raises(InputError, match=r"other_frame_points = 40, but the sweep has 41; allowed: .* another --out"):
         sweep(other, out)
 
 

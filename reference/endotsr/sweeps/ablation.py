@@ -1,11 +1,11 @@
-"""The claims of the paper as differences between configurations, paired by sequence, split and seed.
+"""The paper's claims as differences between configurations, paired by sequence, split and seed.
 
-In: rows of a sweep. Out: one `Increment` a comparison, split and metric: the configuration `with_` minus the
-configuration `without`, on the same frames, with the same seed and no other setting changed (matched input). Sequences
-have equal weights, whatever the number of their seeds. The intervals are of the seeds within each sequence: they say
-how the difference would vary with other seeds on these sequences, and nothing about other sequences. Student's interval
-holds its 95 % with any number of seeds. The bootstrap does so with many: with three seeds it is no more than the range
-from the smallest to the largest difference, which misses the true one in a quarter of all cases.
+In: rows of a sweep. Out: one `Increment` per comparison, split and metric: configuration `with_` minus configuration
+`without`, on the same frames, with the same seed and all other settings equal (matched input). Sequences have equal
+weights, regardless of their number of seeds. The intervals cover other seeds on these sequences, but not other
+sequences. Student's interval has a coverage of 95 % for any number of seeds, if the differences are normal. The
+bootstrap reaches 95 % only with many seeds: with three, its interval is at most the range of the differences and misses
+the true value in 25 % of all cases.
 """
 
 from collections.abc import Iterable
@@ -20,14 +20,14 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.sweeps.execute import FINISHED
 from endotsr.sweeps.results import METRICS, RunRow
 
-FIXED = " fixed"  # ends the names of configurations that begin with the shared checkpoint, without density control
+FIXED = " fixed"  # suffix of configurations that start from the shared checkpoint, without density control
 NO_PRIOR = "S without prior"
 COMPONENTS = {"A": "appearance", "S": "spectral_motion", "L": "laplacian"}
-MATCHED = ("iterations", "preset", "arrays_sha256")  # keys of a row that are equal in both runs of a pair
+MATCHED = ("iterations", "preset", "arrays_sha256")  # keys of a row that must be equal in a pair
 
 
 def model_of(name: str) -> dict[str, dict[str, Any]]:
-    """Settings of a configuration of the ablation: "base", "A+S", "S without prior"."""
+    """Settings of a configuration by name: "base", "A+S", "S without prior"."""
     on = set(name.split(" ")[0].split("+")) if name != "base" else set()
     changes: dict[str, dict[str, Any]] = {"model": {setting: key in on for key, setting in COMPONENTS.items()}}
     return changes | ({"loss": {"lambda_msp": 0.0}} if name == NO_PRIOR else {})
@@ -39,11 +39,11 @@ CONFIGURATIONS = ("base", "A", "S", "L", "A+S", "A+S+L", NO_PRIOR)
 def ablation_spec(
     sequences: Iterable[str], seeds: int, *, fixed_at: int | None, chosen: Iterable[str] = CONFIGURATIONS, **keys: Any
 ) -> dict[str, Any]:
-    """A sweep of the configurations, as `sweeps.spec.spec_of` takes it.
+    """A sweep of the configurations, in the form of `sweeps.spec.spec_of`.
 
-    seeds     0 .. seeds - 1
-    fixed_at  iteration of the shared checkpoint of the base, from which every configuration is trained again without
-              density control, so that all have the same number of Gaussians; None = not made
+    seeds     number of seeds, 0 .. seeds - 1
+    fixed_at  iteration of a checkpoint of the base. Every configuration is also trained from it without density
+              control, hence with the same number of Gaussians; None = no such runs
     chosen    names among CONFIGURATIONS
     keys      other keys of the spec
     """
@@ -56,32 +56,32 @@ def ablation_spec(
 
 
 class Contrast(NamedTuple):
-    """What `with_` gains over `without`. A comparison of the paper has what it publishes; one without is ours."""
+    """The gain of `with_` over `without`. A comparison from the paper has a published value; the others are ours."""
 
     claim: str
     with_: str
     without: str
     published: float | None = None  # PSNR full, dB
-    says: str = ""  # the paper, in our words
+    says: str = ""  # the paper's claim in our words
 
 
 # The paper adds S to the base, A to S, and L to both; at a fixed count it adds A and L to S.
 COMPARISONS = (
-    Contrast("S", "S", "base", 0.04, "Spectral motion gains over the base"),
-    Contrast("A beside S", "A+S", "S", 0.29, "Temporal appearance gains beside spectral motion"),
-    Contrast("L beside A and S", "A+S+L", "A+S", 0.12, "Laplacian detail gains beside both residuals"),
+    Contrast("S", "S", "base", 0.04, "Spectral motion improves on the base"),
+    Contrast("A added to S", "A+S", "S", 0.29, "Temporal appearance improves on spectral motion alone"),
+    Contrast("L added to A and S", "A+S+L", "A+S", 0.12, "Laplacian detail improves on both residuals"),
     Contrast(
-        "A and L beside S, fixed count", f"A+S+L{FIXED}", f"S{FIXED}", 0.25,
-        "At a fixed number of Gaussians, appearance and detail gain over motion alone",
+        "A and L added to S, fixed count", f"A+S+L{FIXED}", f"S{FIXED}", 0.25,
+        "With a fixed number of Gaussians, appearance and detail improve on motion alone",
     ),
     Contrast("Matérn prior", "S", NO_PRIOR, 0.0, "The Matérn prior changes PSNR by less than 0.01 dB"),
     Contrast(
         "Matérn prior, fixed representation", f"S{FIXED}", f"{NO_PRIOR}{FIXED}", 0.0,
-        "The same at a fixed representation",
+        "The same with a fixed representation",
     ),
     Contrast("A alone", "A", "base"),
     Contrast("L alone", "L", "base"),
-    Contrast("S beside A", "A+S", "A"),
+    Contrast("S added to A", "A+S", "A"),
     Contrast("A and S together", "A+S", "base"),
     Contrast("all three", "A+S+L", "base"),
     Contrast("A, fixed count", f"A{FIXED}", f"base{FIXED}"),
@@ -95,7 +95,7 @@ Limits = tuple[float | None, float | None]  # lower and upper
 
 
 class Estimate(NamedTuple):
-    """Of a paired difference. Limits are None unless every sequence has two pairs or more."""
+    """Mean and median of a paired difference. Limits are None unless every sequence has at least two pairs."""
 
     mean: float
     student_low: float | None  # of the mean
@@ -110,7 +110,7 @@ class Estimate(NamedTuple):
 
 
 class RunPair(NamedTuple):
-    """Two runs that differ in a component, on the same sequence with the same seed."""
+    """The metric difference of two runs on the same sequence with the same seed."""
 
     sequence: str
     seed: int
@@ -127,12 +127,11 @@ class Increment(NamedTuple):
     pairs: list[RunPair]
 
 
-def increments(rows: Iterable[RunRow], seed: int = 0) -> list[Increment]:
-    """Every comparison for which there are finished pairs.
+def increments(rows: Iterable[RunRow]) -> list[Increment]:
+    """Every comparison with finished pairs.
 
     rows     of results.json
-    seed     of the resampling
-    Raises:  InputError if the two runs of a pair do not have the same input.
+    Raises:  InputError if the two runs of a pair have different inputs.
     """
     finished = [row for row in rows if row["status"] == FINISHED]
     found = []
@@ -141,12 +140,12 @@ def increments(rows: Iterable[RunRow], seed: int = 0) -> list[Increment]:
             for metric in METRICS:
                 pairs = paired(finished, comparison, split, metric)
                 if pairs:
-                    found.append(Increment(comparison, split, metric, estimate(pairs, seed), pairs))
+                    found.append(Increment(comparison, split, metric, estimate(pairs), pairs))
     return found
 
 
 def paired(rows: list[RunRow], comparison: Contrast, split: str, metric: str) -> list[RunPair]:
-    """The differences of the runs that have both a partner and a value."""
+    """The differences of all runs that have a partner and a value of the metric."""
     with_, without = (
         {(row["sequence"], row["seed"]): row for row in rows if row["split"] == split and row["configuration"] == name}
         for name in (comparison.with_, comparison.without)
@@ -169,7 +168,10 @@ def _refuse_other_input(a: RunRow, b: RunRow) -> None:
 
 
 def estimate(pairs: list[RunPair], seed: int = 0) -> Estimate:
-    """Mean and median over the seeds of each sequence, averaged over the sequences, with their intervals."""
+    """Mean and median over the seeds of each sequence, averaged over the sequences, with intervals.
+
+    seed     of the resampling
+    """
     groups: dict[str, list[float]] = {}
     for pair in pairs:
         groups.setdefault(pair.sequence, []).append(pair.difference)
@@ -183,14 +185,14 @@ def estimate(pairs: list[RunPair], seed: int = 0) -> Estimate:
 
 
 def _student(samples: tuple[FloatArray, ...]) -> Limits:
-    """Student's interval of the average of the means; for several sequences with the degrees of freedom of Welch."""
+    """Student's interval of the average of the means; Welch's degrees of freedom for several sequences."""
     from scipy.stats import t
 
     if min(map(len, samples)) < 2:
         return None, None
     middle = float(np.mean([sample.mean() for sample in samples]))
     variances = np.array([sample.var(ddof=1) / len(sample) for sample in samples])  # of the means
-    if not variances.sum() ** 2 > 0.0:  # equal, or so close that the square vanishes
+    if not variances.sum() ** 2 > 0.0:  # equal values, or underflow
         return middle, middle
     freedom = variances.sum() ** 2 / sum(v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True))
     half = float(t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(variances.sum()) / len(samples))
@@ -198,7 +200,7 @@ def _student(samples: tuple[FloatArray, ...]) -> Limits:
 
 
 class Level(MetricValues, total=False):
-    """The means of a configuration on a split, sequences weighted equally."""
+    """The means of a configuration on a split, with equal weights of the sequences."""
 
     split: Required[str]
     configuration: Required[str]
@@ -208,7 +210,7 @@ class Level(MetricValues, total=False):
 
 
 def levels(rows: Iterable[RunRow]) -> list[Level]:
-    """Mean of every configuration and split for each metric, sequences weighted equally, with its number of runs."""
+    """The `Level` of every configuration and split with finished runs."""
     groups: dict[tuple[str, str], list[RunRow]] = {}
     for row in rows:
         if row["status"] == FINISHED:

@@ -1,6 +1,6 @@
-"""The result of an ablation as JSON, Markdown and a picture with intervals.
+"""The result of an ablation as JSON, Markdown and a plot with intervals.
 
-In: rows of a sweep. Out: `ablation.json`, `ablation.md` and `ablation.png`, written anew after every run.
+In: rows of a sweep. Out: `ablation.json`, `ablation.md` and `ablation.png`, rewritten after every run.
 """
 
 from pathlib import Path
@@ -35,7 +35,7 @@ IncrementRow = TypedDict(
         "pairs": int, "sequences": int, "of": list[dict[str, Any]],
     },
 )  # fmt: skip
-"""A paired difference: contrast, split and metric; the fields of `Estimate`; and its pairs."""
+"""A paired difference: contrast, split, metric, the fields of `Estimate`, and its pairs."""
 
 
 class AblationRecord(TypedDict):
@@ -46,14 +46,14 @@ class AblationRecord(TypedDict):
     command: list[str]
     machine: MachinePart
     versions: dict[str, str]
-    runs: dict[str, Any]  # planned, finished, and the names of the failed ones
+    runs: dict[str, Any]  # counts `planned` and `finished`, names `failed`
     levels: list[Level]
     increments: list[IncrementRow]
     rows: list[RunRow]
 
 
 def ablation_record(rows: list[RunRow], command: list[str]) -> AblationRecord:
-    """The content of ablation.json. Raises InputError if two runs of a pair do not have the same input."""
+    """The content of ablation.json. Raises InputError if the two runs of a pair have different inputs."""
     return {
         "format": FORMAT,
         "date": now(),
@@ -83,7 +83,7 @@ def _increment(found: Increment) -> IncrementRow:
 
 
 def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> AblationRecord:
-    """Write the three files in the folder of the sweep; returns the content of ablation.json. Raises OSError."""
+    """Write the three files to the folder of the sweep; returns the content of ablation.json. Raises OSError."""
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
     replace_text(out / FILES[1], ablation_markdown(record) + "\n")
@@ -93,7 +93,7 @@ def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> Ablatio
 
 
 def ablation_markdown(record: AblationRecord) -> str:
-    """Means of the configurations, and the differences with intervals, split by split."""
+    """Means of the configurations and differences with intervals, one section per split."""
     runs = record["runs"]
     parts = [f"{runs['finished']} of {runs['planned']} runs finished, {len(runs['failed'])} failed."]
     for split in dict.fromkeys(level["split"] for level in record["levels"]):
@@ -104,7 +104,7 @@ def ablation_markdown(record: AblationRecord) -> str:
 
 
 def level_table(record: AblationRecord, split: str) -> str:
-    """Means of the configurations on a split, sequences weighted equally."""
+    """Table of the means of the configurations on a split."""
     chosen = [level for level in record["levels"] if level["split"] == split]
     columns = [column for column in SHOWN if any(level.get(column[0]) is not None for level in chosen)]
     rows = [
@@ -116,7 +116,7 @@ def level_table(record: AblationRecord, split: str) -> str:
 
 
 def increment_table(record: AblationRecord, split: str) -> str:
-    """Paired differences on a split: mean with Student's interval and the bootstrap, median, and what is published."""
+    """Table of the paired differences on a split: mean and median with intervals, and the published value."""
     rows = []
     for found in record["increments"]:
         digits = next((d for key, _, d in SHOWN if key == found["metric"]), None)
@@ -135,24 +135,24 @@ def increment_table(record: AblationRecord, split: str) -> str:
 
 
 def name_of(found: IncrementRow) -> str:
-    """The name of a difference, marked where the paper does not make it."""
+    """The name of a difference, marked if it is not from the paper."""
     return found["claim"] + ("" if found["published"] is not None else " (ours)")
 
 
 def interval_text(found: IncrementRow, of: str, digits: int) -> str:
-    """An interval, `of` being student, mean or median: "-0.02 to +0.11"; "-" where one pair has none."""
+    """An interval as text, "-0.02 to +0.11"; `of` is student, mean or median. "-" without an interval."""
     low, high = found.get(f"{of}_low"), found.get(f"{of}_high")
     return "-" if low is None or high is None else f"{low:+.{digits}f} to {high:+.{digits}f}"
 
 
 def draw(record: AblationRecord, path: Path, metric: str = "psnr_full") -> None:
-    """Mean differences with their intervals, one line per comparison, one panel per split; crosses are the paper's."""
+    """Plot mean differences with intervals, a line per comparison and a panel per split; crosses: published values."""
     chosen = [found for found in record["increments"] if found["metric"] == metric]
     splits = list(dict.fromkeys(found["split"] for found in chosen))
     count = max(sum(found["split"] == split for found in chosen) for split in splits)
     figure = style.new_figure(4.0 + 3.2 * len(splits), 1.5 + 0.32 * count)
     panels = figure.subplots(1, len(splits), squeeze=False)[0]
-    named: dict[str, object] = {}  # one entry of the legend a label, whichever panels have it
+    named: dict[str, object] = {}  # one legend entry per label, over all panels
     for axes, split in zip(panels, splits, strict=True):
         _panel(axes, [found for found in chosen if found["split"] == split])
         style.name_axes(axes, x="difference of PSNR full, dB", title=f"held out: {split}")

@@ -1,12 +1,12 @@
 """The runs of a sweep on an existing Dask cluster (`pip install 'endotsr[cluster]'`).
 
-In: the address of a scheduler, jobs, and a function that gives their sequences. Out: outcomes as they come, and None
-about once a second. Each sequence is sent to the workers once; results come back as the runs end. Dask gives the run of
-a lost worker to another one, which continues it from its checkpoint. Run folders lie on a disk that all machines see:
-this is checked, as are the versions of every worker, because another version gives other numbers.
+In: the address of a scheduler, jobs, and a function that returns their sequences. Out: outcomes as runs end, and None
+about once per second. Each sequence is sent to the workers once. Dask reassigns the run of a lost worker; the new
+worker continues it from its checkpoint. Run folders must be on a disk shared by all machines, and all workers must have
+the same versions, because results depend on them. Both are checked.
 """
 
-# Dask is no dependency of this package.
+# Dask is an optional dependency.
 # pyright: reportMissingImports=false
 
 import contextlib
@@ -26,20 +26,20 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sweeps.execute import FAILED, Outcome, execute
 from endotsr.sweeps.jobs import STOP, Job
 
-TICK = 0.5  # seconds between two looks at the runs
-PATIENCE = 15.0  # seconds for a scheduler to answer, and for its first worker
-MOST_LOSSES = 3  # times that the data of a run may be lost with all workers that held it
-TOKEN = "sweep.token"  # a file in the folder of the sweep
+TICK = 0.5  # seconds between two polls of the runs
+PATIENCE = 15.0  # seconds to wait for the scheduler, and for its first worker
+MOST_LOSSES = 3  # times that a run is resubmitted after all workers with its data were lost
+TOKEN = "sweep.token"  # file in the folder of the sweep
 
 
 def cluster_outcomes(
     address: str, jobs: list[Job], sequence_of: Callable[[Job], Sequence] | None, out: Path, threads: int | None
 ) -> Generator[Outcome | None, None, None]:
-    """Make the runs on the workers of a scheduler; after KeyboardInterrupt all of them stop.
+    """Execute the runs on the workers of a scheduler; KeyboardInterrupt stops all of them.
 
-    sequence_of   None: each worker reads the sequence of its run, from a disk that all machines see
-    threads       of each run; default: the cores of a worker's machine divided by its workers
-    Raises:       InputError of one line if the scheduler does not answer or is lost, or if a worker cannot be used.
+    sequence_of   None: each worker reads the sequence of its run from the shared disk
+    threads       per run; default: the cores of a worker's machine divided by its number of workers
+    Raises:       InputError of one line if the scheduler does not answer or is lost, or if a worker is unusable.
     """
     out = Path(out).absolute()
     with _connected(address) as client:
@@ -49,7 +49,7 @@ def cluster_outcomes(
             yield from _outcomes(client, jobs, sequence_of, out, threads)
         except BaseException:
             with contextlib.suppress(OSError):
-                (out / STOP).touch()  # the runs look for it, and end at their last checkpoint
+                (out / STOP).touch()  # the runs poll for it and stop
             raise
 
 
@@ -74,14 +74,14 @@ def _outcomes(
 
 
 class _Sent:
-    """Sequences that the workers hold, by what they were read from."""
+    """Sequences sent to the workers, by `Job.input_key`."""
 
     def __init__(self, client: Any, sequence_of: Callable[[Job], Sequence] | None) -> None:
         self._client, self._sequence_of = client, sequence_of
         self._found: dict[str, Any] = {}
 
     def of(self, job: Job) -> Any:
-        """The sequence of a job, as a future; it is sent to every worker the first time. None: it is not sent."""
+        """The sequence of a job as a future; the first call sends it to every worker. None: workers read it."""
         if self._sequence_of is None:
             return None
         if job.input_key not in self._found:
@@ -90,7 +90,7 @@ class _Sent:
         return self._found[job.input_key]
 
     def forget(self, job: Job) -> None:
-        """The workers that held the sequence are lost: it is sent again."""
+        """Send the sequence again next time: the workers that held it are lost."""
         self._found.pop(job.input_key, None)
 
 
@@ -126,7 +126,7 @@ def _host(address: str) -> str:
 
 
 class _StopFile:
-    """Whether a file has appeared; looked for about once a second."""
+    """Whether a file exists; checked at most once per second."""
 
     def __init__(self, file: Path) -> None:
         self._file, self._looked = file, 0.0
@@ -149,11 +149,11 @@ def _outcome(job: Job, future: Any) -> Outcome:
 
 @contextlib.contextmanager
 def _connected(address: str) -> Iterator[Any]:
-    """A `distributed.Client` of the scheduler, silent on everything that Dask would log."""
+    """A `distributed.Client` of the scheduler, with Dask's logging suppressed."""
     try:
         import distributed
     except ImportError:
-        raise InputError("--scheduler: Dask is not installed; `pip install 'endotsr[cluster]'` installs it") from None
+        raise InputError("--scheduler: Dask is not installed; run `pip install 'endotsr[cluster]'`") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -165,19 +165,19 @@ def _connected(address: str) -> Iterator[Any]:
     try:
         yield client
     finally:
-        with contextlib.suppress(Exception):  # of a scheduler that has ended
+        with contextlib.suppress(Exception):  # the scheduler may have ended
             client.close(timeout=5)
 
 
 def _refuse_workers(client: Any, out: Path) -> None:
-    """Raises InputError if there is no worker, or one of another version, with several threads or without the disk."""
+    """Raises InputError without a worker, or for one with other versions, several threads or no shared disk."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
-        raise InputError("--scheduler: it has no workers; start some with `dask worker ADDRESS --nthreads 1`") from None
+        raise InputError("--scheduler: no workers; start some with `dask worker ADDRESS --nthreads 1`") from None
     for worker, count in client.nthreads().items():
         if count != 1:
-            raise InputError(f"worker {worker}: takes {count} runs at a time; allowed: --nthreads 1")
+            raise InputError(f"worker {worker}: has {count} threads; allowed: --nthreads 1")
     token, expected = secrets.token_hex(8), _fingerprint()
     (out / TOKEN).write_text(token, encoding="ascii", newline="\n")
     for worker, found in client.run(_seen, str(out / TOKEN), on_error="return").items():
@@ -186,12 +186,12 @@ def _refuse_workers(client: Any, out: Path) -> None:
         if wrong := _difference(found[0], expected):
             raise InputError(f"worker {worker}: {wrong}")
         if found[1] != token:
-            raise InputError(f"worker {worker}: does not see {out}; allowed: an --out on a disk that all machines see")
+            raise InputError(f"worker {worker}: cannot read {out}; allowed: an --out on a disk shared by all machines")
     (out / TOKEN).unlink(missing_ok=True)
 
 
 def _seen(token: str) -> tuple[dict[str, str], str]:
-    """On a worker: its versions, and what it reads in a file of the sweep."""
+    """On a worker: its versions, and the token that it reads ("" without access)."""
     try:
         return _fingerprint(), Path(token).read_text(encoding="ascii")
     except OSError:
@@ -199,7 +199,7 @@ def _seen(token: str) -> tuple[dict[str, str], str]:
 
 
 def _fingerprint() -> dict[str, str]:
-    """The versions that numbers depend on, and a digest of the sources of this package."""
+    """The versions that results depend on, and a digest of this package's sources."""
     import endotsr
 
     digest, package = hashlib.sha256(), Path(endotsr.__file__).parent
@@ -209,7 +209,7 @@ def _fingerprint() -> dict[str, str]:
 
 
 def _difference(found: dict[str, str], expected: dict[str, str]) -> str:
-    """What differs, in words; "" if nothing does."""
+    """The differing versions as text; "" if there are none."""
     wrong = [name for name in expected if found.get(name) != expected[name]]
     shown = ", ".join(f"{name} {found.get(name, 'is missing')} (here {expected[name]})" for name in wrong)
     return f"has other versions: {shown}; allowed: those of this machine" if wrong else ""

@@ -1,8 +1,8 @@
-"""One run of a sweep, from whatever its folder holds to its numbers.
+"""One run of a sweep: started or continued, trained and evaluated.
 
-In: a job, its sequence, a number of threads. Out: an `Outcome`, and the run folder with metrics.json. A folder that is
-finished is left as it is; one that was begun is continued from its last checkpoint, so that a run takes place once,
-wherever and however often it is asked for. Nothing is raised: a failure is an outcome with a reason of one line.
+In: a job, its sequence, a number of threads. Out: an `Outcome`, and the run folder with metrics.json. A finished folder
+stays unchanged; an unfinished one continues from its last checkpoint. `execute` is therefore idempotent. It raises
+nothing: a failure is an outcome with a one-line reason.
 """
 
 import errno
@@ -32,22 +32,22 @@ FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Outcome(NamedTuple):
-    """What became of a run."""
+    """The result of executing a job."""
 
     name: str  # of the job
     status: str  # finished, failed or interrupted
     reason: str = ""  # of a failure, one line
-    ends_sweep: bool = False  # no other run can succeed either: the disk is full, say
+    ends_sweep: bool = False  # no other run can succeed, e.g. on a full disk
 
 
 class Silent(Observer):
-    """An observer that says nothing, and stops the run when it is asked to."""
+    """An observer without output; it stops the run when `stop` returns True."""
 
     def __init__(self, stop: Callable[[], bool] = lambda: False) -> None:
         self._stop = stop
 
     def update(self, entry: LogEntry) -> None:
-        """Raises KeyboardInterrupt if the run is to stop."""
+        """Raises KeyboardInterrupt to stop the run."""
         if self._stop():
             raise KeyboardInterrupt
 
@@ -55,11 +55,11 @@ class Silent(Observer):
 def execute(
     job: Job, threads: int, sequence: Sequence | None = None, stop: Callable[[], bool] | None = None
 ) -> Outcome:
-    """Make a run, or what is missing of it.
+    """Execute a run, or its missing part.
 
-    threads   of compiled kernels; they change no result
-    sequence  of the job; None = it is read
-    stop      asked after every iteration
+    threads   of compiled kernels; results do not depend on them
+    sequence  of the job; None = read it
+    stop      called after every iteration; True stops the run
     """
     from endotsr.kernels.threads import use_threads
 
@@ -97,7 +97,7 @@ def _trained(job: Job, sequence: Sequence, threads: int, observer: Silent) -> Ru
             return _begun(job, sequence, threads, observer)
         except InputError:
             if not path.exists():
-                raise  # otherwise another process has begun it in the meantime
+                raise  # otherwise another process has begun the run in the meantime
     folder = open_run(path)
     refuse_other_settings(job, folder)
     check_same_input(folder, sequence, job.source)
@@ -138,7 +138,7 @@ def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunF
 
 
 def _start_state(job: Job, sequence: Sequence) -> "TrainingState":
-    """The state that the run begins with; it is trained by the first run that needs it, while the others wait."""
+    """The shared initial state. The first run that needs it trains it; the others wait."""
     from endotsr.fitting.checkpoint import load_checkpoint
     from endotsr.fitting.state import state_from_checkpoint
 
@@ -151,7 +151,7 @@ def _start_state(job: Job, sequence: Sequence) -> "TrainingState":
 
 
 def _train_start(job: Job, sequence: Sequence, path: Path) -> None:
-    """Train the other configuration to the iteration at which this one begins, with its own schedule."""
+    """Train the other configuration, with its own schedule, to the iteration at which this run begins."""
     from endotsr.fitting.compile_ahead import compile_ahead
     from endotsr.fitting.state import new_training, save_state, training_constants
     from endotsr.fitting.trainer import training_step
@@ -169,7 +169,7 @@ def _train_start(job: Job, sequence: Sequence, path: Path) -> None:
 
 
 def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
-    """metrics.json, pictures and report of a trained run; checkpoints that are not wanted are removed."""
+    """Write metrics.json, pictures and report of a trained run; remove checkpoints that are not to be kept."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.run import measure_folder
     from endotsr.report.run_files import write_evaluation
@@ -187,7 +187,7 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """One line."""
+    """The reason of a failure in one line."""
     if isinstance(error, OSError):
         return plain_line(os_error_line(error))
     named = isinstance(error, InputError | FloatingPointError)
@@ -195,7 +195,7 @@ def _reason(error: Exception) -> str:
 
 
 def _full_disk(error: BaseException | None) -> bool:
-    """Whether a full disk is behind an error."""
+    """Whether a full disk caused an error."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in FULL_DISK:
             return True

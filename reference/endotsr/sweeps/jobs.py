@@ -1,7 +1,7 @@
-"""The runs of a sweep, and what their folders say about them.
+"""The runs of a sweep and the state of their folders.
 
 In: a checked spec, the folder of the sweep and its sequences. Out: one `Job` per run with its settings, name and
-folder. A job holds all that another process or machine needs for the run.
+folder. A job is self-contained: another process or machine can execute it.
 """
 
 import contextlib
@@ -26,28 +26,28 @@ if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
     from endotsr.sequences.sequence import Sequence
 
-RUNS, SHARED = "runs", "shared"  # folders of the runs and of the checkpoints that several runs begin with
-STOP = "sweep.stop"  # a file for which the workers of a sweep look, and end
+RUNS, SHARED = "runs", "shared"  # folders of the runs, and of shared initial checkpoints
+STOP = "sweep.stop"  # a file that stops the workers of a sweep
 
 
 class Beginning(Protocol):
-    """A state that a run begins with instead of the initialisation, made where the run takes place."""
+    """An initial state other than the initialisation; the process that executes the run creates it."""
 
     def about(self) -> StartPart:
-        """`start` of run.json."""
+        """The entry `start` of run.json."""
         ...
 
     def state(self, sequence: "Sequence", config: Config) -> "TrainingState":
-        """The state. Raises InputError if it cannot be made."""
+        """The state. Raises InputError if it cannot be created."""
         ...
 
 
 class Job(NamedTuple):
     """One run of a sweep."""
 
-    name: str  # unique in the sweep, and the name of its folder
+    name: str  # unique in the sweep; also the name of its folder
     sequence: str  # name of the sequence in tables
-    source: str  # its folder, or `simulated`
+    source: str  # folder of the sequence, or `simulated`
     split: str
     configuration: str
     seed: int
@@ -62,12 +62,12 @@ class Job(NamedTuple):
 
     @property
     def input_key(self) -> str:
-        """Equal for jobs that read the same sequence with the same settings."""
+        """Key that is equal for jobs with the same sequence and reader settings."""
         return f"{self.source} {msgspec.json.encode([self.config.sequence, self.config.raster.near]).decode()}"
 
     @property
     def shared_checkpoint(self) -> Path:
-        """The checkpoint that the run begins with, if it starts as another configuration did."""
+        """The checkpoint of `start`, for a run that starts from another configuration."""
         assert isinstance(self.start, Start)
         parts = (self.sequence, self.split, self.start.configuration, f"seed{self.seed}", str(self.start.iteration))
         return Path(self.folder).parents[1] / SHARED / f"{file_word('-'.join(parts))}.npz"
@@ -79,7 +79,7 @@ def file_word(name: str) -> str:
 
 
 def sequence_names(sources: tuple[str, ...]) -> dict[str, str]:
-    """Source -> name in tables: that of its folder. Raises InputError if two folders have one name."""
+    """Source -> folder name, used in tables. Raises InputError if two folders have the same name."""
     names = {source: source if source == SIMULATED else Path(source).name for source in sources}
     for source, name in names.items():
         twice = [other for other in sources if other != source and names[other] == name]
@@ -89,10 +89,10 @@ def sequence_names(sources: tuple[str, ...]) -> dict[str, str]:
 
 
 def jobs_of(spec: Spec, out: Path, training_frames: Callable[[Job], int]) -> list[Job]:
-    """Every run of a sweep; the first seed of every configuration comes first, so that a short sweep shows them all.
+    """Every run of a sweep. Runs with the first seed come first: a sweep stopped early covers every configuration.
 
-    training_frames   how many the sequence of a job has; the length of a run can depend on it
-    Raises:           InputError for a sequence that cannot be used, or two runs of one name.
+    training_frames   number of training frames of a job's sequence; the length of a run can depend on it
+    Raises:           InputError for an unusable sequence, or two runs of the same name.
     """
     names, jobs = sequence_names(spec.sequences), []
     for seed, source, split, configuration in product(
@@ -124,7 +124,7 @@ def _job(spec: Spec, configuration: Configuration, name: str, source: str, split
 
 
 def _of_run(config: Config, split: str, seed: int) -> Config:
-    """The settings with the split and the seed of a run."""
+    """The settings with the split and seed of a run."""
     return with_settings(config, sequence=split_settings(split) if split else {}, training={"seed": seed})
 
 
@@ -136,9 +136,9 @@ def _lengthened(job: Job, training_frames: int) -> Job:
 
 
 def finished_folder(job: Job) -> RunFolder | None:
-    """The folder of a run that is trained to the end and measured; None if there is still work to do.
+    """The folder of a run that is fully trained and evaluated; None if work is left.
 
-    Raises: InputError if the folder holds a run of other settings, or is none.
+    Raises: InputError if the folder contains a run with other settings, or no run.
     """
     path = Path(job.folder)
     if not path.exists():
@@ -152,7 +152,7 @@ def finished_folder(job: Job) -> RunFolder | None:
 
 
 def measured_at_the_end(job: Job) -> bool:
-    """Whether metrics.json is that of the last iteration, and not of a checkpoint on the way."""
+    """Whether metrics.json is of the last iteration, not of an earlier checkpoint."""
     with contextlib.suppress(InputError):
         found = read_json(Path(job.folder) / "metrics.json", ("run.iteration",))
         return found["run"]["iteration"] == job.config.training.iterations
@@ -160,11 +160,11 @@ def measured_at_the_end(job: Job) -> bool:
 
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:
-    """Raises InputError if the folder holds a run of other settings than those of the job, threads apart."""
+    """Raises InputError if the folder contains a run with other settings than the job, threads excepted."""
     theirs = by_key(msgspec.to_builtins(folder.config()))
     for key, value in by_key(msgspec.to_builtins(job.config)).items():
         if theirs[key] != value and key not in ("preset", "training.threads"):
             raise InputError(
-                f"{folder.path}: holds a run with {key} = {theirs[key]!r}, the sweep asks for {value!r}; allowed: the "
-                "settings that the sweep began with, or another --out"
+                f"{folder.path}: contains a run with {key} = {theirs[key]!r}, but the sweep has {value!r}; allowed: the"
+                " original settings of the sweep, or another --out"
             )

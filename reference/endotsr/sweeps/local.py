@@ -1,9 +1,9 @@
 """The runs of a sweep on a pool of processes of this machine.
 
-In: jobs. Out: their outcomes as they come, and None about once a second so that the caller can show progress. A worker
-that was killed loses no run: its run is tried again, from the last checkpoint, by a new pool. A sweep that is stopped
-creates a file, for which its workers look: no signal ends another process gently on every system. Each of them finishes
-its iteration and writes a checkpoint. Workers end in the same way with their parent, also when it is killed.
+In: jobs. Out: outcomes as runs end, and None about once per second for the caller's progress display. A killed worker
+loses no run: a new pool retries it from the last checkpoint. A stopped sweep creates a file for which its workers poll,
+because no signal stops another process gracefully on every system. Each worker finishes its iteration and writes a
+checkpoint. Workers also stop in this way when their parent ends or is killed.
 """
 
 import _thread
@@ -23,17 +23,17 @@ from pathlib import Path
 from endotsr.sweeps.execute import FAILED, Outcome, execute
 from endotsr.sweeps.jobs import STOP, Job
 
-TICK = 1.0  # seconds between two chances to show progress
-MOST_LOSSES = 3  # processes that a run may lose before it counts as failed
-LOOK = 0.25  # seconds between two looks of a worker for the file that ends it
-LAST_SECONDS = 20.0  # in which workers write their checkpoints
-LOST = "its process was ended from outside, three times; was it short of memory (fewer --workers need less)?"
+TICK = 1.0  # seconds between two updates of the progress
+MOST_LOSSES = 3  # killed processes after which a run counts as failed
+LOOK = 0.25  # seconds between two polls of a worker for the stop file
+LAST_SECONDS = 20.0  # for workers to write their checkpoints
+LOST = "its process was killed three times, perhaps for lack of memory (fewer --workers need less)"
 
-_working = threading.Event()  # of a worker: it makes a run
+_working = threading.Event()  # set in a worker while it executes a run
 
 
 def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Generator[Outcome | None, None, None]:
-    """Make the runs, `workers` at a time with `threads` threads each; after KeyboardInterrupt all of them stop."""
+    """Execute the runs, `workers` at a time with `threads` threads each; KeyboardInterrupt stops all of them."""
     waiting, losses = deque(jobs), Counter[str]()
     stop = Path(jobs[0].folder).parents[1] / STOP
     stop.unlink(missing_ok=True)
@@ -45,7 +45,7 @@ def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Generator[Out
 def _until_broken(
     pool: ProcessPoolExecutor, waiting: deque[Job], losses: Counter[str], workers: int, threads: int
 ) -> Generator[Outcome | None, None, None]:
-    """Outcomes until all jobs are done, or until the pool has lost a process; `waiting` then holds what is left."""
+    """Outcomes until all jobs are done or the pool loses a process; `waiting` then contains the jobs left."""
     running: dict[Future[Outcome], Job] = {}
     while waiting or running:
         try:
@@ -53,7 +53,7 @@ def _until_broken(
                 running[pool.submit(_work, waiting[0], threads)] = waiting[0]
                 waiting.popleft()
         except BrokenProcessPool:
-            pass  # the futures that are running say so too
+            pass  # the running futures raise it too
         done = wait(running, TICK, FIRST_COMPLETED).done
         lost = [running[future] for future in done if isinstance(future.exception(), BrokenProcessPool)]
         for future in done:
@@ -79,7 +79,7 @@ def _outcome(job: Job, future: Future[Outcome]) -> Outcome:
 
 @contextlib.contextmanager
 def _pool(workers: int, stop: Path) -> Iterator[ProcessPoolExecutor]:
-    """A pool whose workers are told to stop, and waited for, if the block is left by an exception."""
+    """A pool of processes. An exception in the block stops the workers; the block's exit waits for them."""
     others = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker, initargs=(stop,))
@@ -94,7 +94,7 @@ def _pool(workers: int, stop: Path) -> Iterator[ProcessPoolExecutor]:
 
 
 def _stop(children: set[process.BaseProcess], stop: Path) -> None:
-    with contextlib.suppress(OSError):  # a disk that is full, or gone: the workers are killed below
+    with contextlib.suppress(OSError):  # a full or missing disk: the workers are killed below
         stop.touch()
     ends = time.monotonic() + LAST_SECONDS
     for child in children:
@@ -106,16 +106,16 @@ def _stop(children: set[process.BaseProcess], stop: Path) -> None:
 
 
 def _begin_worker(stop: Path) -> None:
-    """A worker leaves the Ctrl-C of a terminal to its parent, and looks for the end of it."""
+    """Set up a worker: it ignores Ctrl-C in the terminal, and watches the stop file and its parent."""
     if hasattr(os, "setpgrp"):
         os.setpgrp()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where there are no process groups; a run takes it itself
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # for systems without process groups; a run sets its own handler
     os.environ.setdefault("MPLBACKEND", "Agg")
     threading.Thread(target=_end_when_told, args=(stop,), daemon=True).start()
 
 
 def _end_when_told(stop: Path) -> None:
-    """In a worker: when the file appears or the parent has ended, act as on Ctrl-C; an idle worker ends at once."""
+    """In a worker: when the file appears or the parent ends, interrupt the run; an idle worker exits at once."""
     from endotsr.runs.stopping import stop_asked
 
     parent = multiprocessing.parent_process()
@@ -131,7 +131,7 @@ def _end_when_told(stop: Path) -> None:
 
 
 def _work(job: Job, threads: int) -> Outcome:
-    """In a worker: one run, which is stopped after its iteration."""
+    """In a worker: one run, interruptible between iterations."""
     from endotsr.runs.stopping import signals_stop, stop_asked
 
     try:
@@ -141,5 +141,5 @@ def _work(job: Job, threads: int) -> Outcome:
     finally:
         _working.clear()
         if stop_asked():
-            os._exit(0)  # the parent waits for the end of this process, and takes no other outcome
+            os._exit(0)  # the parent waits for this process to exit and ignores its outcome
     return outcome

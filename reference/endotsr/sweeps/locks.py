@@ -1,6 +1,6 @@
-"""One process at a time: the lock of a sweep, and that of a checkpoint which several runs begin with.
+"""File locks of a sweep, of its shared checkpoints, and of its runs.
 
-The system releases the lock of a process that was killed. Without effect where the disk has no locks.
+The system releases the lock of a killed process. On a disk without locks they have no effect.
 """
 
 import contextlib
@@ -11,15 +11,15 @@ from pathlib import Path
 from endotsr.runs.folder import RunBusy, RunFolder, lock_taken
 
 POLL = 0.5  # seconds between two attempts
-PATIENCE = 60.0  # seconds without progress of the holder after which an attempt is given up
+PATIENCE = 60.0  # seconds without progress of the holder until RunBusy is raised
 
 
 @contextlib.contextmanager
 def file_lock(path: Path, message: str = "", *, wait: bool = False) -> Iterator[None]:
-    """Hold the lock of a file, which is created, for the block.
+    """Hold the lock of a file for the block; creates the file.
 
-    wait     wait until it is free, without a limit
-    Raises:  RunBusy with `message` if another process holds it and `wait` is False.
+    wait     wait for the lock, without a time limit
+    Raises:  RunBusy with `message` if another process holds the lock and `wait` is False.
     """
     with path.open("ab") as file:
         while not lock_taken(file):
@@ -31,10 +31,10 @@ def file_lock(path: Path, message: str = "", *, wait: bool = False) -> Iterator[
 
 @contextlib.contextmanager
 def run_lock(folder: RunFolder, patience: float = PATIENCE) -> Iterator[None]:
-    """Hold the lock of a run; a holder that is still at work, as its log shows, is waited for.
+    """Hold the lock of a run for the block; wait as long as the log of the run grows.
 
-    A worker that a cluster has given up can still be training: its run is taken over only when the worker has ended.
-    Raises: RunBusy if the log of the run has not grown for `patience` seconds.
+    A worker that a cluster counts as lost can still be training. Its run is taken over only after it has ended.
+    Raises: RunBusy if the lock is held and the log has not grown for `patience` seconds.
     """
     size, since = -1, time.monotonic()
     with contextlib.ExitStack() as stack:

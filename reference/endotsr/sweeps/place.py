@@ -1,6 +1,6 @@
-"""Where runs take place: on the cores of this machine, as many as fit, or on the workers of a Dask scheduler.
+"""Where runs execute: on this machine, as many as fit, or on the workers of a Dask scheduler.
 
-No core and no memory of this machine is given out twice.
+Runs on this machine share its cores and memory without oversubscription.
 """
 
 from collections.abc import Callable, Generator
@@ -16,13 +16,13 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sweeps.execute import Outcome
 from endotsr.sweeps.jobs import Job
 
-MARGIN = 1.4  # over the estimate; peaks of 1.14 (`paper`) and 1.10 (`sharp`) times the estimate were measured
-USABLE = 0.9  # of the memory that is free
+MARGIN = 1.4  # factor on the memory estimate; measured peaks: 1.14 (`paper`) and 1.10 (`sharp`) times the estimate
+USABLE = 0.9  # fraction of the free memory
 CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
 class Size(NamedTuple):
-    """The size of a sequence at the scale of its training, as far as memory depends on it."""
+    """The size of a sequence at its training scale."""
 
     frames: int
     width: int
@@ -30,7 +30,7 @@ class Size(NamedTuple):
 
 
 class Capacity(NamedTuple):
-    """Runs at a time, threads of each, and what the number of runs follows from."""
+    """Number of concurrent runs, threads per run, and the reason as text."""
 
     workers: int
     threads: int
@@ -38,21 +38,21 @@ class Capacity(NamedTuple):
 
 
 class Place(NamedTuple):
-    """What the options of a command ask for; None = as many as fit, and this machine."""
+    """The user's options of a command."""
 
-    workers: int | None
-    threads: int | None
-    scheduler: str | None
+    workers: int | None  # None = as many as fit
+    threads: int | None  # per run; None = the cores divided by the workers
+    scheduler: str | None  # address; None = this machine
 
 
 def check_place(command: str, place: Place) -> None:
-    """Raises InputError for a number of workers or threads that is not allowed."""
+    """Raises InputError for an invalid number of workers or threads, and for --workers with --scheduler."""
     for name in ("workers", "threads"):
         value = getattr(place, name)
         if value is not None and value < 1:
             raise InputError(f"{command}: --{name} {value} is not allowed; allowed: an integer >= 1")
     if place.scheduler is not None and place.workers is not None:
-        raise InputError(f"{command}: --workers with --scheduler is not allowed: the cluster has its workers")
+        raise InputError(f"{command}: --workers with --scheduler is not allowed: the cluster has its own workers")
 
 
 def outcomes_at(
@@ -63,9 +63,9 @@ def outcomes_at(
     sequence_of: Callable[[Job], Sequence] | None = None,
     what: str = "runs",
 ) -> Generator[Outcome | None, None, None]:
-    """Make the runs; their outcomes come in any order, None when there is none. One line says how they are made.
+    """Execute the runs; yields outcomes in any order, and None while there is none. Prints one line on the capacity.
 
-    sequence_of   of a job, to be sent to a cluster; None: its workers read the sequence of their run
+    sequence_of   sequence of a job, to be sent to a cluster; None: each worker reads the sequence of its run
     """
     if place.scheduler is not None:
         from endotsr.sweeps.cluster import cluster_outcomes
@@ -81,7 +81,7 @@ def outcomes_at(
 
 
 def run_bytes(size: Size, config: Config) -> float:
-    """Estimated memory of one run with these settings."""
+    """Estimated memory of one run, bytes."""
     read = with_settings(config, sequence={"scale": 1.0})
     return MARGIN * estimated_cost(size.frames, size.width, size.height, read).total_bytes
 
@@ -94,13 +94,12 @@ def capacity(
     workers: int | None = None,
     threads: int | None = None,
 ) -> Capacity:
-    """Workers and threads for runs of this memory each, `run_bytes`; the largest sets that of every worker.
+    """Workers and threads for runs with these `run_bytes`; every worker is assumed to need the largest.
 
-    cores, free       of the machine; default: those that this process may use
-    workers, threads  asked for; default: as many runs as fit, with all cores divided among them
+    cores, free       cores and free bytes; default: those available to this process
+    workers, threads  requested; default: as many runs as fit, with the cores divided among them
 
-    A training on two threads is less than twice as fast as on one, so many runs with few threads finish a sweep sooner
-    than few runs with many.
+    Two threads train less than twice as fast as one, so a sweep finishes sooner with many runs of few threads.
     """
     cores = cores or usable_cores()
     known = free_memory() if free is None else free
@@ -109,13 +108,13 @@ def capacity(
     by_memory = max(1, int(USABLE * free / needed)) if needed else cores
     by_cores = max(1, cores // threads) if threads else cores
     chosen = workers or max(1, min(len(memory), by_memory, by_cores))
-    found = f"{free / 1e9:.1f} GB " + ("free" if known is not None else "assumed: the system does not say what is free")
-    reason = f"{cores} cores, {needed / 1e9:.1f} GB a run, {found}"
+    found = f"{free / 1e9:.1f} GB " + ("free" if known is not None else "assumed: free memory is unknown")
+    reason = f"{cores} cores, {needed / 1e9:.1f} GB per run, {found}"
     return Capacity(chosen, threads or max(1, cores // chosen), reason)
 
 
 def free_memory() -> float | None:
-    """Bytes that programs can still take, within the limit of a container; None where the system does not say."""
+    """Free memory in bytes, at most the limit of a container; None if the system does not report it."""
     found = [value for value in (memory_available(), _container_limit(), memory_of_machine()) if value is not None]
     return min(found, default=None)
 

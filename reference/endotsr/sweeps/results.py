@@ -1,7 +1,7 @@
-"""The table of a sweep: one row per run, as JSON, CSV and Markdown, written anew after every run.
+"""The table of a sweep: one row per run, as JSON, CSV and Markdown, rewritten after every run.
 
-In: jobs and what their folders hold. Out: rows of plain values. A row of a finished run is read from its folder; the
-reason of a failed one is kept in results.json alone.
+In: jobs and their folders. Out: rows of plain values. The row of a finished run is read from its folder; the reason of
+a failure is stored in results.json only.
 """
 
 from pathlib import Path
@@ -19,11 +19,11 @@ from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of results.json; raised when a key changes its name or meaning
 FILES = ("results.json", "results.csv", "results.md")
-OPEN = "open"  # status of a run that was not made yet, or not to its end
+OPEN = "open"  # status of a run that is not finished
 METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric")
 ABOUT = ("sequence", "split", "configuration", "seed")
 COSTS = ("iterations", "gaussians", "seconds", "peak_memory_bytes")
-BESIDE = ("training_psnr_full", "training_psnr_tissue", "cross_fade_psnr_full", "cross_fade_psnr_tissue")
+FURTHER = ("training_psnr_full", "training_psnr_tissue", "cross_fade_psnr_full", "cross_fade_psnr_tissue")
 SHOWN = (
     ("psnr_full", "PSNR full", "{:.2f}"), ("psnr_tissue", "PSNR tissue", "{:.2f}"),
     ("ssim_full", "SSIM full", "{:.4f}"), ("ssim_tissue", "SSIM tissue", "{:.4f}"), ("lpips", "LPIPS", "{:.4f}"),
@@ -33,7 +33,7 @@ SHOWN = (
 
 
 class RunRow(MetricValues, total=False):
-    """One run; a run that is not finished has no numbers, a failed one a reason."""
+    """One run. An unfinished run has no numbers; a failed one has a reason."""
 
     name: Required[str]
     sequence: Required[str]
@@ -64,7 +64,7 @@ class RunRow(MetricValues, total=False):
 
 
 def finished_row(job: Job) -> RunRow:
-    """The numbers of a run that is trained and measured. Raises InputError if its metrics.json lacks a key."""
+    """The row of a finished run. Raises InputError if its metrics.json lacks a key."""
     path = Path(job.folder) / "metrics.json"
     metrics = read_json(path, ("held_out.mean", "training.mean", "run.input.arrays_sha256", "baselines"))
     run, held_out, inside = metrics["run"], metrics["held_out"], metrics["training"]["mean"]
@@ -91,20 +91,19 @@ def finished_row(job: Job) -> RunRow:
 
 
 def about(job: Job) -> RunRow:
-    """What identifies a run."""
+    """The keys that identify a run."""
     return cast(RunRow, {"name": job.name} | {key: getattr(job, key) for key in ABOUT})
 
 
 def open_row(job: Job, outcome: Outcome | None = None) -> RunRow:
-    """A run without numbers; failed ones have a reason."""
-    failed = outcome is not None and outcome.status == FAILED
-    if failed and outcome:
+    """The row of an unfinished run, with the reason if it failed."""
+    if outcome is not None and outcome.status == FAILED:
         return {**about(job), "status": FAILED, "reason": outcome.reason}
     return {**about(job), "status": OPEN}
 
 
 def failures(out: Path) -> dict[str, str]:
-    """Name -> reason of the runs that failed when the sweep ran last. Raises InputError for a damaged results.json."""
+    """Name -> reason of the failed runs in results.json. Raises InputError if the file is damaged."""
     path = out / FILES[0]
     if not path.exists():
         return {}
@@ -116,20 +115,20 @@ def failures(out: Path) -> dict[str, str]:
 
 
 def write_results(out: Path, rows: list[RunRow]) -> None:
-    """results.json, results.csv and results.md, each replaced whole. Raises OSError."""
+    """Write results.json, results.csv and results.md, each atomically. Raises OSError."""
     write_json(out / FILES[0], {"format": FORMAT, "date": now(), "rows": rows})
     for name, text in zip(FILES[1:], (results_csv(rows), results_markdown(rows) + "\n"), strict=True):
         replace_text(out / name, text)
 
 
 def results_csv(rows: list[RunRow]) -> str:
-    """One line a run; an empty cell for a run without the number."""
-    columns = ("name", *ABOUT, "status", *METRICS, *BESIDE, *COSTS, "reason")
+    """One line per run; a missing number is an empty cell."""
+    columns = ("name", *ABOUT, "status", *METRICS, *FURTHER, *COSTS, "reason")
     return csv_text(columns, ([row.get(name) for name in columns] for row in rows))
 
 
 def results_markdown(rows: list[RunRow]) -> str:
-    """The finished runs as a table, and the failed ones by name with their reasons."""
+    """A table of the finished runs, and a list of the failed ones with reasons."""
     finished = [row for row in rows if row["status"] == FINISHED]
     failed = [row for row in rows if row["status"] == FAILED]
     columns = [column for column in SHOWN if any(row.get(column[0]) is not None for row in finished)]

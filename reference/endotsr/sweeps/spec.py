@@ -3,16 +3,16 @@
     sequences = ["endonerf_pulling", "simulated"]    folders, relative to the folder of the file; or `simulated`
     seeds = [0, 1, 2]
     splits = ["every_eighth", "blocks 8"]            default: that of the settings
-    measures = ["depth"]                             measured beside the held-out frames (`evaluation.measures`)
+    measures = ["depth"]                             additional measurements (`evaluation.measures`)
     preset = "paper"                                 iterations = 6000 stretches its schedule
     [settings.sequence]                              settings of every run
     scale = 0.5
     [configurations.base.model]                      settings of one configuration; at least one configuration
     appearance = false
     [configurations."A from base"]
-    start = { configuration = "base", iteration = 3000 }   begins with that checkpoint, trained once for all seeds alike
+    start = { configuration = "base", iteration = 3000 }   starts from that checkpoint, trained once per seed
 
-The runs are all combinations. Order of the settings: preset < iterations < settings < configuration.
+The runs are all combinations. Later settings override earlier ones: preset, iterations, settings, configuration.
 """
 
 import re
@@ -47,14 +47,14 @@ Iteration = Annotated[int, msgspec.Meta(ge=1, le=1 << 53)]
 
 
 class StartAt(Section, frozen=True, kw_only=True):
-    """The configuration and the iteration whose state a run begins with."""
+    """The configuration and iteration whose state a run starts from."""
 
     configuration: Text
     iteration: Iteration
 
 
 class ConfigurationKeys(Section, frozen=True, kw_only=True):
-    """The keys of a configuration beside its settings."""
+    """The keys of a configuration other than its settings."""
 
     preset: Text | None = None
     iterations: Iteration | None = None
@@ -78,15 +78,15 @@ class SpecFile(Section, frozen=True, kw_only=True):
 
 
 class Start(NamedTuple):
-    """A run that begins with the state of another configuration at an iteration."""
+    """The start of a run from the state of another configuration."""
 
-    config: Config  # of that configuration, with the seed and the split of the run
+    config: Config  # of that configuration, with the seed and split of the run
     configuration: str
     iteration: int
 
 
 class Configuration(NamedTuple):
-    """Settings of the runs of one name; seed and split are still to be set."""
+    """A named configuration; each run adds its seed and split."""
 
     name: str
     config: Config
@@ -98,24 +98,24 @@ class Spec(NamedTuple):
 
     sequences: tuple[str, ...]  # folders as absolute paths, or `simulated`
     seeds: tuple[int, ...]
-    splits: tuple[str, ...]  # "every_eighth", "blocks 8", ...; empty = the one of the settings
+    splits: tuple[str, ...]  # "every_eighth", "blocks 8", ...; empty = the split of the settings
     configurations: tuple[Configuration, ...]
     simulator: SimulatorSettings
     measures: tuple[str, ...] = ()
     lpips: str | None = None  # weights file, absolute
-    keep_checkpoints: bool = True  # False: a run that is measured keeps its numbers and pictures only
+    keep_checkpoints: bool = True  # False: an evaluated run keeps only its numbers and pictures
 
 
 def read_spec(path: Path) -> Spec:
-    """A sweep from a file. Raises InputError naming the file, the key and what is allowed."""
+    """A sweep from a file. Raises InputError naming the file, the key and the allowed values."""
     return spec_of(read_toml(path), str(path), Path(path).absolute().parent)
 
 
 def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
     """A sweep from plain values.
 
-    folder   paths are relative to it
-    Raises:  InputError naming `where`, the key and what is allowed.
+    folder   base of relative paths
+    Raises:  InputError naming `where`, the key and the allowed values.
     """
     refuse_unknown_keys(data, SpecFile, where)
     file = checked(data, SpecFile, where)
@@ -124,19 +124,19 @@ def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
     check_measures(file.measures, f"{where}: measures =")
     for key, values in (("sequences", sequences), ("seeds", file.seeds), ("splits", splits)):
         if len(set(values)) < len(values):
-            raise InputError(f"{where}: {key}: one is named twice; allowed: each once")
+            raise InputError(f"{where}: {key}: duplicate entry; allowed: each once")
     made, lpips = _configurations(file, where), None if file.lpips is None else str(folder / file.lpips)
     return Spec(sequences, file.seeds, splits, made, file.simulator, file.measures, lpips, file.keep_checkpoints)
 
 
 def split_settings(split: str) -> dict[str, Any]:
-    """The keys of the section `sequence` of a split: "blocks 4" -> {"split": "blocks", "block_length": 4}."""
+    """The settings of section `sequence` for a split: "blocks 4" -> {"split": "blocks", "block_length": 4}."""
     name, _, length = split.partition(" ")
     return {"split": name} | ({"block_length": int(length)} if length else {})
 
 
 def split_name(settings: SequenceConfig) -> str:
-    """The inverse of `split_settings`, for a table."""
+    """The inverse of `split_settings`."""
     return f"{settings.split} {settings.block_length}" if settings.split in ("blocks", "end") else settings.split
 
 
@@ -149,7 +149,7 @@ def _configurations(file: SpecFile, where: str) -> tuple[Configuration, ...]:
             allowed = ", ".join(starts)
             raise InputError(f"{here}.configuration = {start.configuration!r} is not allowed; allowed: {allowed}")
         if start and starts[start.configuration]:
-            raise InputError(f"{here}: {start.configuration} has a start itself; allowed: one without")
+            raise InputError(f"{here}: {start.configuration} has its own start; allowed: a configuration without start")
     return made
 
 
@@ -159,12 +159,12 @@ def _configuration(name: str, values: Any, file: SpecFile, where: str) -> Config
         raise InputError(f"{here}: the name is not allowed; allowed: letters, digits, space, + - _ . (at most 61)")
     if not isinstance(values, dict):
         raise InputError(f"{here} = {values!r} is not allowed; allowed: a table of keys")
-    beside = ConfigurationKeys.__struct_fields__
-    keys = checked({key: value for key, value in values.items() if key in beside}, ConfigurationKeys, here)
+    own = ConfigurationKeys.__struct_fields__
+    keys = checked({key: value for key, value in values.items() if key in own}, ConfigurationKeys, here)
     config = config_from_dict({"preset": file.preset if keys.preset is None else keys.preset}, here)
     if iterations := keys.iterations or file.iterations:
         config = with_iterations(config, iterations)
-    for changes in (file.settings, {key: value for key, value in values.items() if key not in beside}):
+    for changes in (file.settings, {key: value for key, value in values.items() if key not in own}):
         config = _changed(config, changes, here)
     if keys.start:
         integer(keys.start.iteration, f"{here}.start.iteration", low=1, high=config.training.iterations - 1)
@@ -195,7 +195,7 @@ def _source(word: str, where: str, folder: Path) -> str:
     try:
         found = (folder / word).resolve()
         there = found.is_dir()
-    except (OSError, RuntimeError):  # a name that is too long, links that lead round in a circle
+    except (OSError, RuntimeError):  # a name that is too long, or a cycle of links
         found, there = folder, False
     if not there:
         raise InputError(f"{where}: sequences = {word!r} is not allowed; allowed: a folder, or {SIMULATED}")

@@ -1,10 +1,10 @@
-"""A sweep from its spec to its table: what is finished is kept, the rest is run, every result is written as it comes.
+"""A sweep from its spec to its table: finished runs are kept, the others are executed, and every result is saved.
 
-In: a checked spec and the folder of the sweep; where the runs take place is a function from jobs to outcomes, of this
-machine or of a cluster. Out: the rows of the table, in the order of the spec.
+In: a checked spec, the folder of the sweep, and a function from jobs to outcomes that executes the runs on this machine
+or on a cluster. Out: the rows of the table in the order of the spec.
 
-    DIR/runs/NAME/     one run folder a run          DIR/results.json, .csv, .md   the table as it grows
-    DIR/shared/        checkpoints that several runs begin with                    DIR/sweep.lock
+    DIR/runs/NAME/     one run folder per run        DIR/results.json, .csv, .md   the table, updated after each run
+    DIR/shared/        shared initial checkpoints    DIR/sweep.lock
 """
 
 import contextlib
@@ -28,32 +28,32 @@ Rows = list[RunRow]
 
 
 class Reporter(Protocol):
-    """What is told while a sweep runs."""
+    """Callbacks for the progress of a sweep."""
 
     def begin(self, steps: int) -> None:
-        """The iterations of all runs that are not finished."""
+        """The sweep begins; `steps` iterations are left in all runs."""
 
     def step(self, count: int = 1) -> None:
-        """Iterations that were completed."""
+        """`count` iterations were completed."""
 
     def say(self, message: str) -> None:
         """One line of text for the user."""
 
 
 class Inputs:
-    """The sequences of a sweep, each read and checked once before anything runs."""
+    """The sequences of a sweep, each read and checked once before any run."""
 
     def __init__(self, keep: bool) -> None:
-        self._keep = keep  # whether they are needed here, to be sent to a cluster
+        self._keep = keep  # keep the sequences in memory, to send them to a cluster
         self._sizes: dict[str, tuple[int, Size]] = {}
         self._sequences: dict[str, Sequence] = {}
 
     def training_frames(self, job: Job) -> int:
-        """Of the sequence of a job. Raises InputError for a sequence that cannot be used."""
+        """Number of training frames of a job's sequence. Raises InputError for an unusable sequence."""
         return self._of(job)[0]
 
     def size(self, job: Job) -> Size:
-        """Of the sequence of a job."""
+        """Size of a job's sequence."""
         return self._of(job)[1]
 
     def sequence(self, job: Job) -> Sequence:
@@ -71,24 +71,24 @@ class Inputs:
         return self._sizes[job.input_key]
 
 
-# Makes runs, anywhere: their outcomes come in any order, None when there is none.
+# Executes jobs; yields outcomes in any order, and None while there is none.
 Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
 
 
 class SweepPlan(NamedTuple):
-    """The runs of a sweep and what is left of them."""
+    """The runs of a sweep and their state."""
 
     jobs: list[Job]
     rows: dict[str, RunRow]  # by name of the run
     left: list[Job]
-    failed: dict[str, str]  # runs that failed before and are not tried again: name -> reason
+    failed: dict[str, str]  # name -> reason of earlier failures that are not retried
 
 
 def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> SweepPlan:
-    """Every run, and which of them are to be made.
+    """Every run and its state.
 
-    retry    also those that failed before
-    Raises:  InputError for a sequence or a folder that cannot be used.
+    retry    execute failed runs again
+    Raises:  InputError for an unusable sequence or folder.
     """
     jobs, before = jobs_of(spec, out, inputs.training_frames), failures(out)
     rows = {job.name: finished_row(job) if finished_folder(job) else open_row(job) for job in jobs}
@@ -112,12 +112,13 @@ def run_sweep(
     retry: bool = False,
     on_rows: Callable[[Rows], None] = lambda rows: None,
 ) -> Rows:
-    """Make every run that is not finished; the table is written before the first and after each of them.
+    """Execute every unfinished run; write the table before the first run and after each run.
 
-    outcomes   makes the runs that are left
-    on_rows    called with the rows after each run
-    Raises:    InputError for what cannot be used, for a sweep that is running already, and for a full disk;
-               KeyboardInterrupt with a line that says how to continue.
+    outcomes   executes the remaining jobs
+    retry      execute failed runs again
+    on_rows    called with the rows whenever the table is written
+    Raises:    InputError for unusable input, for a sweep that is already running, and for a full disk;
+               KeyboardInterrupt with a line on how to continue.
     """
     out = Path(out)
     refuse_folder(out)
@@ -148,9 +149,9 @@ def run_sweep(
 def as_they_end(
     jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: "Watch", advice: Callable[[], str]
 ) -> Generator[Outcome, None, None]:
-    """Outcomes as they come, with the progress shown; closed, it ends what still runs.
+    """Outcomes as runs end, with progress reports. Closing the generator stops the remaining runs.
 
-    Raises: InputError with `advice` for an outcome after which no other run can succeed.
+    Raises: InputError with `advice` for an outcome that ends the sweep.
     """
     if not jobs:
         return
@@ -166,7 +167,7 @@ def as_they_end(
 
 
 class Watch:
-    """The iterations of runs, read from the ends of their logs."""
+    """The progress of runs in iterations, read from the ends of their logs."""
 
     def __init__(self, jobs: list[Job]) -> None:
         self._logs = {job.name: Path(job.folder) / "log.jsonl" for job in jobs}
@@ -174,7 +175,7 @@ class Watch:
         self.total = sum(job.config.training.iterations - self._seen[job.name] for job in jobs)
 
     def progress(self) -> int:
-        """Iterations since the last call; a run that was set back to its checkpoint counts again."""
+        """Iterations since the last call; iterations repeated after a checkpoint count again."""
         found = {name: last_iteration(log) for name, log in self._logs.items()}
         steps = sum(found[name] - seen for name, seen in self._seen.items())
         self._seen = found
