@@ -8,13 +8,12 @@
     run.save("runs/mine")
     run = endotsr.open_run("runs/mine")
 
-Every function calls the code that the command of the same purpose calls, so that the numbers are the same, bit for
-bit: `train` gives those of `endotsr train`, `Run.render` those of `endotsr render`, `Run.evaluate` those of
-`endotsr evaluate`. The commands read a run folder that `Run.save` writes, and `open_run` reads one that a command
-writes.
+Functions and commands share their code and give bitwise equal results: `train` and `endotsr train`, `Run.render` and
+`endotsr render`, `Run.evaluate` and `endotsr evaluate`. They also share run folders: the commands read those of
+`Run.save`, and `open_run` reads those of the commands.
 
-Import the names from `endotsr` itself; `endotsr.__all__` lists those that are stable. Input that cannot be used raises
-an `InputError` that names the argument and the allowed values.
+Import the names from `endotsr`; `endotsr.__all__` lists the stable ones. Invalid input raises an `InputError` that
+names the argument and the allowed values.
 """
 
 import shutil
@@ -65,12 +64,12 @@ OnMessage = Callable[[str], object]
 
 
 class StopTraining(Exception):
-    """Raised by a callback, `on_iteration` or `on_run`: the training ends after this iteration; the run is returned."""
+    """Raise it in `on_iteration` or `on_run` to end the training after this iteration; `train` returns the run."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedSequence(Sequence):
-    """A sequence of `load_sequence`, with the source and the settings that a run folder records."""
+    """A sequence from `load_sequence`, with its source and settings for the record of a run."""
 
     source: str = sources.IN_MEMORY  # folder, or `simulated`
     settings: SequenceConfig = PAPER.sequence
@@ -84,16 +83,16 @@ def make_config(
     iterations: int | None = None,
     **sections: Mapping[str, Any],
 ) -> Config:
-    """All settings of a run: preset, then TOML file, then `iterations`, then the sections.
+    """All settings of a run. Later sources override earlier ones: preset, TOML file, `iterations`, sections.
 
-    preset       paper (default), sharp or demo
+    preset       a name in `endotsr.config.PRESETS`; default: paper
     file         TOML file, as `endotsr train --config`
-    iterations   exact length of the run; every milestone keeps its fraction of the run. training={"iterations": n}
-                 changes the length and leaves the milestones where they are. training={"visits_per_frame": v} makes a
-                 run with more than n / v training frames longer
+    iterations   exact length of the run; milestones keep their fraction of the run. training={"iterations": n} changes
+                 the length but not the milestones. training={"visits_per_frame": v} lengthens a run with more than
+                 n / v training frames
     sections     changes by section: model={"appearance": False}, training={"seed": 3, "threads": 2}
 
-    Raises: InputError naming the file or the key, the value and what is allowed.
+    Raises: InputError naming the file or the key, the value and the allowed values.
     """
     data = read_toml(Path(file)) if file is not None else {}
     if preset is not None:
@@ -108,17 +107,17 @@ def load_sequence(
     simulator: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> LoadedSequence:
-    """The whole sequence in memory, fully checked.
+    """The complete sequence in memory, checked.
 
     source      sequence folder, or the word "simulated"
-    config      settings to start from (section `sequence`, and the near plane); default: preset `paper`
+    config      initial settings (section `sequence` and the near plane are used); default: preset `paper`
     simulator   settings of "simulated": {"frames": 16, "width": 96, "pull": {"on": False}}
-    settings    keys of the section `sequence`: scale=0.5, frames="0:60", masks="gt_masks", split="blocks"
+    settings    keys of section `sequence`: scale=0.5, frames="0:60", masks="gt_masks", split="blocks"
 
     returns     images (n, 3, H, W) uint8; masks (n, H, W), True = tissue; depth (n, H, W) in scene units, 0 = none;
-                times (n,) in [0, 1); cameras, split, and notes that state what was assumed
+                times (n,) in [0, 1); cameras, split, and notes on assumptions
 
-    Raises: InputError naming the file, the frame or the key, and what is allowed.
+    Raises: InputError naming the file, the frame or the key, and the allowed values.
     """
     config = _changed(PAPER if config is None else config, None, {"sequence": settings})
     wanted = dict(simulator or {})
@@ -141,23 +140,23 @@ def train(
     effects: Literal["everything", "auto"] = "everything",
     **sections: Mapping[str, Any],
 ) -> "Run":
-    """Train on a sequence; returns the trained run. The numbers are those of `endotsr train` with these settings.
+    """Train on a sequence; returns the trained run. Bitwise equal to `endotsr train` with these settings.
 
-    sequence       from `load_sequence`, whose settings apply; or a `Sequence` made of arrays
-    config         from `make_config`; without it, preset, iterations and sections make the settings as there.
-                   With it, iterations and sections are applied on top of it
-    on_iteration   called after every iteration with its log entry: iteration, frame, loss, the terms of the loss,
-                   gaussians, seconds, and every tenth time psnr. `raise StopTraining` in it ends the training. What it
-                   returns is ignored
-    on_run         called after it with the run, whose `model` and `render` are those of this iteration. Its arrays
-                   change with the next one: copy what is kept, and write to none of them
-    on_message     called with a line when kernels are compiled or the weight of equation (7) is calibrated
-    effects        "auto" trains only what the clip needs, as `train --effects auto`; keys in `sections` stay
+    sequence       from `load_sequence`, with its settings; or a `Sequence` of arrays
+    config         from `make_config`; iterations and sections are applied to it. Without it, the settings are
+                   make_config(preset, iterations=iterations, **sections)
+    on_iteration   called after every iteration with its log entry: iteration, frame, loss, terms of the loss,
+                   gaussians, seconds, and every tenth iteration psnr. May raise StopTraining. Its result is ignored
+    on_run         called next, with the run at this iteration, to use its `model` or `render`. The next iteration
+                   changes the arrays in place: copy those to keep, and do not modify them
+    on_message     called with a line of text when kernels are compiled or equation (7) is calibrated
+    effects        "auto" trains only the components that the clip needs, as `train --effects auto`; keys in `sections`
+                   take precedence
 
-    The number of kernel threads of the calling thread is set to `training.threads` (0 = all cores).
-    A KeyboardInterrupt ends the training at once, without a run; `StopTraining` keeps it.
-    Raises: InputError for settings or a sequence that cannot be used; FloatingPointError naming iteration, frame and
-            terms if the loss is not finite; CalibrationError if equation (7) has no answer.
+    Sets the number of kernel threads of the calling thread to `training.threads` (0 = all cores).
+    A KeyboardInterrupt ends the training without a run; use `StopTraining` to keep it.
+    Raises: InputError for invalid settings or an unusable sequence; FloatingPointError naming iteration, frame and
+            terms if the loss is not finite; CalibrationError if equation (7) has no solution.
     """
     from endotsr.fitting.state import new_training
     from endotsr.kernels.threads import use_threads
@@ -187,7 +186,7 @@ def train(
 def _called_for(
     sequence: Sequence, config: Config, effects: str, sections: Mapping[str, Mapping[str, Any]], say: OnMessage
 ) -> tuple[Config, RunRecord]:
-    """The settings that the clip calls for, and verdicts and plan for the record; with "everything", as they are."""
+    """The settings for the effects found in the clip, with verdicts and plan for the record; unchanged by default."""
     if effects not in ("everything", "auto"):
         raise InputError(f"train: effects = {effects!r} is not allowed; allowed: everything, auto")
     if effects == "everything":
@@ -202,13 +201,13 @@ def _called_for(
 
 
 def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: float | None = None) -> dict[str, Any]:
-    """What a clip shows and which components it calls for, as `endotsr inspect --json` writes it.
+    """The effects found in a clip and the components that it needs, as written by `endotsr inspect --json`.
 
-    config       settings that the plan is relative to; default: preset `paper`
-    frame_rate   frames per second; default: those of the sequence. If known, rates are also given per minute
+    config       settings to which the plan applies; default: preset `paper`
+    frame_rate   frames per second; default: that of the sequence. If known, rates are also given per minute
 
     returns      "noise", "verdicts" by effect (present, kind, statistic, threshold, reason, ...), "rates", and "plan"
-                 with its changes, their reasons and the expected savings
+                 with changes, reasons and expected savings
 
     Raises: InputError for a frame rate that is not positive and finite.
     """
@@ -220,13 +219,13 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
 
 
 def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | WindowedRun":
-    """The run of a run folder at its latest checkpoint, whether a command or `Run.save` wrote it.
+    """A run at its latest checkpoint, from a folder of a command or of `Run.save`.
 
-    A folder of `endotsr train --windows` gives a `WindowedRun`, which renders and evaluates as a `Run` does.
+    A folder of `endotsr train --windows` is opened as a `WindowedRun`, which renders and evaluates like a `Run`.
 
-    sequence   current location of the sequence of the run; default: the recorded location. It is read at first use
+    sequence   current location of the run's sequence, read on first use; default: the recorded location
 
-    Raises: InputError if there is no run or no checkpoint, or if a file is damaged or of other settings.
+    Raises: InputError without a run or checkpoint, or if a file is damaged or has other settings.
     """
     from endotsr.windows.record import is_windowed
     from endotsr.windows.run import WindowedRun
@@ -242,15 +241,15 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | Win
 
 @dataclass(eq=False, repr=False)
 class Run:
-    """A model with its settings, its log and the sequence it was trained on. Made by `train` and `open_run`."""
+    """A model with its settings, log and training sequence, from `train` or `open_run`."""
 
     config: Config  # all settings
-    record: RunRecord  # what run.json holds: versions, machine, input hashes, status, seconds
+    record: RunRecord  # run.json: versions, machine, input hashes, status, seconds
     sequence_record: SequenceRecord  # sequence.json: times, names, split, cameras
-    log: list[LogEntry]  # one entry an iteration, as the lines of log.jsonl
-    model: Model  # Gaussians, spectral constants, settings and iteration: all that rendering reads
-    _source: str  # where the sequence is; "" = where the record says
-    _folder: run_folders.RunFolder | None = None  # of an opened run: what the next two are read from at their first use
+    log: list[LogEntry]  # one entry per iteration, as in log.jsonl
+    model: Model  # Gaussians, spectral constants, settings and iteration
+    _source: str  # location of the sequence; "" = as recorded
+    _folder: run_folders.RunFolder | None = None  # of an opened run; the next two are read from it on first use
     _sequence: Sequence | None = None
     _state: "TrainingState | None" = None
 
@@ -265,9 +264,9 @@ class Run:
 
     @property
     def sequence(self) -> Sequence:
-        """The sequence the run was trained on. An opened run reads it at the first access.
+        """The training sequence. An opened run reads it on first access.
 
-        Raises: InputError if it cannot be found or is not the one that the run was trained on.
+        Raises: InputError if it is missing or differs from the recorded one.
         """
         if self._sequence is None:
             assert self._folder is not None
@@ -280,8 +279,8 @@ class Run:
         """Colour (3, H, W) in display units, depth (H, W) in scene units and opacity (H, W) in [0, 1].
 
         time      normalised, in [0, 1]; frame i of n is at i / n
-        camera    a Camera, or the number of the frame whose camera is meant; default: the frame nearest in time
-        without   spectral components to leave out of the picture: "appearance", "spectral_motion"
+        camera    a Camera, or the number of a frame to use its camera; default: the nearest frame in time
+        without   spectral components to leave out: "appearance", "spectral_motion"
 
         Depth is view-space z, not normalised by opacity. Colour is not clipped to [0, 1].
         Raises: InputError for a time, frame or component that does not exist.
@@ -297,14 +296,14 @@ class Run:
         rate: float | None = None,
         slow: float | None = None,
     ) -> Path:
-        """Write a film, as `endotsr render --film`; returns its path. .mp4 holds H.264, .webm VP9; or .gif.
+        """Write a film, .mp4 (H.264), .webm (VP9) or .gif, as `endotsr render --film`; returns its path.
 
-        count    number of pictures, evenly spaced over the clip; default: the frames
-        camera   "observed", "orbit", "sway", the number of a frame, or a file of cameras
-        rate     pictures per second; default: the speed of the recording, 15 if it is unknown
-        slow     instead of `rate`: the film takes this many times as long as the recording
+        count    number of evenly spaced pictures; default: one per frame
+        camera   "observed", "orbit", "sway", the number of a frame, or a camera file
+        rate     pictures per second; default: real time, or 15 if the frame rate is unknown
+        slow     slow-down relative to the recording, instead of `rate`
 
-        Raises: InputError for a name, rate, count or camera that is not allowed.
+        Raises: InputError for an invalid name, rate, count or camera.
         """
         from endotsr.export.times import Times
         from endotsr.views import film, pictures
@@ -318,9 +317,9 @@ class Run:
         return path
 
     def view(self, path: str | Path) -> Path:
-        """Write the page that plays and turns the scene in a browser, as `endotsr export`; returns its path.
+        """Write the interactive viewer page, as `endotsr export --out PAGE.html`; returns its path.
 
-        Raises: InputError for a name that is not that of a page.
+        Raises: InputError if `path` is no .html name.
         """
         from endotsr.views.page import KEYS, check_page, write_page
 
@@ -330,12 +329,12 @@ class Run:
         return path
 
     def export(self, path: str | Path, *, times: tuple[float, ...] = ()) -> str:
-        """Write Gaussians for other programs, as `endotsr export`; returns a line on what was written.
+        """Write files for other programs, as `endotsr export`; returns one line on the result.
 
-        path    .ply of one time, .glb with points that move, .npz of the whole scene, or a folder to create
+        path    .ply (one time), .glb (animated points), .npz (slim model), or a folder of .ply files to create
         times   normalised, in [0, 1]
 
-        Raises: InputError for a name or a time that is not allowed.
+        Raises: InputError for an invalid name or time.
         """
         from endotsr.export.files import GAUSSIANS, export
         from endotsr.export.times import Times
@@ -343,11 +342,11 @@ class Run:
         return export(self._scene(), Path(path), Times(tuple(times)), GAUSSIANS)
 
     def evaluate(self, *, lpips: str | Path | None = None) -> "EvaluationRecord":
-        """Metrics of the held-out frames beside those of training frames and of baselines that need no model.
+        """Metrics of the held-out frames, of training frames, and of baselines without a model.
 
-        lpips     AlexNet LPIPS weights (.npz); without them the LPIPS values are None
-        returns   the keys of metrics.json that `measure_model` lists. For example
-                  result["held_out"]["mean"]["psnr_tissue"], in dB; a metric without a finite value is None
+        lpips     AlexNet LPIPS weights (.npz); without them LPIPS is None
+        returns   the keys of metrics.json listed in `measure_model`, for example
+                  result["held_out"]["mean"]["psnr_tissue"] in dB; a metric without a finite value is None
 
         Raises: InputError if the sequence or the weights cannot be used.
         """
@@ -363,9 +362,9 @@ class Run:
     def resume(
         self, on_iteration: OnIteration | None = None, on_message: OnMessage = print, on_run: OnRun | None = None
     ) -> "Run":
-        """Train on to the planned number of iterations; returns this run. A finished run stays as it is.
+        """Continue the training to the planned number of iterations; returns this run. No effect on a finished run.
 
-        The result is that of an uninterrupted training, bit for bit. Callbacks and errors are those of `train`.
+        The result is bitwise equal to an uninterrupted training. Callbacks and errors as in `train`.
         """
         from endotsr.fitting.compile_ahead import compile_ahead
         from endotsr.fitting.trainer import train as train_to_the_end
@@ -404,11 +403,11 @@ class Run:
         return self
 
     def save(self, path: str | Path) -> Path:
-        """Write a run folder that `open_run` and the commands read; returns its path.
+        """Write a run folder for `open_run` and the commands; returns its path.
 
-        The folder holds the settings, the log, the checkpoint and the records. `endotsr evaluate` adds the metrics, the
-        renders and the report to it, and `endotsr train --resume` continues it.
-        Raises: InputError if something exists at `path` or the file system refuses.
+        The folder contains settings, log, checkpoint and records. `endotsr evaluate` adds metrics, renders and report;
+        `endotsr train --resume` continues the run.
+        Raises: InputError if `path` exists or on an error of the file system.
         """
         state = self._training()
         folder = run_folders.create_run(Path(path), self.config, self.record, self.sequence_record)
@@ -424,7 +423,7 @@ class Run:
         return folder.path
 
     def _scene(self) -> "MovingScene":
-        """What renders, and what the writers of films and files take."""
+        """The scene for renders, films and exports."""
         from endotsr.export.scene import MovingScene
 
         return MovingScene(self.sequence_record, self.model)
@@ -448,7 +447,7 @@ class Run:
 
 
 def _model_of(state: "TrainingState", config: Config, record: SequenceRecord) -> Model:
-    """The model of a state; `record` is that of the sequence."""
+    """The model of a training state; `record` belongs to the sequence."""
     from endotsr.fitting.model import spectral_from
 
     spectral = spectral_from(config.model, record.train_times)
@@ -456,7 +455,7 @@ def _model_of(state: "TrainingState", config: Config, record: SequenceRecord) ->
 
 
 def _changed(config: Config, iterations: int | None, sections: Mapping[str, Mapping[str, Any]]) -> Config:
-    """The settings with the schedule stretched to `iterations` and the sections changed, all checked."""
+    """The checked settings with the schedule stretched to `iterations` and the sections changed."""
     if iterations is not None:
         if isinstance(iterations, bool) or not isinstance(iterations, int) or iterations < 1:
             raise InputError(f"iterations = {iterations!r} is not allowed; allowed: an integer >= 1")
