@@ -44,7 +44,7 @@ def told(monkeypatch):
 
 def test_compilation_is_no_part_of_the_time_left(told):
     lines, _, end = told
-    assert lines[0].startswith("iteration 1 of 1600: ") and lines[0].endswith("time left not known yet")
+    assert lines[0].startswith("iteration 1 of 1600: ") and lines[0].endswith("time left unknown")
     assert lines[1].startswith("iteration 9 of 1600: ")
     assert seconds(lines[1].rsplit(", ", 1)[1]) == pytest.approx(end - 220, rel=0.05)
 
@@ -52,7 +52,7 @@ def test_compilation_is_no_part_of_the_time_left(told):
 def test_the_forecast_knows_that_the_gaussians_will_grow(told):
     _, out, end = told
     assert len(out) == 1
-    assert out[0].endswith("of training from here, about 22000 Gaussians at its end")
+    assert out[0].endswith("of training left, about 22000 Gaussians at the end")
     left = seconds(out[0].removeprefix("forecast: ").split(" of ")[0])
     assert left == pytest.approx(end - 220, rel=0.05)
     first = 0.1 * iteration_work(16_000, PIXELS, 0.0)

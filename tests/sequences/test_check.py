@@ -369,7 +369,7 @@ def test_the_command_writes_json_and_a_page(sequence, tmp_path, capsys):
     write_endonerf(sequence, tmp_path / "clip")
     files = [str(tmp_path / "a.json"), str(tmp_path / "a.html")]
     assert main(["check", str(tmp_path / "clip"), "--json", files[0], "--html", files[1]]) == 0
-    assert "can be trained on" in capsys.readouterr().out
+    assert "ready for training" in capsys.readouterr().out
     each(tmp_path / "clip", "images", lambda x: x * 0, [3])
     cut(tmp_path / "clip/masks/000002.png")
     assert main(["check", str(tmp_path / "clip"), "--json", files[0], "--html", files[1]]) == 1

@@ -378,7 +378,7 @@ def test_a_pair_without_a_baseline_is_told_which_number_is_missing(tmp_path, cap
             write_png(tmp_path / "clip" / side / f"{i}.png", scene_picture(i))
     words = ["--camera", *map(str, CAMERA)]
     assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 0
-    assert "next: state the distance of the two cameras, [camera] baseline" in capsys.readouterr().out
+    assert "next: set the baseline of the two cameras, [camera] baseline" in capsys.readouterr().out
     with pytest.raises(InputError, match="once \\[camera\\] baseline, the distance of the two cameras"):
         read_sequence(tmp_path / "o", WHOLE, 0.2)
     assert main(["depth", str(tmp_path / "o")]) == 2 and "allowed: the distance of the two" in capsys.readouterr().err

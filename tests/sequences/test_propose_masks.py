@@ -131,7 +131,7 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
     text = (clip / FILE_NAME).read_text().replace("width = 32", "width = 160").replace("height = 24", "height = 128")
     (clip / FILE_NAME).write_text(text)
     assert len(pictures) == FRAMES and main(["masks", str(clip)]) == 0
-    assert "look at" in capsys.readouterr().out and (clip / "proposed_masks.png").is_file()
+    assert "inspect " in capsys.readouterr().out and (clip / "proposed_masks.png").is_file()
     found = read_sequence_file(clip)
     assert found.masks is not None and found.masks.proposed and found.masks.excluded_value == "white"
     sequence = read_common(clip, SequenceConfig(), 0.2)

@@ -94,7 +94,7 @@ def test_a_frame_without_points_takes_the_line_of_its_neighbour(tmp_path, capsys
 def test_without_depth_the_shape_has_the_assumed_ratio_and_every_output_says_so(tmp_path, capsys):
     where, files = clip(tmp_path, lambda i: 1800 / true_depth(i) - 3)
     assert given(where, files, "--farthest-over-nearest", "2") == 0
-    assert "not metric, scale and shift of the depth assumed" in capsys.readouterr().out
+    assert "not metric (scale and shift of the depth assumed)" in capsys.readouterr().out
     read = open_common(where).depth
     planes = np.stack([read(i) for i in range(FRAMES)])
     assert planes.min() == 1 and planes.max() == 2  # the assumed ratio

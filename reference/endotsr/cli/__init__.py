@@ -1,5 +1,5 @@
-"""One module a command, each with `run(argv) -> exit code`. Heavy imports stay inside the functions.
+"""One module per command, each with `run(argv) -> exit code`. Heavy imports are inside functions.
 
-In: the words after the command. Out: files, a table on standard output, an exit code.
-There is no mathematics here: a command reads its options, calls the packages in order and reports the result.
+In: the words after the command. Out: files, text on standard output, an exit code. A command only reads its options,
+calls the other rooms and reports the result.
 """

@@ -1,4 +1,4 @@
-"""`endotsr ablate`: the components of the method on and off, over seeds, with paired differences."""
+"""`endotsr ablate`: components of the method on and off, over several seeds, with paired differences."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class AblateOptions:
-    """Train the configurations base, A, S, L, A+S, A+S+L and S without its prior on every SEQUENCE, over seeds.
+    """Train the configurations base, A, S, L, A+S, A+S+L and S without its prior on every SEQUENCE and seed.
 
-    Each difference between two configurations is paired by sequence and seed, with mean, median and intervals.
-    With --fixed-count all are also trained from one checkpoint of the base without density control, so that the numbers
-    of Gaussians are equal. The command continues where it was interrupted, as `endotsr sweep` does.
+    Differences between configurations are paired by sequence and seed, with mean, median and intervals. With
+    --fixed-count, every configuration is also trained from the same checkpoint of the base without density control,
+    that is, with the same number of Gaussians. An interrupted command continues when repeated, as `endotsr sweep`.
     """
 
     sequences: Annotated[tuple[str, ...], Option("SEQUENCE", positional=True)]
@@ -30,7 +30,7 @@ class AblateOptions:
     out: Annotated[Path, Option("DIR")]
     """folder of the sweep"""
     seeds: Annotated[int, Option("N")] = 3
-    """number of seeds, from 0"""
+    """number of seeds, starting at 0"""
     preset: Preset = "paper"
     """settings of every run"""
     iterations: Annotated[int | None, Option("N")] = None
@@ -38,7 +38,7 @@ class AblateOptions:
     scale: float = 1.0
     """image scale"""
     splits: Annotated[tuple[str, ...], Option("SPLIT")] = ("every_eighth",)
-    """held-out frames: every_eighth, every_second, "blocks N", "end N"; several may be given"""
+    """held-out frames, one or more of every_eighth, every_second, "blocks N", "end N\""""
     configurations: Annotated[tuple[str, ...], Option("NAME")] = ()
     """only these configurations (default: all seven)"""
     fixed_count: bool = True
@@ -48,19 +48,19 @@ class AblateOptions:
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights"""
     keep_checkpoints: bool = False
-    """keep the model of every run (hundreds of megabytes each at full size)"""
+    """keep the model of every run (several hundred megabytes each at full size)"""
     collect: bool = False
     """write the results of finished runs without training"""
     json: JsonFile = None
     """also write the results to this file"""
     workers: Annotated[int | None, Option("N")] = None
-    """runs at a time (default: as many as cores and free memory allow)"""
+    """concurrent runs (default: as many as cores and free memory allow)"""
     threads: Annotated[int | None, Option("N")] = None
-    """threads of each run (default: the cores divided by the runs)"""
+    """threads per run (default: the cores divided by the runs)"""
     scheduler: Annotated[str | None, Option("ADDRESS")] = None
     """send the runs to the workers of this Dask scheduler"""
     retry: bool = False
-    """also repeat the runs that failed before"""
+    """repeat failed runs"""
 
 
 def run(words: list[str]) -> int:
@@ -74,7 +74,7 @@ def run(words: list[str]) -> int:
     place = Place(options.workers, options.threads, options.scheduler)
     check_place("ablate", place)
     spec = spec_of(spec_data(options), "ablate", Path.cwd())
-    records: list[AblationRecord] = []  # the latest, once there are rows
+    records: list[AblationRecord] = []  # the latest record
     command = ["endotsr", "ablate", *map(without_folders, words)]
 
     def on_rows(rows: "Rows") -> None:
@@ -97,14 +97,14 @@ def run(words: list[str]) -> int:
 
 
 def without_folders(word: str) -> str:
-    """A word of the command as results store it: a path shrinks to its last name, as results are passed on."""
+    """A word of the command for the record: a path is reduced to its last name, because records are published."""
     head, equals, value = word.rpartition("=")
     path = Path(value)
     return f"{head}{equals}{path.name}" if path.is_absolute() or path.exists() else word
 
 
 def spec_data(options: AblateOptions) -> dict[str, Any]:
-    """The sweep of the options, as a SPEC.toml would hold it. Raises InputError for what is not allowed."""
+    """The sweep for the options, in the form of a SPEC.toml. Raises InputError for invalid options."""
     from endotsr.sweeps.ablation import CONFIGURATIONS, ablation_spec
 
     if options.seeds < 1:

@@ -1,4 +1,4 @@
-"""`endotsr bench`: the time of each stage of a training iteration on this machine, beside its lower limit."""
+"""`endotsr bench`: the time of each stage of a training iteration on this machine, with its lower bound."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,28 +16,28 @@ LEAST = {"gaussians": 4, "repeats": 1, "width": 16, "height": 16, "threads": 1}
 
 @dataclass
 class BenchOptions:
-    """Time every stage of a training iteration and its limit from the measured peaks of this machine.
+    """Time every stage of a training iteration, with a lower bound from the measured peaks of this machine.
 
-    The iteration is one of the published schedule at which everything is active, on a common workload or on trained
+    The iteration is one of the published schedule with all components active, on a standard workload or on trained
     --scenes. Every combination of size, precision and threads is measured in a separate process.
     """
 
     gaussians: Annotated[tuple[int, ...], Option("INT ...", may_be_empty=True)] = (60_000,)
-    """numbers of Gaussians of the common workload; may be empty with --scenes"""
+    """numbers of Gaussians of the standard workload; may be empty with --scenes"""
     scenes: Annotated[tuple[Path, ...], Option("FILE ...")] = ()
-    """trained scenes (npz of `endotsr export`) to time as well"""
+    """trained scenes to time too: npz with xyz, log_scale, quat_wxyz, rgb, opacity"""
     precisions: tuple[Precision, ...] = ("float32",)
     """arithmetic: float32, float64"""
     threads: tuple[int, ...] = (2,)
     """numbers of threads"""
     width: int = 640
-    """columns of the picture"""
+    """width of the picture, pixels"""
     height: int = 512
-    """rows of the picture"""
+    """height of the picture, pixels"""
     repeats: int = 11
     """timed iterations per case"""
     json: JsonFile = None
-    """also write the figures as JSON"""
+    """also write the results as JSON"""
 
 
 def run(words: list[str]) -> int:
@@ -64,12 +64,12 @@ def _refuse(options: BenchOptions) -> None:
                 raise InputError(f"bench: --{name} {value} is not allowed; allowed: an integer >= {least}")
     if not options.gaussians and not options.scenes:
         raise InputError(
-            "bench: --gaussians is empty, which leaves nothing to time; allowed: one or more, or none with --scenes"
+            "bench: --gaussians is empty and there are no --scenes; allowed: one or more numbers, or --scenes"
         )
 
 
 def cases_of(options: BenchOptions) -> list[BenchCase]:
-    """Every combination of scene, precision and threads; the common workload comes first, grouped by size."""
+    """Every combination of scene, precision and threads, the standard workload first."""
     base = BenchCase(width=options.width, height=options.height, repeats=options.repeats)
     scenes = [replace(base, gaussians=n) for n in options.gaussians]
     scenes += [replace(base, scene=str(path)) for path in options.scenes]

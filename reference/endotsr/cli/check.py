@@ -1,4 +1,4 @@
-"""`endotsr check`: everything that is wrong with a sequence, in one pass."""
+"""`endotsr check`: all faults of a sequence, in one pass."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +13,9 @@ from endotsr.errors import InputError
 
 @dataclass
 class CheckOptions:
-    """Check a sequence before a training: every finding with file, frame, reason and remedy.
+    """Check a sequence before training: every finding with file, frame, reason and remedy.
 
-    Exit code 0: a training accepts the sequence; 1: it refuses it.
+    Exit code 0: the sequence is ready for training; 1: it is refused.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
@@ -44,11 +44,11 @@ def run(words: list[str]) -> int:
     cost = checked.facts.get("cost")
     if cost:
         print(
-            f"{checked.facts['frames']} frames of {checked.facts['width']}x{checked.facts['height']}: a training needs"
+            f"{checked.facts['frames']} frames of {checked.facts['width']}x{checked.facts['height']}: training needs"
             f" about {cost['total_bytes'] / 1e9:.1f} GB and {cost['minutes']:.0f} minutes on two cores,"
-            f" with about {cost['gaussians']} Gaussians at the end"
+            f" and ends with about {cost['gaussians']} Gaussians"
         )
-    print(f"{options.sequence}: {'refused' if checked.refused else 'can be trained on'}")
+    print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")
     if options.json is not None:
         findings = [finding._asdict() for finding in checked.findings]
         write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})

@@ -24,9 +24,9 @@ class DemoOptions:
     iterations: Annotated[int, Option("N")] = DEMO.training.iterations
     """exact length of the run; stretches the schedule"""
     scale: float = 1.0
-    """size of the simulated pictures; 1 = 160x128"""
+    """scale of the simulated pictures; 1 = 160x128"""
     seed: int = 0
-    """seed of every random draw"""
+    """random seed"""
     threads: int = 0
     """threads, 0 = all cores"""
     json: JsonFile = None

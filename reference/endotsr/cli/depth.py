@@ -1,4 +1,4 @@
-"""`endotsr depth`: depth of a sequence, from its stereo pairs or from files of another program."""
+"""`endotsr depth`: depth of a sequence, from its stereo pairs or from another program."""
 
 import sys
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from endotsr.errors import InputError
 from endotsr.sequences.stereo_depth import StereoSettings
 
 STEREO = StereoSettings()
-LARGEST_RATIO = 100.0  # of the farthest tissue over the nearest
+LARGEST_RATIO = 100.0  # farthest to nearest tissue
 
 if TYPE_CHECKING:
     from endotsr.sequences.make_depth import DepthReport
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class DepthOptions:
-    """Make the depth of a folder that `endotsr prepare` wrote.
+    """Add depth to a folder that `endotsr prepare` wrote.
 
-    From the stereo pairs: semi-global matching, a check of left against right, and edge-preserving smoothing. Pixels
-    without a reliable match stay without depth. --given reads the files of another program instead.
+    Stereo pairs are matched by semi-global matching with a left-right consistency check and edge-preserving smoothing.
+    Pixels without a reliable match get no depth. --given reads the files of another program instead.
 
-    For a clip from one camera there are two ways. --kind relative reads the inverse depth of a monocular network, whose
+    For a monocular clip there are two options. --kind relative reads the inverse depth of a monocular network; its
     scale and shift are fitted to existing depth (points of a reconstruction) or assumed. --flat needs no files: it
-    assumes a plane that faces the camera. With assumed values, lengths and other viewpoints are not measurements.
+    assumes a plane parallel to the image. With assumed values, lengths and other viewpoints are not metric.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
@@ -37,15 +37,15 @@ class DepthOptions:
     kind: Literal["disparity", "depth", "relative"] = "disparity"
     """content of these files: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
     align: Literal["auto", "frame", "sequence"] = "auto"
-    """of relative: fit scale and shift in each frame, or once (auto: each frame where the clip has depth)"""
+    """with --kind relative: fit scale and shift per frame, or once (auto: per frame if the clip has depth)"""
     farthest_over_nearest: float = 3.0
-    """of relative, without reference depth: assumed ratio of the farthest to the nearest tissue"""
+    """with --kind relative and no reference depth: assumed ratio of the farthest to the nearest tissue"""
     trust_depth: bool = False
-    """of relative: take the numbers even if they are large where the pictures are dark"""
+    """with --kind relative: accept values that are large at dark pixels"""
     flat: bool = False
-    """a plane that faces the camera, for a clip without any depth"""
+    """assume a plane parallel to the image, for a clip without any depth"""
     unit_scale: float = 1.0
-    """length (or pixels of disparity) of one step of the stored numbers, in millimetres"""
+    """millimetres (or pixels of disparity) per unit of the stored values"""
     stereo: Annotated[StereoSettings, Option(flat=True)] = STEREO
     replace: bool = False
     """replace existing depth"""
@@ -72,14 +72,14 @@ def run(words: list[str]) -> int:
     if report.file.depth.method.startswith(("relative", "assumed")):
         print(f"  {report.file.depth.method}")
     if report.file.depth.assumed:
-        print(f"not metric, {report.file.depth.assumed} of the depth assumed: {KINDS['assumed-depth'].why}")
+        print(f"not metric ({report.file.depth.assumed} of the depth assumed): {KINDS['assumed-depth'].why}")
     print(f"next: endotsr train {options.sequence} --out RUN")
     write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
     return 0
 
 
 def _refuse_contradictions(options: DepthOptions) -> None:
-    """Raises InputError for options that exclude each other, and a ratio that is none."""
+    """Raises InputError for options that exclude each other, and for an invalid ratio."""
     if options.flat and options.given is not None:
         raise InputError("--flat reads no files; allowed: --flat or --given")
     if options.kind == "relative" and options.given is None:
@@ -92,7 +92,7 @@ def _refuse_contradictions(options: DepthOptions) -> None:
 
 
 def _made(options: DepthOptions) -> "DepthReport":
-    """Depth of another program, or that of the stereo pairs."""
+    """Compute or read the depth and write it."""
     from endotsr.sequences.common import list_contents
     from endotsr.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
     from endotsr.sequences.relative_depth import flat_depth
@@ -111,6 +111,6 @@ def _made(options: DepthOptions) -> "DepthReport":
 
 
 def _said(done: int, total: int) -> None:
-    """A line that counts on a terminal; a pipe or a file gets none."""
+    """Show a counter on a terminal; nothing for a pipe or a file."""
     if sys.stdout.isatty():
         print(f"\rframe {done} of {total}", end="\n" if done == total else "", flush=True)

@@ -1,4 +1,4 @@
-"""`endotsr evaluate`: the held-out metrics of a run or of any pictures beside baselines, and of several methods."""
+"""`endotsr evaluate`: held-out metrics of a run, or of any pictures, with baselines; comparison of methods."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -25,7 +25,7 @@ def run(words: list[str]) -> int:
     if len(options.methods) > 1 or options.compare:
         return _compare(options)
     if options.pictures and options.measures:
-        raise InputError("evaluate: --measures with --pictures is not allowed: they render views of a run")
+        raise InputError("evaluate: --measures with --pictures is not allowed: measures render views of a run")
     metrics = _pictures(options) if options.pictures else _run(options)
     if options.json:
         write_json(options.json, metrics)
@@ -35,7 +35,7 @@ def run(words: list[str]) -> int:
 
 
 def _compare(options: EvaluateOptions) -> int:
-    """The table of several methods."""
+    """Compare several methods."""
     if not options.methods:
         raise InputError("evaluate: METHOD is missing: run folders, JSON files or folders of pictures to compare")
     for name in ("pictures", "label", "measures"):
@@ -59,10 +59,10 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
         from endotsr.cli.parts.windows import evaluate_windows
 
         if options.measures:
-            raise InputError(f"evaluate: --measures is for a run without windows, not {options.run}")
+            raise InputError(f"evaluate: --measures with {options.run} is not allowed: it is a run of windows")
         return cast("EvaluationRecord", evaluate_windows(options.run, options.lpips, options.sequence))
     folder = open_run(options.run)
-    load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
+    load_model(folder)  # raises for a run without a usable checkpoint, before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)
     return evaluate_run(
         folder,
@@ -101,9 +101,9 @@ def evaluate_run(
 ) -> "RunEvaluation":
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
 
-    view       also write the viewer page that the report links to
+    view       also write the viewer page linked from the report
     measures   names of `evaluation.measures.MEASURES`
-    source     current place of the sequence; default: the recorded one
+    source     current location of the sequence; default: the recorded one
     """
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.measures import check_measures, measure_lines

@@ -1,4 +1,4 @@
-"""`endotsr export`: a trained scene as .ply files, a point cloud, one small file, or a page that plays it."""
+"""`endotsr export`: a trained scene as .ply files, a point cloud, a slim model, or an interactive page."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,16 +12,16 @@ from endotsr.errors import InputError
 
 @dataclass
 class ExportOptions:
-    """Write a scene for other programs, as a page that plays it, or as a slim model that `render` and `export` read.
+    """Write a scene for other programs, as an interactive page, or as a slim model for `render` and `export`.
 
-    SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows supports .ply files and a page, and each
-    of its windows all formats. The extension of --out selects the format: `.npz` is a slim model of the whole scene,
-    `.html` is a page with the moving scene, `.glb` holds moving points, `.ply` is one time of the scene, and a name
-    without an extension is a folder with one .ply file for every time.
+    SCENE is a run folder, a slim model, or a 3DGS .ply file. A run of windows can be written as .ply files and as a
+    page; each of its windows in all formats. The extension of --out selects the format: `.npz` is a slim model of the
+    whole scene, `.html` an interactive page, `.glb` animated points, `.ply` the scene at one time, and a name without
+    extension a folder with one .ply file per time.
 
-    The page needs no server, no network and no other file; a browser with WebGL 2 draws it. Positions and shapes are
-    stored at key times, between which the page interpolates; the colours are those seen by the observed camera. The
-    page of a run of windows loads the current window from a folder next to it.
+    The page needs a browser with WebGL 2, but no server, no network and no other file. It stores positions and shapes
+    at key times and interpolates between them; colours are those seen from the observed camera. The page of a run of
+    windows loads the current window from a folder next to it.
     """
 
     scene: Annotated[Path, Option("SCENE", positional=True)]
@@ -29,7 +29,7 @@ class ExportOptions:
     out: Annotated[Path, Option("FILE|DIR")]
     """FILE.ply, FILE.glb, FILE.npz, PAGE.html, or a folder to create"""
     content: Literal["gaussians", "points", "mesh"] = "gaussians"
-    """content of a .ply file: Gaussians as 3DGS viewers read them, centres with colours, or the visible surface"""
+    """content of a .ply file: Gaussians for 3DGS viewers, coloured centres, or the visible surface"""
     times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
     """normalised times in [0, 1]"""
     frames: Literal["test", "train", "all"] | None = None
@@ -37,19 +37,19 @@ class ExportOptions:
     count: Annotated[int | None, Option("N")] = None
     """number of times, evenly spaced over [0, 1], instead of --times"""
     opacity: float = 0.1
-    """minimum opacity of a Gaussian whose centre becomes a point"""
+    """with points: minimum opacity of a Gaussian"""
     voxel: float | None = None
-    """side of a voxel of a mesh, in scene units (default: 1.5 pixels at the median depth)"""
+    """with mesh: side of a voxel, scene units (default: 1.5 pixels at the median depth)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
     """components to omit"""
     keys: Annotated[int | None, Option("N")] = None
-    """of a page: largest number of key times, default 32 (a window: 16); more are smoother and make the page larger"""
+    """for a page: maximum number of key times, default 32 (16 per window); more make it smoother and larger"""
     title: str = ""
-    """of a page: its heading (default: the name of the scene)"""
+    """for a page: heading (default: the name of the scene)"""
     held_out: bool = True
-    """of a page: show the held-out frames and the error, if the sequence of the run is found"""
+    """for a page: show held-out frames and error; needs the sequence of the run"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """of a page: current location of the sequence of the run (default: the recorded one)"""
+    """for a page: current location of the sequence of the run (default: the recorded one)"""
     json: JsonFile = None
     """also write a record of the output as JSON"""
     threads: int = 0
@@ -70,12 +70,12 @@ def run(words: list[str]) -> int:
     content = Content(options.content, options.opacity, options.without, options.voxel)
     if options.out.suffix.lower() in (".html", ".htm"):
         if times.chosen or content != GAUSSIANS:
-            raise InputError(f"{options.out}: a page holds every time and the whole scene; allowed: --out alone")
+            raise InputError(f"{options.out}: a page contains all times and the whole scene; allowed: --out alone")
         _write_page(options)
         return 0
     for name, given in (("keys", options.keys), ("title", options.title), ("sequence", options.sequence)):
         if given:
-            raise InputError(f"export: --{name} belongs to a page; allowed: with --out PAGE.html")
+            raise InputError(f"export: --{name} applies to a page only; allowed: with --out PAGE.html")
     said = export(open_any(options.scene), options.out, times, content)
     print(said)
     files = sorted(options.out.iterdir()) if options.out.is_dir() else [options.out]
@@ -85,7 +85,7 @@ def run(words: list[str]) -> int:
 
 
 def _write_page(options: ExportOptions) -> None:
-    """The page with the moving scene."""
+    """Write the interactive page."""
     from endotsr.export.scene import open_scene
     from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import load_run_sequence
@@ -110,7 +110,7 @@ def _write_page(options: ExportOptions) -> None:
 
 
 def _write_windows_page(options: ExportOptions, title: str, keys: int) -> None:
-    """The page of a recording, and the folder of its windows."""
+    """Write the page of a run of windows, and the folder of its windows."""
     from endotsr.windows.page import window_files, write_windows_page
     from endotsr.windows.scene import WindowFrames, open_windows
 
@@ -118,8 +118,8 @@ def _write_windows_page(options: ExportOptions, title: str, keys: int) -> None:
     frames = WindowFrames(scene, options.sequence) if options.held_out else None
     found = write_windows_page(options.out, scene, title, keys, frames)
     print(
-        f"{options.out}: {found.page / 1e6:.1f} MB, and {folder}: {len(found.windows)} windows of at most"
-        f" {max(found.windows) / 1e6:.1f} MB, which belong together; open the page in a browser"
+        f"{options.out}: {found.page / 1e6:.1f} MB, with {folder}: {len(found.windows)} windows of at most"
+        f" {max(found.windows) / 1e6:.1f} MB; keep both together and open the page in a browser"
     )
     write_result(
         options.json,

@@ -1,4 +1,4 @@
-"""`endotsr golden`: the conformance target of ports: judge outputs, run a port, write the reference's own outputs."""
+"""`endotsr golden`: conformance tests for ports: judge outputs, run a port, write the reference's outputs."""
 
 import tempfile
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Level = Literal[0, 1, 2, 3, 4, 5]
 @dataclass
 class _Reported:
     precision: Literal["float32", "float64"] = "float32"
-    """precision that the port claims"""
+    """claimed precision of the port"""
     level: Level = 5
     """level to judge; exit code 0 if it is complete"""
     golden: Annotated[Path | None, Option("DIR")] = None
@@ -27,11 +27,11 @@ class _Reported:
     html: Annotated[Path | None, Option("FILE", written=True)] = None
     """also write the report as one HTML page with difference images"""
     only: Annotated[str, Option("FAMILY[/CASE]")] = ""
-    """judge this family or case alone; there is then no claim, and exit code 0 means that nothing was refused"""
+    """judge this family or case only; the report then makes no claim, and exit code 0 means that no case failed"""
     all: bool = False
-    """list the cases that passed, too, and leave nothing out"""
+    """list all cases, including those that passed"""
     search: Annotated[float, Option("SECONDS")] = 16.0
-    """seconds of computing that the search for the cause of a refusal may take; 0 leaves it out"""
+    """time limit of the search for the cause of a failure, seconds of computation; 0 = no search"""
 
 
 @dataclass
@@ -40,7 +40,7 @@ class JudgeOptions(_Reported):
 
     outdir: Outdir = Path()
     again: Annotated[Path | None, Option("DIR")] = None
-    """outputs of a second run: level 5 requires it, with the same bits"""
+    """outputs of a second run; level 5 requires them to be bitwise equal"""
 
 
 @dataclass
@@ -48,16 +48,16 @@ class RunOptions(_Reported):
     """Pass all requests to a port's command, then judge its outputs."""
 
     port: str = ""
-    """the command, with {requests} and {outputs} instead of the folders; called without a shell"""
+    """the command, with {requests} and {outputs} for the folders; called without a shell"""
     timeout: float = 600.0
-    """seconds allowed for one call"""
+    """time limit of a call, seconds"""
     keep: Annotated[Path | None, Option("DIR")] = None
-    """keep requests and outputs in this folder, instead of those of an earlier run"""
+    """keep requests and outputs in this folder; replaces those of an earlier run"""
 
 
 @dataclass
 class ReferenceOptions:
-    """Write the reference's own outputs; with --requests, as a port that reads the requests alone."""
+    """Write the reference's outputs; with --requests, computed from the requests only, like a port."""
 
     outdir: Outdir
     precision: Literal["float32", "float64"] = "float32"
@@ -65,7 +65,7 @@ class ReferenceOptions:
     json: JsonFile = None
     """also write the number of cases as JSON"""
     requests: Annotated[Path | None, Option("DIR")] = None
-    """answer this folder of requests"""
+    """folder of requests to answer"""
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
 
@@ -73,7 +73,7 @@ class ReferenceOptions:
 SUBCOMMANDS = {
     "judge": "judge a folder of outputs",
     "run": "call a port's command and judge its outputs",
-    "reference": "write the reference's own outputs in the same form",
+    "reference": "write the reference's outputs in the same format",
 }
 
 

@@ -1,4 +1,4 @@
-"""`endotsr gradcheck`: the table of all reverse passes against finite differences."""
+"""`endotsr gradcheck`: all reverse passes compared with finite differences."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +10,7 @@ from endotsr.cli.parts.parser import parse
 
 @dataclass
 class GradcheckOptions:
-    """Check reverse passes in float64 against finite differences; exit code 1 if one does not pass."""
+    """Compare reverse passes in float64 with finite differences; exit code 1 if a check fails."""
 
     names: Annotated[tuple[str, ...], Option("[NAME ...]", positional=True)] = ()
     """stages to check (default: all)"""

@@ -1,4 +1,4 @@
-"""`endotsr inspect`: what a clip shows, and which components it calls for."""
+"""`endotsr inspect`: the effects in a clip, and the components that it needs."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +20,8 @@ SHORT = ("sequence.scale", "sequence.frames", "sequence.masks")
 class InspectOptions:
     """Test the training frames of a sequence for every effect, and plan the components that the clip needs.
 
-    The plan is relative to the settings given here (preset, TOML file, options), as `endotsr train` would use them.
-    `endotsr train --effects auto` follows it.
+    The plan is a change of the settings given here (preset, TOML file, options). `endotsr train --effects auto`
+    applies it.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)]
@@ -31,9 +31,9 @@ class InspectOptions:
     json: JsonFile = None
     """write verdicts and plan as JSON"""
     frame_rate: Annotated[float | None, Option("FPS")] = None
-    """frames per second (default: those of the recording, if known); rates are then also given per minute"""
+    """frames per second, to give rates per minute too (default: the recording's frame rate, if known)"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
-    """settings to start from"""
+    """initial settings"""
     settings: Annotated[Config, Option(flat=True, short=SHORT)] = PAPER
 
 

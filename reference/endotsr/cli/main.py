@@ -1,8 +1,7 @@
-"""The command `endotsr`: selects the subcommand, imports it alone, and reports a user error in one line.
+"""The command `endotsr`: imports and runs one subcommand, and reports user errors in one line.
 
-Nothing heavy is imported here, so that `endotsr --help` prints at once. Exit codes: 0 done, 1 a check or comparison
-did not pass, 2 invalid input or usage, 130 interrupted (Ctrl-C or SIGTERM), 141 stopped because the pipe that reads its
-output was closed (128 + SIGPIPE, as other programs).
+No heavy imports here: `endotsr --help` starts quickly. Exit codes: 0 success, 1 a check or comparison failed, 2 invalid
+input or usage, 130 interrupted (Ctrl-C or SIGTERM), 141 output pipe closed (128 + SIGPIPE, like other programs).
 """
 
 import errno
@@ -18,8 +17,8 @@ from endotsr.errors import CalibrationError, InputError
 from endotsr.runs.stopping import signals_stop
 from endotsr.untrusted.names import plain_line
 
-OTHER_PROGRAMS = "end other programs that hold memory"
-LESS_MEMORY = {  # what a user of this command can do; every other command has no option that needs less
+OTHER_PROGRAMS = "close other programs"
+LESS_MEMORY = {  # advice by command; the other commands have no option that reduces memory
     "train": "a smaller --scale, fewer --frames or a smaller --density.maximum needs less; with --resume, "
     + OTHER_PROGRAMS,
     "demo": "a smaller --scale needs less",
@@ -31,7 +30,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run one command; `argv` without the program name. Returns the exit code."""
     argv = sys.argv[1:] if argv is None else argv
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal whose encoding lacks letters of a file name
+        sys.stdout.reconfigure(errors="backslashreplace")  # the terminal's encoding may lack letters of a file name
     try:
         output, words = split_output(argv)
         with saying(output):
@@ -46,7 +45,7 @@ def _main(words: list[str]) -> int:
     try:
         with signals_stop():
             code = _command(words[0])(words[1:])
-            print(end="", flush=True)  # a pipe that was closed is noticed here at the latest
+            print(end="", flush=True)  # raises for a closed pipe
             return code
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
@@ -60,7 +59,7 @@ def _main(words: list[str]) -> int:
         print(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}", file=sys.stderr)
         return 130
     except OSError as error:
-        if _is_closed_pipe(error):  # the pipe that reads the output was closed (`endotsr ... | head`)
+        if _is_closed_pipe(error):  # for example `endotsr ... | head`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 141
         from endotsr.runs.files import os_error_line
@@ -74,7 +73,7 @@ def _main(words: list[str]) -> int:
 
 
 def _answered(words: list[str]) -> bool:
-    """Whether the words ask for something beside a command, which is then printed. Raises InputError."""
+    """Print the answer to an option of `endotsr` itself; False if the words are a command. Raises InputError."""
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
     elif words[0] == "--version":
@@ -91,7 +90,7 @@ def _answered(words: list[str]) -> bool:
 
 
 def _is_closed_pipe(error: OSError) -> bool:
-    """On Windows a write to a pipe that was closed is an invalid argument, without the name of a file."""
+    """Whether an output pipe was closed. On Windows such a write is an invalid argument without a file name."""
     invalid = os.name == "nt" and error.errno == errno.EINVAL and error.filename is None
     return isinstance(error, BrokenPipeError) or invalid
 
@@ -108,7 +107,7 @@ def _command(name: str):
 
 
 def _completion(words: list[str]) -> str:
-    """The script that completes commands and options in a shell."""
+    """The completion script for a shell."""
     from endotsr.cli.parts.completion import SCRIPTS
 
     shell = "".join([words[0].partition("=")[2], *words[1:]])
@@ -128,17 +127,17 @@ def _overview() -> str:
         [
             "usage: endotsr COMMAND [OPTIONS]",
             "",
-            "Reconstructs moving tissue from endoscopic video, on the CPU: the reference implementation of Endo-TSR.",
+            "Reconstruct moving tissue from endoscopic video on the CPU: the reference implementation of Endo-TSR.",
             "",
             "commands:",
             *(f"  {name:<{width}}  {summary}" for name, summary in COMMANDS.items()),
             "",
             "options:",
-            "  -h, --help   this overview; `endotsr COMMAND --help` lists the options of a command",
-            "  --version    the version",
-            "  --completion {bash,zsh,fish}   a completion script for this shell",
-            "  --cache [clear]   location and size of the compiled kernels; `clear` removes them",
-            "  -q, --quiet; --log-file FILE   print nothing but errors; also write what is printed (any command)",
+            "  -h, --help   print this overview; `endotsr COMMAND --help` lists the options of a command",
+            "  --version    print the version",
+            "  --completion {bash,zsh,fish}   print a completion script for a shell",
+            "  --cache [clear]   show location and size of the compiled kernels; `clear` removes them",
+            "  -q, --quiet; --log-file FILE   print only errors; also write the output to a file (any command)",
         ]
     )
 

@@ -1,4 +1,4 @@
-"""`endotsr masks`: proposes instrument masks for a clip that has none."""
+"""`endotsr masks`: propose instrument masks for a clip without masks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +11,11 @@ from endotsr.cli.parts.result import JsonFile, write_result
 
 @dataclass
 class MasksOptions:
-    """Propose masks of the instruments from the grey of metal and from motion that differs from the tissue.
+    """Propose instrument masks from metallic grey and from motion relative to the tissue.
 
-    Without --out, SEQUENCE is a folder that `endotsr prepare` wrote, and the masks are added to it. With --out,
-    SEQUENCE is any source that `prepare` reads, and masks/ and the overlay are written to FOLDER, marked as a proposal.
-    Inspect proposed_masks.png before a training. Exit code 1: nothing was found, and nothing was written.
+    Without --out, SEQUENCE is a folder from `endotsr prepare`, and the masks are added to it. With --out, SEQUENCE is
+    any source of `prepare`; masks/ and the overlay are written to FOLDER and marked as a proposal. Inspect
+    proposed_masks.png before training. Exit code 1: no instrument found, nothing written.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
@@ -57,5 +57,5 @@ def run(words: list[str]) -> int:
     if proposal.without_tissue:
         named = shortened([str(i) for i in proposal.without_tissue])
         print(f"warning: hardly any tissue is left in {len(proposal.without_tissue)} frames: {named}")
-    print(f"these masks are proposals: look at {place / OVERLAY} before a training")
+    print(f"these masks are proposals: inspect {place / OVERLAY} before training")
     return 0

@@ -1,4 +1,4 @@
-"""`endotsr prepare`: any recording becomes a folder in the common format."""
+"""`endotsr prepare`: convert a recording to a folder in the common format."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class PrepareOptions:
-    """Turn a recording into a folder that `endotsr train` reads: pictures, masks, depth and sequence.toml.
+    """Convert a recording to a folder for `endotsr train`: pictures, masks, depth and sequence.toml.
 
     SOURCE is a folder of pictures, a video, a StereoMIS, COLMAP, TUM or EndoNeRF folder, or a folder in the common
-    format. Options supply metadata that its files lack. Lengths are converted to millimetres. The printed notes state
-    every assumption and every change.
+    format. Options supply missing metadata. Lengths are converted to millimetres. The printed notes list all
+    assumptions and changes.
     """
 
     source: Annotated[Path, Option("SOURCE", positional=True)]
@@ -29,17 +29,17 @@ class PrepareOptions:
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
     stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
-    """layout of a stereo pair in a picture: side_by_side = left half first, stacked = left on top"""
+    """stereo pairs in one picture: side_by_side = left picture on the left, stacked = left picture on top"""
     camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
     """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
-    """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; the pictures are undistorted"""
+    """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; pictures are undistorted"""
     calibration: Annotated[Path | None, Option("FILE")] = None
-    """calibration of one camera or of a pair, which is rectified: ini, YAML of OpenCV, ROS or Kalibr, or a matrix K"""
+    """calibration of one camera or of a pair (is rectified): ini, YAML of OpenCV, ROS or Kalibr, or a matrix K"""
     baseline: float | None = None
-    """distance of the cameras of an already rectified pair, millimetres"""
+    """baseline of an already rectified pair, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
-    """poses in the TUM form: stamp tx ty tz qx qy qz qw"""
+    """poses in TUM format: stamp tx ty tz qx qy qz qw"""
     trajectory_direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
     """direction of the poses"""
     trajectory_axes: Literal["opencv", "opengl"] = "opencv"
@@ -49,42 +49,41 @@ class PrepareOptions:
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one per frame, or one file for all frames"""
     excluded_value: Literal["white", "black"] = "white"
-    """which value of these masks is excluded; white = above half of the largest value"""
+    """excluded value of these masks; white = above half of the largest value"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
     """depth of every frame: png, tiff, npy or pfm"""
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     """unit of the depth"""
     depth_scale: float = 1.0
-    """length of one step of the stored depth, in its unit"""
+    """size of one stored depth level, in the unit of the depth"""
     trust_depth: bool = False
-    """read these files as lengths even if they look like disparity or a relative depth"""
+    """read these files as metric depth even if they look like disparity or relative depth"""
     points: Literal["interpolated", "sparse", "none"] = "interpolated"
-    """depth from the points of a reconstruction (COLMAP): between the points, at the points, or none"""
+    """depth from the points of a reconstruction (COLMAP): interpolated, at the points only, or none"""
     frames: Annotated[str, Option("A:B[:S],...")] = ""
     """frames or seconds of the source: 0:10,12,30s:45s"""
     drop: Annotated[str, Option("N,...")] = ""
     """frames or seconds to omit, such as 10,11"""
     crop: Annotated[tuple[int, ...], Option("X Y WIDTH HEIGHT")] = ()
-    """window of the pictures, pixels of the source; the intrinsics follow"""
+    """crop of the pictures, source pixels; intrinsics are adapted"""
     unite_masks: Annotated[tuple[Path, ...], Option("FOLDER ...")] = ()
-    """further masks, one per frame or one file for all frames: a pixel that any of them excludes is excluded"""
+    """further masks, one per frame or one file for all frames; a pixel excluded by any mask is excluded"""
     rate: float | None = None
     """frames per second to keep"""
     source_rate: float | None = None
     """frames per second of the source, if its files do not state it"""
     orientation: Literal["turned", "stored"] | None = None
-    """for a video with rotation metadata: pictures (and intrinsics, masks, depth) as players rotate them, or as
-    stored"""
+    """for a video with rotation metadata: rotate pictures, intrinsics, masks and depth as players do, or not"""
     scale: float = 1.0
-    """image scale, area-averaged; the intrinsics follow"""
+    """image scale, by area averaging; intrinsics are adapted"""
     gaps: Literal["refuse", "drop", "fill"] = "refuse"
-    """frames without mask or pose while others have one: drop omits them, fill interpolates"""
+    """single frames without mask or pose: drop omits them, fill interpolates"""
     pictures: Literal["png", "jpg"] = "png"
     """format of the written pictures"""
     also: tuple[Literal["nerfstudio", "colmap"], ...] = ()
-    """descriptions for other programs in addition to sequence.toml: transforms.json, or a COLMAP model in sparse/0"""
+    """also describe the folder for other programs: transforms.json, or a COLMAP model in sparse/0"""
     replace: bool = False
-    """replace FOLDER if `prepare` wrote it; it may be the source"""
+    """replace FOLDER if it is from `prepare`; it may be the source"""
     json: JsonFile = None
     """also write the findings and notes as JSON"""
 
@@ -130,7 +129,7 @@ def run(words: list[str]) -> int:
 
 
 def _check_numbers(options: PrepareOptions) -> None:
-    """Raises: InputError for a number that is not positive, or intrinsics that are not four numbers."""
+    """Raises InputError for a number that is not positive, or intrinsics that are not four numbers."""
     for name in ("rate", "source_rate", "baseline", "depth_scale"):
         value = getattr(options, name)
         if value is not None and not 0 < value < float("inf"):
@@ -140,7 +139,7 @@ def _check_numbers(options: PrepareOptions) -> None:
 
 
 def _stated(options: PrepareOptions) -> "SourceOptions":
-    """What the options state about the source."""
+    """The options on the source."""
     from endotsr.sequences.source_options import SourceOptions
 
     same = (
@@ -163,7 +162,7 @@ def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
         from endotsr.sequences.sequence_file import FILE_NAME
 
         return (
-            "next: state the distance of the two cameras, [camera] baseline in"
+            "next: set the baseline of the two cameras, [camera] baseline in"
             f" {out / FILE_NAME} (or prepare --baseline MM), then endotsr depth {out}"
         )
     if stereo:

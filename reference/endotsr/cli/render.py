@@ -11,11 +11,11 @@ from endotsr.cli.parts.result import JsonFile, write_result
 
 @dataclass
 class RenderOptions:
-    """Render a scene as pictures (--out), as a film (--film), or as both.
+    """Render a scene as pictures (--out), as a film (--film), or both.
 
-    SCENE is a run folder (also one of windows), a slim model of `endotsr export`, or a 3DGS .ply file. Times are those
-    of frames, or any others in [0, 1]; a time between frames has the camera of the frame nearest in time. The folder
-    holds colour/, depth/, opacity/ and render.json (time, camera and file of every picture, depth scale).
+    SCENE is a run folder (with or without windows), a slim model from `endotsr export`, or a 3DGS .ply file. Times are
+    those of frames or any others in [0, 1]; a time between frames uses the camera of the nearest frame. The folder
+    contains colour/, depth/, opacity/ and render.json (time, camera and file of every picture, depth scale).
     """
 
     scene: Annotated[Path, Option("SCENE", positional=True)]
@@ -27,25 +27,25 @@ class RenderOptions:
     times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
     """normalised times in [0, 1]"""
     frames: Literal["test", "train", "all"] | None = None
-    """the frames of the sequence instead of --times (default: test; of a film alone: all)"""
+    """the frames of the sequence instead of --times (default: test; for a film only: all)"""
     count: Annotated[int | None, Option("N")] = None
     """number of times, evenly spaced over [0, 1], instead of --times"""
     camera: Annotated[str, Option("observed|orbit|sway|FRAME|PATH.json")] = "observed"
-    """cameras of the frames, once around them, from side to side, that of one frame, or those of a file"""
+    """the frames' cameras, a circle around them, from side to side, the camera of one frame, or a camera file"""
     angle: float = 8.0
-    """largest turn of orbit and sway, degrees"""
+    """largest rotation of orbit and sway, degrees"""
     offset: Annotated[tuple[float, float, float], Option("RIGHT DOWN FORWARD")] = (0.0, 0.0, 0.0)
     """shift of the camera along its own axes, scene units"""
     size: Annotated[str, Option("WIDTHxHEIGHT")] = ""
-    """pixels of a picture (default: those of the camera); the whole field of view stays in the picture"""
+    """size of a picture (default: the camera's), with at least the camera's field of view"""
     depth: Literal["accumulated", "normalised"] = "accumulated"
     """depth as composited, or divided by the opacity"""
     panels: tuple[Literal["render", "truth", "error", "depth", "opacity"], ...] = ("render",)
-    """pictures of a film, side by side; truth and error are those of frames"""
+    """panels of a film, left to right; truth and error need the times and cameras of frames"""
     rate: float | None = None
-    """pictures per second of a film (default: the speed of the recording; 15 if it is unknown)"""
+    """pictures per second of a film (default: real time; 15 if the frame rate is unknown)"""
     slow: Annotated[float | None, Option("N")] = None
-    """a film that takes N times as long as the recording, instead of --rate"""
+    """slow-down of a film by a factor of N relative to the recording, instead of --rate"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()

@@ -1,4 +1,4 @@
-"""`endotsr simulate`: writes a simulated sequence and its truth as a folder."""
+"""`endotsr simulate`: write a simulated sequence and its ground truth as a folder."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -24,11 +24,11 @@ PREPARE = "next: endotsr prepare {} --out FOLDER"
 
 @dataclass
 class SimulateOptions:
-    """Simulate a scene in which every effect is known, and write it with the exact ground truth.
+    """Simulate a scene with known effects, and write it with the exact ground truth.
 
-    SCENE is still, breathing, pulling, cutting, smoke, moving-camera or everything; the options change its size, its
-    seed and its effects. `endotsr train OUT` reads a folder in the layout endonerf; `endotsr prepare OUT` reads the
-    raw recording of the layout stereomis. OUT/truth holds depth, motion, light and masks.
+    SCENE is still, breathing, pulling, cutting, smoke, moving-camera or everything; options change its size, seed and
+    effects. Layout endonerf is for `endotsr train OUT`; layout stereomis is a raw recording for `endotsr prepare OUT`.
+    OUT/truth contains depth, motion, light and masks.
     """
 
     scene: Annotated[str, Option("[SCENE]", positional=True)] = ""
@@ -36,7 +36,7 @@ class SimulateOptions:
     out: Annotated[Path | None, Option("FOLDER")] = None
     """sequence folder to create (required)"""
     effects: Annotated[str | None, Option("NAME,..")] = None
-    """exactly these effects, instead of those of a scene; empty for none"""
+    """exactly these effects, instead of a scene's; empty for none"""
     json: JsonFile = None
     """also write a record of the simulation as JSON"""
     layout: Literal["endonerf", "stereomis"] = "endonerf"
@@ -70,7 +70,7 @@ def run(words: list[str]) -> int:
 
 
 def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> None:
-    """Refuse what cannot be written before anything is, then write beside the folder's name and rename."""
+    """Check the options and the output path, then write the folder atomically."""
     from endotsr.simulator import folder, stereomis
 
     out, raw = options.out, options.layout == "stereomis"
@@ -78,7 +78,7 @@ def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> 
     recording = partial(stereomis.write_recording, lossless=options.lossless)
     check, write = (stereomis.check_recording, recording) if raw else (folder.check_scene, folder.write_sequence)
     if options.lossless and not raw:
-        raise InputError("simulate: --lossless belongs to --layout stereomis; files of the other layout have no loss")
+        raise InputError("simulate: --lossless needs --layout stereomis; the other layout is always lossless")
     refuse_existing(out)
     check(settings)
     print(f"{settings.frames} frames of {settings.width}x{settings.height}, seed {settings.seed}", flush=True)

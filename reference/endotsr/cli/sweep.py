@@ -16,27 +16,26 @@ if TYPE_CHECKING:
 
 @dataclass
 class SweepOptions:
-    """Make every run of SPEC.toml (sequences x splits x configurations x seeds) and a table of their results in DIR.
+    """Execute every run of SPEC.toml (sequences x splits x configurations x seeds), with a table of results in DIR.
 
-    After a kill, Ctrl-C or a full disk the same command continues: finished runs are kept, and an unfinished run
-    continues from its checkpoint. A failed run is named in the table and repeated with --retry. Exit code 1: a run
-    failed.
+    After a kill, Ctrl-C or a full disk, the same command continues: finished runs are kept, and unfinished runs
+    continue from their checkpoints. The table lists failed runs; --retry repeats them. Exit code 1: a run failed.
     """
 
     spec: Annotated[Path, Option("SPEC.toml", positional=True)]
-    """the runs"""
+    """specification of the runs"""
     out: Annotated[Path, Option("DIR")]
     """folder of the sweep"""
     workers: Annotated[int | None, Option("N")] = None
-    """runs at a time (default: as many as cores and free memory allow)"""
+    """concurrent runs (default: as many as cores and free memory allow)"""
     threads: Annotated[int | None, Option("N")] = None
-    """threads of each run (default: the cores divided by the runs)"""
+    """threads per run (default: the cores divided by the runs)"""
     scheduler: Annotated[str | None, Option("ADDRESS")] = None
-    """send the runs to the workers of this Dask scheduler, such as tcp://host:8786; DIR is on a disk that all see"""
+    """send the runs to the workers of this Dask scheduler, such as tcp://host:8786; DIR must be on a shared disk"""
     retry: bool = False
-    """also repeat the runs that failed before"""
+    """repeat failed runs"""
     dry_run: bool = False
-    """list the runs and end"""
+    """list the runs without executing them"""
 
 
 def run(words: list[str]) -> int:
@@ -54,12 +53,12 @@ def run(words: list[str]) -> int:
 
 
 def run_spec(spec: "Spec", out: Path, place: "Place", retry: bool, on_rows=lambda rows: None) -> "Rows":
-    """The rows of a sweep, made where `place` says, under one progress bar."""
+    """Execute a sweep at `place` with a progress bar; returns its rows."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.sweeps.place import outcomes_at
     from endotsr.sweeps.sweep import Inputs, run_sweep
 
-    load_lpips_weights(spec.lpips)  # weights that cannot be used are refused before the first run
+    load_lpips_weights(spec.lpips)  # raises for unusable weights before the first run
     inputs = Inputs(keep=place.scheduler is not None)
     outcomes = lambda jobs: outcomes_at(place, jobs, out, inputs.size, inputs.sequence)
     with StepBar("iterations") as bar:
@@ -67,7 +66,7 @@ def run_spec(spec: "Spec", out: Path, place: "Place", retry: bool, on_rows=lambd
 
 
 def ended(rows: "Rows", out: Path) -> int:
-    """Print the table and what to do about failed runs; 0, or 1 if a run failed."""
+    """Print the table and advice on failed runs; returns 0, or 1 if a run failed."""
     from endotsr.sweeps.execute import FAILED
     from endotsr.sweeps.results import FILES, results_markdown
 
@@ -75,7 +74,7 @@ def ended(rows: "Rows", out: Path) -> int:
     print(f"table: {', '.join(str(out / name) for name in FILES)}")
     failed = [row for row in rows if row["status"] == FAILED]
     if failed:
-        print(f"{len(failed)} failed; --retry makes them again")
+        print(f"{len(failed)} failed; --retry repeats them")
     return 1 if failed else 0
 
 

@@ -19,10 +19,10 @@ RESULT = "tradeoff.json"  # in the folder of the measurement
 
 @dataclass
 class TradeoffOptions:
-    """Measure error against time for every setting of the renderer; the figures are kept in --out.
+    """Measure error against time for many settings of the renderer; write the measurement to --out.
 
-    The scene is simulated, a trained --run, or a file of --splats. With --budget, the setting is chosen from the
-    measurement in --out, which is made if it is missing.
+    The scene is simulated, a trained --run, or a file of --splats. With --budget, a setting is chosen from the
+    measurement in --out; a missing measurement is made first.
     """
 
     out: Annotated[Path, Option("DIR")] = Path("tradeoff")
@@ -32,7 +32,7 @@ class TradeoffOptions:
     splats: Annotated[Path | None, Option("FILE")] = None
     """file of trained Gaussians: .ply, or .npz with xyz, log_scale, quat_wxyz, rgb, opacity"""
     scale: float = 1.0
-    """size of the picture, relative to that of the scene"""
+    """scale of the picture, relative to the scene's"""
     budget: str | None = None
     """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate) or an error
     ("1/255", "1e-3": the fastest)"""
@@ -52,7 +52,7 @@ def run(words: list[str]) -> int:
     budget = None if options.budget is None else parse_budget(options.budget)
     file = options.out / RESULT
     if budget is None and file.exists():
-        raise InputError(f"{options.out}: holds a measurement already; choose another --out, or read it with --budget")
+        raise InputError(f"{options.out}: already contains a measurement; choose another --out, or use --budget")
     result = read_result(file, Measurement) if file.exists() else _measure(options)
     if budget is not None:
         advice = frame_advice(result, budget)
@@ -63,9 +63,9 @@ def run(words: list[str]) -> int:
 
 def _refuse(options: TradeoffOptions) -> None:
     if options.run is not None and options.splats is not None:
-        raise InputError("tradeoff: give one of --run and --splats")
+        raise InputError("tradeoff: --run with --splats is not allowed; allowed: one of them")
     if options.json is not None and options.budget is None:
-        raise InputError(f"tradeoff: --json holds the answer to --budget; the measurement itself is DIR/{RESULT}")
+        raise InputError(f"tradeoff: --json needs --budget; the measurement itself is DIR/{RESULT}")
     if not 0 < options.scale <= 8:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
 

@@ -1,4 +1,4 @@
-"""`endotsr train`: trains on a sequence and writes a run folder."""
+"""`endotsr train`: train on a sequence and write a run folder."""
 
 import math
 from dataclasses import dataclass
@@ -25,46 +25,46 @@ if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
-RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run because they change no result
+RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run: they do not affect results
 
 
 @dataclass
 class TrainOptions:
     """Train on a sequence folder, evaluate, and write a run folder.
 
-    Settings come from the preset, then the TOML file, then the command line. `--resume` continues the run in --out
-    from its last checkpoint to the same result, bit for bit; with --iterations N it also extends a finished run.
+    Later settings override earlier ones: preset, TOML file, command line. `--resume` continues the run in --out from
+    its last checkpoint, with a bitwise equal result; with --iterations N it also extends a finished run.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
-    """sequence folder, or `simulated` for the scene of `demo`; with --resume the default is the sequence of the run"""
+    """sequence folder, or `simulated` for the scene of `demo` (with --resume, default: the recorded sequence)"""
     out: Annotated[Path | None, Option("RUN")] = None
     """run folder to create (required)"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
-    """settings to start from"""
+    """initial settings"""
     iterations: Annotated[int | None, Option("N")] = None
-    """exact length of the run; stretches the schedule. With --resume: a larger number extends the run"""
+    """exact length of the run; stretches the schedule. With --resume, a larger number extends the run"""
     minutes: Annotated[float | None, Option("M")] = None
-    """choose length, points and Gaussians for a training of M minutes on this machine"""
+    """choose length, points and Gaussians for M minutes of training on this machine"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
     effects: Literal["everything", "auto"] = "everything"
-    """train every component of the settings, or only those that the clip needs (see `endotsr inspect`)"""
+    """train all components of the settings, or only those that the clip needs (see `endotsr inspect`)"""
     windows: Annotated[str | None, Option("auto|N")] = None
-    """divide a recording into windows of about N frames, or by its motion and cuts; each is a run in RUN/windows"""
+    """divide a recording into windows of about N frames, or by motion and cuts; each is a run in RUN/windows"""
     overlap: int = 8
-    """of windows: frames that neighbours share"""
+    """with --windows: number of frames shared by neighbours"""
     chain: int = 1
-    """of windows: this many in a row, each but the first started from its neighbour; 1 = all start independently"""
+    """with --windows: length of a chain, whose windows except the first start from their neighbour; 1 = none do"""
     workers: Annotated[int | None, Option("N")] = None
-    """of windows: windows trained at a time (default: as many as cores and free memory allow)"""
+    """with --windows: concurrent windows (default: as many as cores and free memory allow)"""
     scheduler: Annotated[str | None, Option("ADDRESS")] = None
-    """of windows: send them to the workers of this Dask scheduler; RUN and SEQUENCE are on a disk that all see"""
+    """with --windows: send them to the workers of this Dask scheduler; RUN and SEQUENCE must be on a shared disk"""
     resume: bool = False
     """continue the run in --out"""
     calibrate_only: bool = False
-    """only compute the weight of equation (7) on the run in --out; --loss.ssim-weight and the other settings
-    that it reads may differ from those of the run"""
+    """only compute the weight of equation (7) on the run in --out; settings that affect it, such as
+    --loss.ssim-weight, may be changed"""
     evaluate: bool = True
     """evaluate, render and write the report after training"""
     lpips: Annotated[Path | None, Option("FILE")] = None
@@ -85,9 +85,9 @@ def run(words: list[str]) -> int:
     if options.calibrate_only:
         return _calibrate(options, words)
     if options.json and not options.evaluate:
-        raise InputError("train: --json holds the metrics, which --no-evaluate leaves out; allowed: one of them")
+        raise InputError("train: --json with --no-evaluate is not allowed: there are no metrics to write")
     if options.evaluate:
-        load_lpips_weights(options.lpips)  # weights that cannot be used are refused before the training begins
+        load_lpips_weights(options.lpips)  # raises for unusable weights before the training
     if options.windows is not None or (options.resume and is_windowed(options.out)):
         return _train_windows(options, words)
     if options.resume:
@@ -103,14 +103,14 @@ def run(words: list[str]) -> int:
 
 
 def _train_windows(options: TrainOptions, words: list[str]) -> int:
-    """Train a recording in windows, or what is missing of it, and measure it."""
+    """Train the missing windows of a recording, and evaluate it."""
     from endotsr.cli.parts.windows import evaluate_windows, plan_windows, train_windows
     from endotsr.sweeps.place import Place, check_place
     from endotsr.windows.make import recording_settings, with_visits
 
     assert options.out is not None
     if options.effects != "everything":
-        raise InputError("train: --effects auto with --windows is not allowed; allowed: inspect a part, and settings")
+        raise InputError("train: --effects auto with --windows is not allowed; allowed: `inspect` a part, set options")
     place = Place(options.workers, options.settings.training.threads or None, options.scheduler)
     check_place("train", place)
     if options.resume:
@@ -127,10 +127,10 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
 
 
 def _accepted_settings(out: Path, words: list[str], kept: Config, frames: int | None = None) -> Config:
-    """The settings `kept` of a run as the words ask for them, with which it is resumed.
+    """The settings of a resumed run: `kept`, with the changes in the words.
 
-    frames   training frames of the run, which may be extended; None: it may not
-    Raises:  InputError for settings that differ and would change a result.
+    frames   number of training frames of the run; None: the run cannot be extended
+    Raises:  InputError for changes that would affect results.
     """
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
     wanted = options.settings if frames is None else lengthened(options.settings, frames)
@@ -144,7 +144,7 @@ def _accepted_settings(out: Path, words: list[str], kept: Config, frames: int | 
 
 
 def _calibrate(options: TrainOptions, words: list[str]) -> int:
-    """Equation (7) on the run in --out, with its settings where the words name no other."""
+    """Evaluate equation (7) on the run in --out, with its settings except those changed in the words."""
     from endotsr.cli.parts.calibration import calibrate_run
 
     assert options.out is not None
@@ -178,13 +178,13 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
         refuse_inside(options.out, Path(source), "the sequence")
     sequence = load_sequence(source, config, SimulatorSettings())
     if options.evaluate and source != SIMULATED:
-        recorded_positions(Path(source), sequence)  # refuses a damaged truth before the training begins
+        recorded_positions(Path(source), sequence)  # raises for a damaged truth before the training
     threads = use_threads(config.training.threads)
     config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
     if options.minutes is not None:
         config, schedule_note = _of_minutes(options, sequence, config)
     found: RunRecord = {}
-    lines = ["effects: everything; `--effects auto` trains only what the clip needs"]
+    lines = ["effects: everything; `--effects auto` trains only the components that the clip needs"]
     if options.effects == "auto":
         config, lines, effects = planned_settings(sequence, config, explicit_settings(TrainOptions, words))
         found["effects"] = effects
@@ -199,7 +199,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 
 
 def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> tuple[Config, str]:
-    """The settings for the minutes asked for, from a few timed iterations, and the line on them."""
+    """The settings for the requested minutes, from a few timed iterations, and a line on them."""
     from endotsr.fitting.compile_ahead import compile_ahead
     from endotsr.runs.pace import paced_for, seconds_of_unit
 
@@ -208,13 +208,13 @@ def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> 
     unit = seconds_of_unit(sequence, config)
     found = paced_for(options.minutes, sequence, config, unit)
     return found, (
-        f"minutes: {options.minutes:g}, where an iteration of 60 000 Gaussians takes {1e3 * unit:.0f} ms: "
+        f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * unit:.0f} ms: "
         f"{found.training.iterations} iterations, {found.density.maximum} Gaussians"
     )
 
 
 def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence"]:
-    """Refuse settings that would change the run, and train it from its last checkpoint to the end."""
+    """Check the settings, and train a run from its last checkpoint to the end."""
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.sources import check_same_input, load_sequence, run_source
     from endotsr.runs.training import extend_run, resume_run
@@ -238,20 +238,20 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
 
 
 def _progress(folder: RunFolder, sequence: "Sequence", config: Config) -> Progress:
-    """The progress of a training, on the standard error and as a page in its folder."""
+    """The progress of a training, on standard error and as a page in its folder."""
     from endotsr.report.live_page import LIVE_PAGE, LivePage
 
-    print(f"watch it in a browser: {folder.path / LIVE_PAGE}", flush=True)
+    print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(config, sequence.width * sequence.height, LivePage(folder, sequence, config))
 
 
 def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
-    """The settings with the length of a run on so many training frames, and the line on its schedule."""
+    """The settings with the length of a run on `frames` training frames, and the line on its schedule."""
     found, before = lengthened(config, frames), config.training.iterations
     if (after := found.training.iterations) > before:
         note = (
-            f"schedule: stretched from {before} to {after} iterations, {after / frames:.0f} for each of "
-            f"{frames} training frames (--iterations N trains exactly N)"
+            f"schedule: stretched from {before} to {after} iterations, {after / frames:.0f} per training frame "
+            "(--iterations N trains exactly N)"
         )
     return found, note
 

@@ -1,1 +1,1 @@
-"""Helpers of several commands: options, progress, stop signals."""
+"""Shared parts of the commands: options, parser, help, progress, output."""

@@ -1,4 +1,4 @@
-"""`endotsr train --calibrate-only`: equation (7) on the checkpoint of a run, which is not changed."""
+"""`endotsr train --calibrate-only`: evaluate equation (7) on the checkpoint of a run, without changing the run."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from endotsr.errors import InputError
 from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder
 
-# Settings that equation (7) reads; no other setting would change the result.
+# Settings that affect equation (7).
 REPLACEABLE = (
     "loss.ssim_weight",
     "loss.upsampling",
@@ -20,12 +20,12 @@ REPLACEABLE = (
 
 
 def calibrate_run(folder: RunFolder, config: Config, source: str | None, json: Path | None) -> None:
-    """Print the table of the calibration views and the weight, and write both to `json` if it is named.
+    """Print the table of the calibration views and the weight, and optionally write them to `json`.
 
-    config   settings of the run with those replaced that equation (7) reads
+    config   settings of the run, with changes only to `REPLACEABLE`
     source   current location of the sequence; None = the recorded one
 
-    Raises:  InputError for a replaced setting that the run has fixed; CalibrationError if no view gives a ratio.
+    Raises:  InputError for a change of another setting; CalibrationError if no view gives a ratio.
     """
     from endotsr.fitting.objective import calibrate_on
     from endotsr.kernels.threads import use_threads
@@ -48,7 +48,7 @@ def calibrate_run(folder: RunFolder, config: Config, source: str | None, json: P
 
 
 def _refuse_fixed(replaced: list[str], run_path: Path) -> None:
-    """Raises InputError for settings that the trained run has fixed: they would be named and then not used."""
+    """Raises InputError for changed settings that do not affect equation (7)."""
     fixed = [line for line in replaced if not line.split(" = ")[0].startswith(REPLACEABLE)]
     if fixed:
         raise InputError(

@@ -1,4 +1,4 @@
-"""`endotsr evaluate`: its options, the sequence that pictures show, and several methods in one table."""
+"""`endotsr evaluate`: options, the sequence of a folder of pictures, and the comparison of methods."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ShownSettings(Section, frozen=True, kw_only=True):
-    """The settings of a sequence, as options `--sequence.scale` and so on."""
+    """The settings of a sequence, as options such as `--sequence.scale`."""
 
     sequence: SequenceConfig = SequenceConfig()
 
@@ -31,26 +31,26 @@ SHOWN = ShownSettings()
 
 @dataclass
 class EvaluateOptions:
-    """Evaluate a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
+    """Evaluate a run on its held-out frames; write metrics, pictures, report.html and view.html to its folder.
 
-    Several METHODs are compared on the same held-out frames: means, and differences from the first one frame by frame.
-    Each is a run folder that was evaluated, a JSON file of --json, or pictures; NAME=PATH gives it another
-    name. The interval of a difference is a bootstrap over the frames of this clip; it does not cover other clips.
+    Several METHODs are compared on the same held-out frames, with means and with differences to the first method,
+    paired by frame. A METHOD is an evaluated run folder, a JSON file from --json, or pictures; NAME=PATH renames it.
+    Intervals of differences are bootstrapped over the frames of this clip; they do not cover other clips.
 
-    With --pictures the renders of any method are evaluated by the same code with the same baselines, on the sequence
-    of the run or on --sequence. One picture per held-out frame is needed: .png, .tiff or .bmp (8 or 16 bit) or
-    .npy (float, display units) in a folder, paired by the names of the frames, by their numbers, or in order; or a
-    video of all frames or of the held-out ones. A named run is not changed.
+    With --pictures, the renders of any method are evaluated by the same code and with the same baselines, on the
+    sequence of the run or on --sequence. Required is one picture per held-out frame: .png, .tiff or .bmp (8 or 16 bit)
+    or .npy (float, display units) in a folder, paired by frame names, by frame numbers, or in order; or a video of all
+    frames or of the held-out ones. The run is not changed.
     """
 
     methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()
     """run folder, or several methods to compare; optional with --pictures"""
     pictures: Annotated[Path | None, Option("FOLDER|VIDEO")] = None
-    """evaluate the pictures of this folder or video, not the run"""
+    """evaluate the pictures of this folder or video instead of the run"""
     label: Annotated[str, Option("TEXT")] = ""
     """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """sequence folder, or `simulated`; of a run: its current location (default: the recorded one)"""
+    """sequence folder, or `simulated`; for a run: its current location (default: the recorded one)"""
     json: JsonFile = None
     """also write the metrics as JSON"""
     csv: Annotated[Path | None, Option("FILE", written=True)] = None
@@ -60,7 +60,7 @@ class EvaluateOptions:
     measures: Annotated[tuple[str, ...], Option("NAME")] = ()
     """additional measurements, each with reference rows: depth, flicker, right_view"""
     view: bool = True
-    """write the viewer page that the report links to, view.html"""
+    """write the viewer page view.html, linked from the report"""
     compare: bool = False
     """compare a single METHOD with its baselines"""
     baselines: bool = True
@@ -73,14 +73,14 @@ class EvaluateOptions:
 
     @property
     def run(self) -> Path | None:
-        """The one run folder."""
+        """The run folder of a single method."""
         return Path(self.methods[0]) if self.methods else None
 
 
 def shown_sequence(command: str, run: Path | None, source: str | None, settings: ShownSettings) -> "Sequence":
-    """The sequence of `run` (at `source`, if it has moved), or the sequence `source` read with these settings.
+    """The sequence of `run` (at `source`, if it has moved), or the sequence `source` with these settings.
 
-    Raises: InputError if neither is named, or if settings are given that the run has fixed.
+    Raises: InputError if neither is given, or for settings together with a run.
     """
     from endotsr.runs.sources import load_run_sequence, load_sequence
     from endotsr.simulator.settings import SimulatorSettings
@@ -90,14 +90,14 @@ def shown_sequence(command: str, run: Path | None, source: str | None, settings:
             raise InputError(f"{command}: --sequence.* with {run} is not allowed: the settings of a run are fixed")
         return load_run_sequence(open_run(run), source)
     if source is None:
-        raise InputError(f"{command}: --sequence is missing: the sequence that the pictures show, or a run folder")
+        raise InputError(f"{command}: --sequence is missing: the sequence of the pictures, or a run folder")
     return load_sequence(source, msgspec.structs.replace(PAPER, sequence=settings.sequence), SimulatorSettings())
 
 
 def compare_methods(asked: EvaluateOptions) -> None:
-    """Print the means of every method and their differences to the first one frame by frame, with intervals.
+    """Print the means of every method, and the paired differences to the first one with intervals.
 
-    A method is a run folder, a JSON file, or a folder of pictures or a video, each PATH or NAME=PATH.
+    A method is a run folder, a JSON file, a folder of pictures or a video, as PATH or NAME=PATH.
     """
     from endotsr.evaluation.compare import compare, methods_of
     from endotsr.report.comparison import METRICS, comparison_csv, comparison_table
@@ -129,7 +129,7 @@ def _named(word: str) -> tuple[str, Path]:
 def _metrics(
     label: str, path: Path, asked: EvaluateOptions, paths: list[Path], sequence: "Sequence | None"
 ) -> tuple["EvaluationRecord", "Sequence | None"]:
-    """The metrics of one argument, and the sequence if it had to be read."""
+    """The metrics of one method, and the sequence, if it was read for this or an earlier method."""
     if (path / "run.json").exists() or is_windowed(path):
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")

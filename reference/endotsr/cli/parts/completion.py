@@ -1,8 +1,7 @@
-"""Scripts that complete commands and options in a shell, made from the options of every command.
+"""Shell completion scripts for commands and options.
 
-In: nothing. Out: the text of a script. The words are those of this version: the script is printed again after an
-update. Where an option takes a file, or where nothing is known, the shell completes file names. Where a shell looks for
-the script of `endotsr --completion SHELL`:
+Out: the text of a script with the options of this version; print it again after an update. In other places the shell
+completes file names. Location of the output of `endotsr --completion SHELL`:
 
     bash   ~/.local/share/bash-completion/completions/endotsr
     zsh    a folder of $fpath, as _endotsr
@@ -18,8 +17,8 @@ from endotsr.cli.parts.mistakes import option_names
 from endotsr.simulator.scenes import SCENES
 
 ALWAYS = ("--help", "--help-all", "--quiet", "--log-file")
-SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # a command whose options are those of another
-CHOICES = {"golden": "SUBCOMMANDS"}  # the table of a command module whose keys are its first words
+SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # command with the options of another command
+CHOICES = {"golden": "SUBCOMMANDS"}  # table in the command's module whose keys are the possible first words
 FIRST_WORDS = {
     "train": ("simulated",),
     "inspect": ("simulated",),
@@ -28,11 +27,11 @@ FIRST_WORDS = {
 
 
 def words_of(command: str) -> list[str]:
-    """What may follow a command: its first words, then its options in the order of the help."""
+    """The possible words after a command: its first words, then its options in the order of the help."""
     module, name = SHARED_MODULE.get(command, (command, f"{command.capitalize()}Options"))
     command_module: Any = importlib.import_module(f"endotsr.cli.{module}")
     found = list(getattr(command_module, CHOICES[command]) if command in CHOICES else FIRST_WORDS.get(command, ()))
-    options = getattr(command_module, name, None)  # golden has a class for each first word instead
+    options = getattr(command_module, name, None)  # golden has a class per first word instead
     if options is not None:
         found += [word for word in option_names(fields_of(options)) if word not in ALWAYS]
     return [*found, *ALWAYS]

@@ -1,8 +1,8 @@
-"""The options of a command, listed from the typed class that holds them.
+"""The options of a command, derived from a typed class.
 
-In: a dataclass whose fields are options or sections of settings (msgspec structures). Out: one `Field` for each option
-and positional argument, with name, type, default and help. The help of a field is the docstring below it, which is
-read from the source of its module by `ast`. This module does not read a command line; see parser.py.
+In: a dataclass whose fields are options or sections of settings (msgspec structures). Out: one `Field` per option and
+positional argument, with name, type, default and help. The help of a field is the docstring below it, read from the
+source of its module by `ast`. parser.py reads command lines.
 """
 
 import ast
@@ -20,32 +20,32 @@ import msgspec
 
 from endotsr.config import is_section
 
-REQUIRED: Any = dataclasses.MISSING  # the default of an option that must be given
+REQUIRED: Any = dataclasses.MISSING  # the default of a required option
 METAVARS = {int: "INT", float: "FLOAT", str: "TEXT"}
 
 
 @dataclass(frozen=True)
 class Option:
-    """Command-line attributes of a field besides its type: `Annotated[Path, Option("RUN", positional=True)]`."""
+    """Command-line attributes of a field: `Annotated[Path, Option("RUN", positional=True)]`."""
 
     metavar: str = ""  # the value in the help; empty = derived from the type
-    positional: bool = False  # given without a name
-    may_be_empty: bool = False  # of several values: also without any value
-    written: bool = False  # a file that the command writes: refused before the work if it cannot be
-    flat: bool = False  # a section of settings whose keys are options without the name of the field in front
-    short: tuple[str, ...] = ()  # keys of such a section that are options without their section, too: `--scale`
+    positional: bool = False  # an argument without a name
+    may_be_empty: bool = False  # of several values: none is allowed
+    written: bool = False  # an output file, checked before the computation
+    flat: bool = False  # a section of settings whose options omit the name of the field
+    short: tuple[str, ...] = ()  # keys of a section that also exist without its name: `--scale`
 
 
 @dataclass(frozen=True)
 class Field:
     """One option or positional argument of a command."""
 
-    path: tuple[str, ...]  # attributes from the options class down to the value
+    path: tuple[str, ...]  # attributes from the options class to the value
     name: str  # `--model.frequency-max`; the metavar of a positional argument
-    kind: Any  # type of the value, limits of a number included
-    default: Any  # REQUIRED without one
+    kind: Any  # type of the value, with the limits of a number
+    default: Any  # REQUIRED without a default
     help: str
-    section: type | None  # the settings it belongs to; None outside of a section
+    section: type | None  # the section of settings; None outside a section
     metavar: str
     positional: bool
     may_be_empty: bool = False
@@ -53,23 +53,23 @@ class Field:
 
     @property
     def in_section(self) -> bool:
-        """Whether it is a setting of a section, named with it: `--model.bases`."""
+        """Whether it is a setting named with its section: `--model.bases`."""
         return not self.positional and "." in self.name
 
     @property
     def switch(self) -> bool:
-        """Whether the option is true or false and takes no value."""
+        """Whether the option is boolean and has no value."""
         return self.kind is bool
 
     @property
     def off(self) -> str:
-        """The option that turns a switch off: `--model.no-appearance`."""
+        """The negated switch: `--model.no-appearance`."""
         section, dot, key = self.name.removeprefix("--").rpartition(".")
         return f"--{section}{dot}no-{key}"
 
     @property
     def key(self) -> str:
-        """The name as a key of a settings file: `model.frequency_max`."""
+        """The key in a settings file: `model.frequency_max`."""
         return self.name.removeprefix("--").replace("-", "_")
 
     @property
@@ -86,7 +86,7 @@ class Field:
 
 
 def fields_of(options: type, default: Any = None) -> list[Field]:
-    """Every option and positional argument of a class of options, with the values of `default` if it is given."""
+    """Every option and positional argument of a class, with defaults from the instance `default`, if given."""
     return list(_walk(options, default, (), "", None))
 
 
@@ -117,7 +117,7 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
 
 
 def _declared(kind: type) -> list[tuple[str, Any, Any]]:
-    """Name, annotated type and default of every field, in the order of their declaration."""
+    """Name, annotated type and default of every field, in declaration order."""
     if is_section(kind):
         return [(f.name, f.type, f.default) for f in msgspec.structs.fields(kind)]
     hints = get_type_hints(kind, include_extras=True)
@@ -125,7 +125,7 @@ def _declared(kind: type) -> list[tuple[str, Any, Any]]:
 
 
 def _split_note(annotated: Any) -> tuple[Option, Any]:
-    """The `Option` of an annotated type (the default one without), and the type without it."""
+    """The `Option` of an annotated type (default: `Option()`), and the type without it."""
     if get_origin(annotated) is not Annotated:
         return Option(), annotated
     plain, *notes = get_args(annotated)
@@ -135,7 +135,7 @@ def _split_note(annotated: Any) -> tuple[Option, Any]:
 
 
 def _metavar(kind: Any) -> str:
-    """The metavar of the value in the help: `FLOAT`, `{quartic,gaussian}`, `{FLOAT,auto}`, `INT ...`."""
+    """The metavar of a type: `FLOAT`, `{quartic,gaussian}`, `{FLOAT,auto}`, `INT ...`."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _metavar(arguments[0])
@@ -151,7 +151,7 @@ def _metavar(kind: Any) -> str:
 
 
 def _attribute_docstrings(kind: type) -> dict[str, str]:
-    """Name of a field -> the docstring below it, those of base classes included."""
+    """Name of a field -> the docstring below it, including base classes."""
     texts: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         if base.__module__.startswith("endotsr."):
@@ -161,7 +161,7 @@ def _attribute_docstrings(kind: type) -> dict[str, str]:
 
 @cache
 def _docstrings_of_module(name: str) -> dict[str, dict[str, str]]:
-    """Class -> field -> docstring, of all classes of a module."""
+    """Class -> field -> docstring, for all classes of a module."""
     tree = ast.parse(inspect.getsource(sys.modules[name]))
     return {
         node.name: {

@@ -1,7 +1,7 @@
-"""The page that `endotsr COMMAND --help` prints: usage, description, and the options by section.
+"""The output of `endotsr COMMAND --help`: usage, description, and options by section.
 
-In: the fields of a command and the width of the terminal. Out: text. Two columns, as argparse lays them out; a name
-that is too long for the first column has a line of its own.
+In: the fields of a command and the width of the terminal. Out: text in two columns, like argparse. A name too long for
+the first column has its own line.
 """
 
 import inspect
@@ -14,15 +14,15 @@ from typing import Annotated, Any, get_args, get_origin
 from endotsr.cli.parts.fields import REQUIRED, Field
 from endotsr.config import allowed_values
 
-WIDEST = 120  # characters of a line; longer lines are hard to read on a wide terminal
+WIDEST = 120  # maximum characters per line
 GAP = 2  # characters between name and help, and before the name
 OPTIONS = "options:"
 COMMON = (
     ("-h, --help", "print this help; --help-all prints every option"),
-    ("-q, --quiet", "print nothing but errors"),
-    ("--log-file FILE", "also write everything that is printed to a file"),
+    ("-q, --quiet", "print only errors"),
+    ("--log-file FILE", "also write the output to a file"),
 )  # of every command
-FEW_SETTINGS = 12  # settings of sections up to which the short help shows all of them
+FEW_SETTINGS = 12  # up to this number of settings in sections, the short help shows all
 OFTEN_SET = (
     "sequence.split",
     "sequence.excluded_value",
@@ -32,19 +32,19 @@ OFTEN_SET = (
     "loss.lambda_lap",
     "training.precision",
 )
-PART_OF = "of windows: "
-UNBROKEN = "\u00a0"  # a space at which textwrap does not break
+PART_OF = "with --windows: "
+UNBROKEN = "\u00a0"  # a space without a line break in textwrap
 
 
 def terminal_width() -> int:
-    """Characters of a line of help: those of the terminal, at most WIDEST."""
+    """Characters per line of help: the width of the terminal, at most WIDEST."""
     return min(shutil.get_terminal_size(fallback=(100, 24)).columns, WIDEST)
 
 
 def short_fields(fields: list[Field]) -> list[Field]:
-    """The options that people set: all of a command with few settings, else those outside of sections and OFTEN_SET.
+    """The options of the short help: all of a command with few settings, else those outside sections and OFTEN_SET.
 
-    Options that only mean something beside another one, whose help begins with PART_OF, are left to the whole help.
+    The short help omits options that require another one; their help begins with PART_OF.
     """
     settings = [field for field in fields if field.in_section]
     if len(settings) <= FEW_SETTINGS:
@@ -54,9 +54,9 @@ def short_fields(fields: list[Field]) -> list[Field]:
 
 
 def help_page(options: type, fields: list[Field], command: str, width: int, hidden: int = 0) -> str:
-    """The help of a command, in lines of at most `width` characters.
+    """The help of a command in lines of at most `width` characters.
 
-    hidden   options that are left out of `fields`; the last line says how to see them
+    hidden   number of options omitted from `fields`; the last line explains how to list them
     """
     needed = [field for field in fields if field.positional or field.default is REQUIRED]
     usage = " ".join(["endotsr", command, *(_required_name(field) for field in needed), "[OPTIONS]"])
@@ -74,7 +74,7 @@ def help_page(options: type, fields: list[Field], command: str, width: int, hidd
 
 
 def _groups(fields: list[Field], width: int) -> list[tuple[str, list[Field]]]:
-    """Title and members: positional arguments, options outside of sections, then one group for each section."""
+    """Title and members of each group: positional arguments, options outside sections, then each section."""
     arguments = [field for field in fields if field.positional]
     options = [field for field in fields if not field.positional and not field.in_section]
     groups = [("arguments:", arguments)] if arguments else []
@@ -106,7 +106,7 @@ def _explained(field: Field) -> str:
 
 
 def _row(name: str, text: str, column: int, width: int) -> str:
-    """A name and its help from `column` on; a longer name has a line of its own."""
+    """A name, and its help starting at `column`; a longer name has its own line."""
     lines = textwrap.wrap(text, max(width - column, 20), break_on_hyphens=False) or [""]
     first = " " * GAP + name
     if len(first) + GAP <= column:
@@ -115,7 +115,7 @@ def _row(name: str, text: str, column: int, width: int) -> str:
 
 
 def _limits(kind: Any) -> str:
-    """The range of a number that has one: `a number > 0`; choices are shown by the metavar."""
+    """The range of a number, `a number > 0`; "" without a range. The metavar shows choices."""
     parts = [part for part in get_args(kind) if part is not NoneType] if get_origin(kind) is not Annotated else [kind]
     limited = any(get_origin(part) is Annotated for part in parts)
     return allowed_values(kind) if limited else ""

@@ -1,7 +1,7 @@
-"""`endotsr --cache`: what the package keeps on this machine outside run folders, and its removal.
+"""`endotsr --cache`: show or remove the package's files outside run folders.
 
-Compiled kernels are kept, one folder for each state of their sources and version of Numba; an older one is never read
-again. A folder of NUMBA_CACHE_DIR belongs to whoever set it: it is shown and left alone.
+These are the compiled kernels: one folder per state of their sources and version of Numba. Older folders are never
+read again. A folder in NUMBA_CACHE_DIR is shown but never removed.
 """
 
 import os
@@ -17,7 +17,7 @@ CLEAR = "clear"
 
 
 def kept(words: list[str]) -> list[str]:
-    """Lines on what is kept, or on what was removed.
+    """Lines on the kept or removed files.
 
     words    nothing, or "clear"
 

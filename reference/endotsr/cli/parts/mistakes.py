@@ -1,4 +1,4 @@
-"""Errors for unknown words of a command line: one line with the likely option, or the settings of the section."""
+"""Errors for unknown words of a command line: one line with the likely option, or the keys of the section."""
 
 import difflib
 from typing import Any
@@ -6,13 +6,13 @@ from typing import Any
 from endotsr.cli.parts.fields import Field
 from endotsr.errors import InputError
 
-LIKE_ENOUGH = 0.7  # fraction of common letters from which an option is suggested
-LAST_NAME_ONLY = 0.95  # factor for a setting named without its section: an option of that name is the likelier one
+LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
+LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
 MOST_OFFERED = 3
 
 
 def unknown_word(fields: list[Field], words: list[str], command: str) -> InputError:
-    """The error for words that belong to no option; an unknown option is named before a word without one."""
+    """The error for words that belong to no option; it names the first unknown option, or else the first word."""
     option = next((word.split("=")[0] for word in words if word.startswith("-")), None)
     if option is None:
         return InputError(f"{words[0]!r}: unexpected argument; `endotsr {command} --help` lists the options")
@@ -25,13 +25,13 @@ def unknown_word(fields: list[Field], words: list[str], command: str) -> InputEr
 
 
 def option_names(fields: list[Field]) -> list[str]:
-    """Every option of a command in the order of its help, those that switch off included."""
+    """Every option of a command in the order of its help, including negated switches."""
     names = [[field.name, field.off] if field.switch else [field.name] for field in fields if not field.positional]
     return ["--help", *(name for both in names for name in both)]
 
 
 def _unknown_key(fields: list[Field], option: str) -> str:
-    """The unknown part of a dotted option and the keys of its section; "" without a dot or without sections."""
+    """The unknown part of a dotted option with the allowed keys; "" without a dot or without sections."""
     keys: dict[str, Any] = {}
     for field in (field for field in fields if not field.positional):
         tree = keys
@@ -53,7 +53,7 @@ def _unknown_key(fields: list[Field], option: str) -> str:
 
 
 def _similar(option: str, names: list[str]) -> list[str]:
-    """The options most similar to the given one; a setting is also found by its name without the section."""
+    """The most similar options; a setting also matches by its name without the section."""
     likeness = {}
     for name in names:
         last = "--" + name.removeprefix("--").rpartition(".")[2]

@@ -1,7 +1,7 @@
 """The settings of a run from preset, TOML file and command line.
 
-Order of the settings: preset < TOML file < `--iterations` (stretches the schedule) < every other option. A source that
-gives the length of the run gives it exactly: `config.merged`.
+Later sources override earlier ones: preset, TOML file, `--iterations` (stretches the schedule), other options. A source
+that sets the length of the run sets it exactly: see `config.merged`.
 """
 
 from dataclasses import dataclass
@@ -35,9 +35,9 @@ class Sources:
 
 
 def base_settings(words: list[str]) -> tuple[Config, str]:
-    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is).
+    """The settings from preset, TOML file and `--iterations`, and a line on the schedule ("" = unchanged).
 
-    Where neither names a preset it is `paper`, and `sharp` with `--minutes`.
+    The default preset is `paper`, with `--minutes` it is `sharp`.
     """
     sources = parse_known(Sources, words)
     data: dict[str, object] = {"preset": "paper" if sources.minutes is None else "sharp"}
@@ -56,15 +56,15 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
         return with_settings(config, training=length), note
     note = (
         f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its fraction "
-        "(--schedule absolute leaves them in place)"
+        "(--schedule absolute keeps their iterations)"
     )
     return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
 
 
 def asked_settings(options: type, words: list[str], wanted: Config, kept: Config) -> Config:
-    """The settings `kept` of a run, changed where the command line or its TOML file names a setting.
+    """The settings `kept` of a run, changed where the command line or its TOML file sets a value.
 
-    wanted   settings that a new run with these words would have, of the length for its number of frames
+    wanted   settings of a new run with these words, with the length for its number of frames
     """
     sources, named = parse_known(Sources, words), explicit_settings(options, words)
     if sources.iterations is not None or "training.visits_per_frame" in named:
@@ -77,19 +77,19 @@ def asked_settings(options: type, words: list[str], wanted: Config, kept: Config
     for section, _, key in (name.partition(".") for name in named):
         if not key:
             data[section] = new[section]
-        elif key in new[section]:  # not so a key of an earlier version in a file
+        elif key in new[section]:  # a file may have keys of earlier versions
             data[section][key] = new[section][key]
     return config_from_dict(data, str(sources.config or "command line"))
 
 
 def explicit_settings(options: type, words: list[str]) -> frozenset[str]:
-    """Keys of the settings that the command line or its TOML file names: `model.bases`. A preset names none."""
+    """Keys of the settings in the command line and its TOML file: `model.bases`. A preset does not count."""
     sources = parse_known(Sources, words)
     asked = read_toml(sources.config) if sources.config else {}
     return frozenset(key for key in by_key(asked).keys() | given_keys(options, words) if "." in key)
 
 
 def differences(config: Config, other: Config, name: str) -> list[str]:
-    """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
+    """`section.key = value (name: other value)` for every setting that differs from `other`, called `name`."""
     ours, theirs = by_key(msgspec.to_builtins(config)), by_key(msgspec.to_builtins(other))
     return [f"{key} = {ours[key]!r} ({name}: {theirs[key]!r})" for key in ours if ours[key] != theirs[key]]

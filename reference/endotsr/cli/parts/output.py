@@ -1,7 +1,7 @@
-"""Options that every command has: `-q` says less, `--log-file FILE` keeps what is said.
+"""Output options of every command: `-q` prints only errors, `--log-file FILE` also writes the output to a file.
 
-In: the words of a command line. Out: the words without these options, and streams in the place of the standard ones.
-Errors are always printed. A log file gets every line of standard output and standard error, also with `-q`.
+In: the words of a command line. Out: the words without these options, and redirected standard streams. Errors are
+always printed. A log file contains all standard output and standard error, also with `-q`.
 """
 
 import contextlib
@@ -16,14 +16,14 @@ QUIET, LOG_FILE = ("-q", "--quiet"), "--log-file"
 
 
 class OutputOptions(NamedTuple):
-    """Where a command says what it says."""
+    """The output options."""
 
     quiet: bool = False
     log_file: Path | None = None
 
 
 def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
-    """The options of this module, and the other words in their order.
+    """The output options, and the other words in order.
 
     Raises: InputError for `--log-file` without a value.
     """
@@ -45,7 +45,7 @@ def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
 
 @contextlib.contextmanager
 def saying(output: OutputOptions) -> Iterator[None]:
-    """Standard output and standard error as asked for, during the block; the log file is written from its beginning.
+    """Redirect standard output and standard error for the block; an existing log file is overwritten.
 
     Raises: InputError if the log file cannot be written.
     """
@@ -66,14 +66,14 @@ def _opened(file: Path) -> IO[str]:
 
 
 class _Tee:
-    """A text stream that writes to a shown stream, to a log, to both or to none."""
+    """A text stream that writes to a shown stream, a log, both or neither."""
 
     def __init__(self, shown: Any, log: IO[str] | None) -> None:
         self._shown, self._log = shown, log
         self.encoding = "utf-8"
 
     def write(self, text: str) -> int:
-        """As a text file."""
+        """As `TextIO.write`."""
         if self._shown is not None:
             self._shown.write(text)
         if self._log is not None:
@@ -81,17 +81,17 @@ class _Tee:
         return len(text)
 
     def flush(self) -> None:
-        """As a text file."""
+        """As `TextIO.flush`."""
         for stream in (self._shown, self._log):
             if stream is not None:
                 stream.flush()
 
     def isatty(self) -> bool:
-        """Whether the shown stream is a terminal, on which a progress bar is drawn."""
+        """Whether to draw a progress bar: the shown stream is a terminal, and there is no log."""
         return self._log is None and self._shown is not None and self._shown.isatty()
 
     def fileno(self) -> int:
-        """Of the shown stream. Raises: OSError without one."""
+        """The descriptor of the shown stream. Raises: OSError without one."""
         if self._shown is None:
             raise OSError("a quiet stream has no file")
         return self._shown.fileno()

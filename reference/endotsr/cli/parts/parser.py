@@ -1,8 +1,8 @@
-"""From the words of a command line to the typed options of a command.
+"""Parse a command line into the typed options of a command.
 
-argparse splits the words into options, values and positional arguments; the types of the options class convert the
-values, and msgspec checks the sections of settings. A mistake is an InputError of one line that names the option and
-what is allowed; no text of argparse is shown or read.
+argparse splits the words into options, values and positional arguments. Values are converted by the types of the
+options class; sections of settings are checked by msgspec. A mistake raises a one-line InputError with the option and
+the allowed values, never a message of argparse.
 """
 
 import argparse
@@ -27,9 +27,9 @@ SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a setting
 
 
 def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
-    """The options of one command, over the values of `default` if it is given.
+    """The options of a command, with defaults from `default`, if given.
 
-    `--help` prints those that people set, `--help-all` prints all of them; both leave with SystemExit(0).
+    `--help` prints the short help, `--help-all` all options; both raise SystemExit(0).
 
     Raises:  InputError for an unknown option, a value of the wrong type or range, a missing option, and a file that
              cannot be written.
@@ -52,20 +52,20 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
 
 
 def parse_known(options: type[T], words: list[str]) -> T:
-    """These options alone, from words with other options too. Raises InputError for a value that is not allowed."""
+    """These options only, from words that may have others too. Raises InputError for an invalid value."""
     fields = fields_of(options)
     return _built(options, fields, _given(fields, words)[0], None)
 
 
 def given_keys(options: type, words: list[str]) -> frozenset[str]:
-    """Keys of the options that words name: `model.bases` for `--model.bases 9`, `sequence.scale` for `--scale 1`."""
+    """Keys of the given options: `model.bases` for `--model.bases 9`, `sequence.scale` for `--scale 1`."""
     fields = fields_of(options)
     named = {field.path: field.key for field in fields}
     return frozenset(named[path] for path in _given(fields, words)[0])
 
 
 def _given(fields: list[Field], words: list[str]) -> tuple[dict[tuple[str, ...], Any], list[str]]:
-    """Path -> converted value of every option that was given, and the words that belong to none."""
+    """Path -> converted value of every given option, and the words that belong to none."""
     by_path = {".".join(field.path): field for field in fields}
     parser = _parser(fields)
     try:
@@ -89,17 +89,17 @@ def _parser(fields: list[Field]) -> argparse.ArgumentParser:
             parser.add_argument(field.name, dest=path, action="store_true")
             parser.add_argument(field.off, dest=path, action="store_false")
         else:
-            several = field.count != "*" or field.may_be_empty  # otherwise an option without any value is a slip
+            several = field.count != "*" or field.may_be_empty  # otherwise an option without values is a mistake
             count = field.count if several else "+"
             parser.add_argument(field.name, dest=path, nargs=None if count == 1 else count)
     return parser
 
 
 def _plain_words(fields: list[Field], words: list[str]) -> list[str]:
-    """The words as argparse takes them: names with `-` for `_`, and every switch as `--name` or `--no-name`.
+    """The words in the form of argparse: names with `-` for `_`, and every switch as `--name` or `--no-name`.
 
-    `--model.appearance false` becomes `--model.no-appearance`, as a settings file would say it, and `--x -1e-3`
-    becomes `--x=-1e-3`, because argparse would read the number as an option. Raises InputError for `--switch=other`.
+    `--model.appearance false`, the form of a settings file, becomes `--model.no-appearance`. `--x -1e-3` becomes
+    `--x=-1e-3`, because argparse would read the number as an option. Raises InputError for `--switch=other`.
     """
     by_name = {field.name: field for field in fields if not field.positional}
     out: list[str] = []
@@ -132,7 +132,7 @@ def _is_negative(word: str) -> bool:
 
 
 def _value(field: Field, found: Any) -> Any:
-    """The value that argparse found (words, or True or False for a switch), converted to the type of the option."""
+    """The value from argparse (words, or a boolean for a switch), converted to the type of the option."""
     if field.switch:
         return found
     words = [found] if field.count == 1 else found
@@ -146,7 +146,7 @@ def _value(field: Field, found: Any) -> Any:
 
 
 def converted(kind: Any, word: str) -> Any:
-    """A word converted to a type; limits are not checked. Raises ValueError if the word is no such value."""
+    """A word converted to a type; limits are not checked. Raises ValueError if that is impossible."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return converted(arguments[0], word)
@@ -174,7 +174,7 @@ def _refused(field: Field, word: str) -> InputError:
 
 
 def _written_out(field: Field, word: str) -> str:
-    """Advice for a number with a letter, such as 1k or 1.5M; "" for other words and options without such numbers."""
+    """Advice for a number with a suffix, such as 1k or 1.5M; "" for other words, or if the option has no numbers."""
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+)([kKM])", word)
     if found is None:
         return ""
@@ -187,7 +187,7 @@ def _written_out(field: Field, word: str) -> str:
 
 
 def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], Any], default: T | None) -> T:
-    """The options with the given values over the defaults; sections that changed are checked."""
+    """The options with the given values; changed sections are checked."""
     values: dict[str, Any] = {} if default is None else dict(vars(default))
     sections: dict[str, dict[str, Any]] = {}
     for path, value in given.items():

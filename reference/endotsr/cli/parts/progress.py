@@ -1,4 +1,4 @@
-"""Progress on the standard error: a bar on a terminal, single lines elsewhere; and the page of a training."""
+"""Progress on standard error (a bar on a terminal, lines elsewhere) and on the page of a training."""
 
 import math
 import statistics
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
     from endotsr.report.live_page import LivePage
 
-QUIET_SECONDS = 30.0  # between lines if the standard error is not a terminal
-BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the time left is in the postfix
-LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # whose seconds give the time left
+QUIET_SECONDS = 30.0  # between lines if standard error is no terminal
+BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the postfix contains the time left
+LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations for the time left
 FORECAST_AFTER = 30  # iterations of this process
-SPIKE = 10.0  # medians: a longer iteration compiled code and is left out
-MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
+SPIKE = 10.0  # medians; longer iterations compiled code and are left out
+MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR: every tenth iteration)
 
 
 class Progress:
-    """Loss and PSNR (running means over views), Gaussian count and time left.
+    """Loss and PSNR (running means over views), number of Gaussians and time left.
 
-    config   of the training, whose length is fixed
-    pixels   of a frame
-    page     is told of the same events, and of the time left
+    config   settings of the training, with a fixed length
+    pixels   per frame
+    page     receives the same events, and the time left
     """
 
     def __init__(self, config: Config, pixels: int, page: "LivePage | None" = None) -> None:
@@ -76,7 +76,7 @@ class Progress:
             self._page.update(entry, lambda: self._left(standing))
         if self._done == FORECAST_AFTER and (left := self._left(standing)) is not None:
             count = gaussians_at_end(self._config)
-            self.say(f"forecast: {left} of training from here, about {count} Gaussians at its end")
+            self.say(f"forecast: {left} of training left, about {count} Gaussians at the end")
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
@@ -90,14 +90,14 @@ class Progress:
             )
 
     def say(self, message: str) -> None:
-        """A line that does not disturb the bar."""
+        """Print a line without breaking the bar."""
         if self._bar is not None:
             self._bar.write(message)
         else:
             print(message, flush=True)
 
     def close(self) -> None:
-        """End the line of the bar, and the page."""
+        """Close the bar and the page."""
         if self._page is not None:
             self._page.close()
         if self._bar is not None:
@@ -105,7 +105,7 @@ class Progress:
 
     def _state(self, entry: LogEntry, left: str | None) -> str:
         shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
-        time_left = "time left not known yet" if left is None else f"{left} left"
+        time_left = "time left unknown" if left is None else f"{left} left"
         return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left}"
 
     def _standing(self, entry: LogEntry) -> Standing:
@@ -118,7 +118,7 @@ class Progress:
 
 
 def unit_seconds(seconds: Sequence[float]) -> float | None:
-    """Seconds of a unit of work from those of the latest iterations, without those that compiled code; None = unknown.
+    """Mean seconds per unit of work, without iterations that compiled code; None = too few iterations.
 
     seconds   of the latest iterations, each divided by its work
     """
@@ -129,7 +129,7 @@ def unit_seconds(seconds: Sequence[float]) -> float | None:
 
 
 class StepBar:
-    """A progress bar on a terminal; one line at the beginning elsewhere."""
+    """A progress bar on a terminal; elsewhere one line at the beginning."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -151,7 +151,7 @@ class StepBar:
         self._bar.update(count)
 
     def say(self, message: str) -> None:
-        """A line that does not disturb the bar."""
+        """Print a line without breaking the bar."""
         if self._bar is not None:
             self._bar.clear()
         print(message, flush=True)

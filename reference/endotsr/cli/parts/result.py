@@ -1,4 +1,4 @@
-"""`--json FILE`, which every command that prints a result has: the same result for programs."""
+"""`--json FILE`, an option of every command with a result: the result for programs."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +10,6 @@ JsonFile = Annotated[Path | None, Option("FILE", written=True)]
 
 
 def write_result(file: Path | None, **result: Any) -> None:
-    """Write the result as JSON if a file is named; paths become text, and numbers that are not finite null."""
+    """Write the result as JSON if a file is given; paths become text, non-finite numbers null."""
     if file is not None:
         write_json(file, result)

@@ -18,7 +18,7 @@ AUTO = "auto"
 
 
 def train_windows(out: Path, place: "Place") -> int:
-    """Train the windows of a plan; 0, or 1 if a window failed."""
+    """Train the windows of a plan; returns 0, or 1 if a window failed."""
     from endotsr.sweeps.execute import FINISHED
     from endotsr.sweeps.place import outcomes_at
     from endotsr.windows.make import make_windows, size_of
@@ -36,12 +36,12 @@ def train_windows(out: Path, place: "Place") -> int:
 
 
 def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: int, chain: int) -> None:
-    """Survey a recording and write the plan of its windows: a number of frames each, or `auto`."""
+    """Survey a recording and write its window plan; `windows` is a number of frames or `auto`."""
     from endotsr.windows.make import plan_recording
     from endotsr.windows.plan import Wanted
 
     if source in ("", SIMULATED):
-        raise InputError("train: --windows cuts a sequence folder; allowed: a folder of `prepare` or `simulate`")
+        raise InputError("train: --windows needs a sequence folder; allowed: a folder of `prepare` or `simulate`")
     if windows != AUTO and not (windows.isascii() and windows.isdecimal()):
         raise InputError(f"train: --windows {windows!r} is not allowed; allowed: auto, or a number of frames")
     refuse_inside(out, Path(source), "the sequence")
@@ -51,7 +51,7 @@ def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: 
 
 
 def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> dict[str, Any]:
-    """Measure a run of windows, write metrics.json into its folder, and print the tables; returns the metrics."""
+    """Evaluate a run of windows, write metrics.json to its folder, and print the tables; returns the metrics."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.report.run_text import held_out_table
     from endotsr.windows.measure import measure_windows
