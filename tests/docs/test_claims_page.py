@@ -156,7 +156,7 @@ def psnr(record: dict, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "words, with_, without",
-    [("Spectral motion", "S", "base"), ("Temporal appearance improves", "A+S", "S"), ("Laplacian detail", "A+S+L", "A+S"),
+    [("Spectral motion", "S", "base"), ("Temporal appearance", "A+S", "S"), ("Laplacian detail", "A+S+L", "A+S"),
      ("With a fixed number", "A+S+L fixed", "S fixed"), ("The Matérn prior", "S", "S without prior"),
      ("The same with a fixed", "S fixed", "S without prior fixed")],
 )  # fmt: skip

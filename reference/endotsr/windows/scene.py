@@ -67,7 +67,7 @@ class WindowedScene(MovingScene):
     @cached_property
     def frames(self) -> list[int]:
         """The covered frames of the recording, ascending, as listed by `record`."""
-        return covered(self.plan)
+        return sorted({g for window in self.plan.windows for g in range(window.first, window.end)})
 
     @cached_property
     def cameras(self) -> list[Camera]:
@@ -147,11 +147,6 @@ def blended(renders: list[RenderOut], weights: list[float]) -> RenderOut:
         return total
 
     return renders[0]._replace(**{name: summed(name) for name in ("colour", "depth", "opacity")})
-
-
-def covered(plan: WindowsRecord) -> list[int]:
-    """The frames covered by windows, ascending."""
-    return sorted({g for window in plan.windows for g in range(window.first, window.end)})
 
 
 def open_any(path: Path) -> MovingScene:
