@@ -1,4 +1,4 @@
-"""One page a room of the package under docs/api, written for autodoc; docstrings are laid out by `docstring_layout`."""
+"""One page per room of the package in docs/api, written for autodoc; `docstring_layout` formats the docstrings."""
 
 import ast
 import inspect
@@ -30,12 +30,12 @@ GROUPS = (
     ("Checks and ports", "Gradients, stored numbers, and the registry of both.", ("gradcheck", "golden", "stages")),
     ("Time and accuracy", "Measurements of this machine, and many runs.", ("bench", "tradeoff", "sweeps")),
     ("Commands", "The program `endotsr`.", ("cli",)),
-)  # in the order in which a user meets them
+)  # in the order of use
 ROLE = re.compile(r"\{([\w:]+)\}(?=`)")
 
 
 def rooms() -> dict[str, list[str]]:
-    """Modules that define something public, by the room of the package that they stand in."""
+    """Modules with public definitions, by room of the package."""
     found: dict[str, list[str]] = {}
     for name in dict.fromkeys(dotted.rpartition(".")[0] for dotted in definitions()):
         parts = name.split(".")
@@ -45,7 +45,7 @@ def rooms() -> dict[str, list[str]]:
 
 
 def room_page(room: str, names: list[str]) -> str:
-    """All modules of a room on one page: few pages build fast, and a search in the browser finds a function."""
+    """All modules of a room on one page: few pages build fast, and the browser can search them."""
     lines = [NOTE + f"# {room}", ""]
     for name in names:
         lines += [f"## {name}", "", "```{eval-rst}", f".. automodule:: {name}", "   :members:"]
@@ -54,14 +54,14 @@ def room_page(room: str, names: list[str]) -> str:
 
 
 def summary(room: str) -> str:
-    """The first sentence of the docstring of a room; that of the package for its modules without a room."""
+    """The first sentence of the docstring of a room, or of the package for modules without a room."""
     tree = ast.parse(modules()["endotsr" if room == "package" else f"endotsr.{room}"].read_text(encoding="utf-8"))
     first = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
     return re.split(r"(?<=\.)\s", first)[0]
 
 
 def index_page() -> str:
-    """The rooms in the order in which a user meets them. Raises: ExtensionError for a room without a group."""
+    """The rooms in the order of use. Raises: ExtensionError for a room without a group."""
     lines = [NOTE + "# API", "", "Every public function of `endotsr`: shapes, units, edges, errors, and its source."]
     lines += ["A program that uses the package starts with {doc}`/guides/python`.", ""]
     known = [room for _, _, names in GROUPS for room in names]
@@ -84,13 +84,13 @@ def write_api(app: Sphinx) -> None:
 
 
 def field_comments(dotted: str) -> list[str]:
-    """`name  comment` of the fields of a class that carry one, from its source."""
+    """`name  comment` of the commented fields of a class, from its source."""
     module, _, name = dotted.rpartition(".")
     if module not in modules():
         return []
     text = modules()[module].read_text(encoding="utf-8")
     node = next((n for n in ast.parse(text).body if isinstance(n, ast.ClassDef) and n.name == name), None)
-    body = node.body if node else []  # a name for a type is no class of its own
+    body = node.body if node else []  # a type alias is not a class
     fields = [n for n in body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)]
     comments = [
         (ast.unparse(n.target), text.splitlines()[(n.end_lineno or n.lineno) - 1].partition("#")[2].strip())
@@ -100,7 +100,7 @@ def field_comments(dotted: str) -> list[str]:
 
 
 def book_line(dotted: str) -> str:
-    """Where the book derives, checks and pins a function; "" for one that implements no equation alone."""
+    """Links to the derivation, check and golden cases of a function; "" unless it implements an equation."""
     for row in equations():
         if dotted in row.functions:
             parts = (f"reverse {reverse_links(row)}", f"check {check_links(row)}", f"golden cases {golden_links(row)}")
@@ -111,14 +111,14 @@ def book_line(dotted: str) -> str:
 
 
 def process(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
-    """Hand the docstring over as it is; the directive makes the nodes."""
+    """Pass the docstring on unchanged; the directive builds the nodes."""
     fields = field_comments(name) if what in ("class", "exception") else []
     text = [*lines, "", *fields]
     lines[:] = [".. docstring::", "", *(f"   {line}" for line in text), "", book_line(name)]
 
 
 def skip(app: Sphinx, what: str, name: str, found: Any, skipped: bool, options: Any) -> bool | None:
-    """Fields stand in the table of their class."""
+    """Skip fields, which are in the table of their class."""
     is_field = what == "class" and not (inspect.isfunction(found) or isinstance(found, property | classmethod))
     return True if is_field else None
 

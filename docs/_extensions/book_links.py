@@ -1,6 +1,6 @@
-"""Links that are made when a page is read; the sources stay plain text.
+"""Links added when a page is read; the sources stay plain text.
 
-Under the heading of a specification page stands a line of links for each of its equations. Names of the package in back
+A specification page has a line of links for each of its equations below its heading. Names of the package in back
 quotes become links, in pages and in the Markdown cells of notebooks. The reverse pass of a notebook gets an anchor.
 """
 

@@ -1,7 +1,7 @@
 """The map of the book: for each equation its functions, reverse pass, gradient check, golden cases and notebooks.
 
-Everything is read from the registry of stages, `golden/cases` and the notebooks. Only what no stage can say is here:
-the functions of equations without a derivative, why they have none, and which tests check them instead.
+Everything is read from the registry of stages, `golden/cases` and the notebooks. Only information without a stage is
+here: the functions of equations without a derivative, the reason, and the tests that check them instead.
 """
 
 import json
@@ -24,9 +24,9 @@ class Undifferentiated(NamedTuple):
 
     functions: tuple[str, ...]
     reason: str  # why there is no reverse pass
-    tests: str  # what checks it instead
-    golden: str = ""  # family of golden cases that contains it, or why there is none; "" = its own family
-    notebook: str = ""  # why no notebook announces it; "" = one does
+    tests: str  # tests that check it instead
+    golden: str = ""  # family of golden cases that contains it, or the reason for none; "" = its own family
+    notebook: str = ""  # the reason if no notebook announces it; "" = one does
 
 
 UNDIFFERENTIATED = {
@@ -119,7 +119,7 @@ REVERSE_OF = {"endotsr.fitting.objective.image_loss": "endotsr.fitting.objective
 
 
 class Equation(NamedTuple):
-    """One row of the map. Every tuple is non-empty, or the reason beside it is given."""
+    """One row of the map. Every tuple is non-empty, or its absence has a reason."""
 
     label: str
     page: str

@@ -1,6 +1,6 @@
-"""Pages that are written when the book is built: the map of the equations, the gradient checks, the golden cases.
+"""Pages generated when the book is built: the map of the equations, the gradient checks, the golden cases.
 
-They are Markdown files beside the others, not kept in git, and rewritten only when they change.
+They are Markdown files in the folder of the other pages, ignored by git, and rewritten only when they change.
 """
 
 import hashlib
@@ -33,7 +33,7 @@ def function_links(row: Equation) -> str:
 
 
 def reverse_links(row: Equation) -> str:
-    """The derivation in a notebook, then the functions; or why there is none, and where that is explained."""
+    """The derivation in a notebook, then the functions; or the reason for none, with a link to its explanation."""
     anchors = [f"reverse-{name}" for name in row.notebooks if has_derivation(name)][:1]
     if row.without:
         return ", ".join([f"none: {row.without.reason}", *(f"{{ref}}`why <{anchor}>`" for anchor in anchors)])
@@ -49,7 +49,7 @@ def check_links(row: Equation) -> str:
 
 
 def without_repetition(names: list[str]) -> list[str]:
-    """The first name whole, then only what differs, where all start with the same stage."""
+    """The first name in full, then only the differing parts if all start with the same stage."""
     first = names[0]
     stages = [pair.function.rpartition(".")[2].removesuffix("_forward") for pair in all_pairs().values()]
     stage = next((s for s in stages if all(name.startswith(f"{s}_") for name in names)), None)
@@ -67,7 +67,7 @@ def notebook_links(row: Equation) -> str:
 
 
 def link_line(row: Equation) -> str:
-    """One line under the heading of a specification page: everything about one equation, one click away."""
+    """One line below the heading of a specification page, with all links of one equation."""
     return (
         f"{{eq}}`eq-{row.label}`: code {function_links(row)}; reverse {reverse_links(row)}; check {check_links(row)}; "
         f"golden {golden_links(row)}; notebook {notebook_links(row)}; {{ref}}`all equations <equation-map>`."
@@ -119,7 +119,7 @@ def checks_page(reports: dict[str, PairReport]) -> str:
 
 
 def _tests(row: Equation) -> Iterator[str]:
-    """An equation without a derivative: what tests it."""
+    """The tests of an equation without a derivative."""
     assert row.without
     yield from (f"(check-{row.label})=", f"### {row.without.tests}", "")
     yield f"No gradient: {row.without.reason}. The tests of `{row.without.tests}`:"
@@ -139,7 +139,7 @@ def _report(name: str, function: str, report: PairReport) -> Iterator[str]:
 
 
 def definition_page(found: list[Distance]) -> str:
-    """The worst difference of every output from the definition; a book with a wrong one is not built."""
+    """The worst difference of every output from the definition. A difference above its bound stops the build."""
     if wrong := [
         f"{d.stage}.{d.output}: {d.distance:.1e} of {d.bound:.0e}" for d in found if not d.distance <= d.bound
     ]:
@@ -207,13 +207,13 @@ def _arrays(entries: dict) -> str:
 
 
 def source_digest() -> str:
-    """What the measured page depends on."""
+    """Digest of the sources on which the measured pages depend."""
     sources = [*sorted(PACKAGE.rglob("*.py")), *sorted(Path(__file__).parent.glob("*.py"))]
     return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
 
 
 def gradient_reports() -> dict[str, PairReport]:
-    """The check of every pair; a book with a wrong gradient is not built."""
+    """The check of every pair. A wrong gradient stops the build."""
     with one_thread():
         reports = {name: check_pair(pair, pair_stream(name, 0)) for name, pair in all_pairs().items()}
     failures = [f"{name}: {reason}" for name, report in reports.items() for reason in report.failures]
@@ -223,7 +223,7 @@ def gradient_reports() -> dict[str, PairReport]:
 
 
 def write(file: Path, text: str) -> None:
-    """Write, but leave the date of an unchanged file alone: Sphinx reads it again otherwise."""
+    """Write a changed file only: Sphinx rereads files with a new date."""
     if not file.is_file() or file.read_text(encoding="utf-8") != text:
         file.write_text(text, encoding="utf-8", newline="\n")
 

@@ -1,7 +1,7 @@
-"""A finished run in the book: the demo is trained when the book is built, and its report and viewer are pages of it.
+"""A finished run in the book: the build trains the demo, whose report and viewer become pages.
 
-They are the folder `demo` of the built book. A run of the same sources is kept. ENDOTSR_DOCS_EXECUTE=0 leaves the run
-out, as it does the pictures of the notebooks.
+They are in the folder `demo` of the built book. A run of the same sources is kept. ENDOTSR_DOCS_EXECUTE=0 omits the
+run, like the pictures of the notebooks.
 """
 
 import os
@@ -21,7 +21,7 @@ STAMP = "sources.txt"
 
 
 def train_demo(app: Sphinx, error: Exception | None) -> None:
-    """Train the demo after the pages are written, unless there is a run of these sources."""
+    """Train the demo after the pages are written, unless a run of these sources exists."""
     target = Path(app.outdir) / "demo"
     size = os.environ.get("ENDOTSR_NOTEBOOK_SIZE", "small")
     stamp = f"{size} {source_digest()}\n"

@@ -1,8 +1,8 @@
-"""Layout of the package's docstrings: aligned columns become tables, `Edges:` and its like become fields.
+"""Layout of the package's docstrings: aligned columns become tables, `Edges:` and similar notes become fields.
 
-The layout is the one of the sources: a summary, rows `name  (shape)  text` with two or more spaces between the
-columns, then `Reverse:`, `Edges:`, `Raises:`, `Oracle:`. Nodes are built directly, so that no character of a
-formula is taken for markup. Names in back quotes that the package defines and equation numbers become links.
+A docstring has a summary, rows `name  (shape)  text` with two or more spaces between the columns, then `Reverse:`,
+`Edges:`, `Raises:`, `Oracle:`. Nodes are built directly, because characters of a formula must not be parsed as markup.
+Names in back quotes that the package defines and equation numbers become links.
 """
 
 import re
@@ -18,7 +18,7 @@ KEYS = ("Reverse", "Edges", "Raises", "Oracle", "Source", "Draws", "Its mask")
 NOTE = re.compile(rf"^({'|'.join(KEYS)}):\s*(.*)$")
 ROW = re.compile(r"^(\S.*?)\s{2,}(\S.*)$")
 SHAPE = re.compile(r"^(\([^()]*\)(?: bool)?)(?:\s{2,}(\S.*))?$")
-# `code`, or an equation number after the words that announce one, or a number of the base model standing alone
+# `code`, or an equation number after the word "equation", or a number of the base model alone
 INLINE = re.compile(
     r"`(?P<code>[^`]+)`|(?P<bare>\b[a-z]+_\w+\b)"
     r"|(?:(?<=quation )|(?<=quations ))\((?P<paper>\d+[a-z]?)\)"
@@ -27,7 +27,7 @@ INLINE = re.compile(
 
 
 class DocstringDirective(SphinxDirective):
-    """The content of the directive, taken as a docstring."""
+    """Formats the content of the directive as a docstring."""
 
     has_content = True
 
@@ -47,7 +47,7 @@ def blocks(lines: Iterable[str]) -> Iterator[list[str]]:
 
 
 def render(lines: list[str], env: BuildEnvironment) -> Iterator[nodes.Element]:
-    """Nodes of one block: a formula if it is indented, else paragraphs, rows and notes in the order they come."""
+    """Nodes of one block: a formula if it is indented, else paragraphs, rows and notes in order."""
     if lines[0].startswith("    "):
         yield literal(lines)
         return
@@ -61,7 +61,7 @@ def render(lines: list[str], env: BuildEnvironment) -> Iterator[nodes.Element]:
 
 
 def grouped(lines: list[str]) -> Iterator[tuple[str, list[list[str]]]]:
-    """Entries of the same kind together; an entry is a first line with the lines that continue it."""
+    """Groups of entries of the same kind; an entry is a first line with its continuation lines."""
     group: list[list[str]] = []
     kind = ""
     for line in lines:
@@ -79,7 +79,7 @@ def grouped(lines: list[str]) -> Iterator[tuple[str, list[list[str]]]]:
 
 
 def kind_of(line: str, before: str) -> str:
-    """`row`, `note` or `text`; `more` for a line that belongs to the one above."""
+    """`row`, `note` or `text`; `more` for a continuation line."""
     if before and line.startswith(" "):
         return "more"
     if NOTE.match(line):
@@ -98,7 +98,7 @@ def literal(lines: list[str]) -> nodes.literal_block:
 
 
 def paragraphs(entries: list[list[str]], env: BuildEnvironment) -> Iterator[nodes.Element]:
-    """Text, and the indented lines that may follow it as a formula."""
+    """Text, with any following indented lines as a formula."""
     for entry in entries:
         split = next((k for k, line in enumerate(entry) if line.startswith("    ")), len(entry))
         yield nodes.paragraph("", "", *inline(" ".join(line.strip() for line in entry[:split]), env))
@@ -107,7 +107,7 @@ def paragraphs(entries: list[list[str]], env: BuildEnvironment) -> Iterator[node
 
 
 def table(entries: list[list[str]], env: BuildEnvironment) -> nodes.table:
-    """Rows `name, shape, text`; the column of shapes is left out where no row has one."""
+    """Rows `name, shape, text`; the column of shapes is omitted if no row has one."""
     rows = []
     for first, *more in entries:
         name, rest = ROW.match(first).groups()  # type: ignore[union-attr]
@@ -142,7 +142,7 @@ def field_list(entries: list[list[str]], env: BuildEnvironment) -> nodes.field_l
 
 
 def inline(text: str, env: BuildEnvironment) -> list[nodes.Node]:
-    """Text with its links: code the package defines, numbers of equations."""
+    """Text with its links: names defined by the package, and equation numbers."""
     found: list[nodes.Node] = []
     end = 0
     for match in INLINE.finditer(text):
@@ -159,14 +159,14 @@ def inline(text: str, env: BuildEnvironment) -> list[nodes.Node]:
 
 
 def code(text: str, env: BuildEnvironment) -> nodes.Node:
-    """A literal that links to the object of that name, if there is one."""
+    """A literal, linked to the object of that name if it exists."""
     content = nodes.literal("", text, classes=["py"])
     target = linkable().get(text.removesuffix("()"))
     return xref("py", "obj", target, content, env) if target else content
 
 
 def equation(number: str, text: str, env: BuildEnvironment) -> nodes.Node:
-    """A link to the display, which shows as its number in brackets."""
+    """A link to the display, shown as its number in brackets."""
     if number.lower() not in equation_pages():
         return nodes.Text(text)
     return xref("math", "eq", f"eq-{number.lower()}", nodes.Text(text), env)

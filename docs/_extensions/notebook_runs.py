@@ -1,12 +1,12 @@
-"""Copies the notebooks into the book, and runs them before its pages are read, as many at once as there are cores.
+"""Copies the notebooks into the book, and runs them before its pages are read, one per core at a time.
 
-The copies are docs/notebooks, which git ignores: a link in their place would be a text file in a clone on Windows.
-Every build makes them anew, and removes what has no notebook any more.
+The copies are in docs/notebooks, which git ignores; a symbolic link would be a text file in a clone on Windows. Every
+build updates the copies and removes copies without a notebook.
 
-MyST-NB runs a notebook when it reads its page, one after the other. Here the runs come first, and its cache, which
-lives no longer than the build, hands them to the pages. A notebook that fails is not in the cache: its page runs it
-again and reports the error. ENDOTSR_DOCS_CACHE=FOLDER keeps the runs for the next build, which is for work on the
-layout of the pages only: a kept run does not notice that the package has changed.
+MyST-NB alone would run the notebooks one after the other when it reads their pages. Here they run in advance, and its
+cache, which is deleted after the build, passes the results to the pages. A failed notebook is not in the cache: its
+page reruns it and reports the error. ENDOTSR_DOCS_CACHE=FOLDER keeps the runs for the next build. Use it only for work
+on the layout of the pages, because kept runs do not reflect changes of the package.
 """
 
 import logging
@@ -25,9 +25,9 @@ logger = getLogger(__name__)
 
 
 def copy_notebooks(app: Sphinx) -> None:
-    """Make docs/notebooks equal to the notebooks; the date of an unchanged copy stays, so that its page is kept."""
+    """Make docs/notebooks equal to the notebooks; unchanged copies keep their date, so their pages are not reread."""
     copies = DOCS / "notebooks"
-    if copies.is_symlink():  # of a checkout that had a link there
+    if copies.is_symlink():  # of an older checkout
         copies.unlink()
     copies.mkdir(exist_ok=True)
     sources = {file.name: file for file in NOTEBOOKS.iterdir() if file.suffix in (".py", ".md")}
@@ -38,7 +38,7 @@ def copy_notebooks(app: Sphinx) -> None:
 
 
 def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:
-    """Run those of `names` that are notebooks; the kernels that most of them call are compiled before."""
+    """Run the notebooks among `names`, after compiling the kernels that most of them call."""
     from jupyter_cache import get_cache
     from jupyter_cache.executors import load_executor
 
@@ -58,7 +58,7 @@ def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:
 
 
 def forget_runs(app: Sphinx, error: Exception | None) -> None:
-    """A run is as good as the kernels it called, and no longer: the next build runs what it reads."""
+    """Delete the runs: they are valid only for the kernels of this build."""
     if not os.environ.get("ENDOTSR_DOCS_CACHE"):
         shutil.rmtree(app.config.nb_execution_cache_path, ignore_errors=True)
 

@@ -1,4 +1,4 @@
-"""What can be linked to: the public names of the package, the equation labels of the specification, the notebooks."""
+"""Link targets: the public names of the package, the equation labels of the specification, the notebooks."""
 
 import ast
 import re
@@ -38,7 +38,7 @@ def definitions() -> dict[str, str]:
 
 @cache
 def linkable() -> dict[str, str]:
-    """Text in back quotes -> dotted target: full names, and short names that only one module defines."""
+    """Text in back quotes -> dotted target: full names, and short names defined by one module only."""
     compiled = {dotted: name for dotted, name in definitions().items() if not dotted.startswith(DEFINITION)}
     count = Counter(compiled.values())
     short = {name: dotted for dotted, name in compiled.items() if count[name] == 1}
@@ -48,7 +48,7 @@ def linkable() -> dict[str, str]:
 
 @cache
 def equation_pages() -> dict[str, str]:
-    """Equation label -> name of the page of the specification that displays it, in reading order."""
+    """Equation label -> name of its page of the specification, in reading order."""
     pages = sorted(SPECIFICATION.glob("*.md"), key=lambda page: (page.stem[0] == "m", page.stem[0] == "b", page.stem))
     return {label: page.stem for page in pages for label in LABEL.findall(page.read_text(encoding="utf-8"))}
 

@@ -1,4 +1,4 @@
-"""Equation numbers that are the paper's: the display labelled `eq-1b` is (1b), `eq-b5` is (B5)."""
+"""Equation numbers from labels: the display labelled `eq-1b` is (1b), `eq-b5` is (B5)."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from sphinx.domains.math import MathDomain
 
 
 class PaperMathDomain(MathDomain):
-    """The mathematics domain, with the number of an equation read from its label instead of counted."""
+    """The mathematics domain, with equation numbers from labels instead of a count."""
 
     def note_equation(self, docname: str, labelid: str, location: Any = None) -> None:
         super().note_equation(docname, labelid, location)

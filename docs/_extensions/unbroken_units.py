@@ -1,7 +1,7 @@
-"""Keeps a number on the line of its unit, and the groups of its digits together, on every page of the book.
+"""Prevents line breaks between a number and its unit, and between groups of digits, on every page of the book.
 
-A space between a number and a unit becomes a space at which no browser breaks a line. Code and mathematics stay as they
-are, but for long names in tables, which may break after a point or an underscore.
+A space between a number and a unit becomes a non-breaking space. Code and mathematics are unchanged, except for long
+names in tables, which may break after a point or an underscore.
 """
 
 import re
@@ -24,7 +24,7 @@ UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, n
 
 
 def unbroken(text: str) -> str:
-    """The text with unbreakable spaces, `12 ms` and `1 462 338`, and a whole exponent, `1e-4`."""
+    """The text with non-breaking spaces, `12 ms` and `1 462 338`, and unbroken exponents, `1e-4`."""
     return EXPONENT.sub("-\u2060", GROUPS.sub("\u202f", BREAKABLE.sub("\u00a0", text)))
 
 

@@ -1,10 +1,10 @@
-"""Where a run is better and where it is worse than optical flow between the frames: by held-out frame, and by pixels.
+"""A run compared with optical flow between the frames, by held-out frame and by kind of pixel.
 
     python docs/pages/against_flow.py RUN   write docs/results/against_flow.json from a finished run, then the tables
-    python docs/pages/against_flow.py       write the tables of the last result again
+    python docs/pages/against_flow.py       rewrite the tables of the last result
 
-The squared error of the tissue pixels is divided among kinds of pixels; a pixel belongs to the first kind that fits.
-The tables stand in docs/results/README.md between its marks.
+The squared error of the tissue pixels is divided among kinds of pixels; a pixel belongs to the first kind that applies.
+The tables are written to docs/results/README.md.
 """
 
 import argparse
@@ -82,7 +82,7 @@ def measured(run: Path) -> dict[str, Any]:
 
 
 def _frame(sequence: Sequence, index: int, errors: list[NDArray[np.floating]]) -> dict[str, Any]:
-    """PSNR over the tissue of one frame, and how far the tissue moves between its neighbours."""
+    """PSNR over the tissue of one frame, and the motion of the tissue between its neighbours."""
     near, tissue = neighbours(sequence, index), sequence.masks[index]
     flow = flows_between(sequence, near.before, near.after).forward
     model, other = (float(-10 * np.log10(error[tissue].mean())) for error in errors)

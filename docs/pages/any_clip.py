@@ -1,14 +1,14 @@
-"""One simulated scene through two layouts, one command a step, and the table of the cost of each input route.
+"""One simulated scene through two layouts, one command per step, and the table of the cost of each input route.
 
     python docs/pages/any_clip.py                measure, a few minutes on two cores
-    python docs/pages/any_clip.py --ways stereo  measure one way again
-    python docs/pages/any_clip.py --table        write the table of the last result again
+    python docs/pages/any_clip.py --ways stereo  repeat the measurement of one route
+    python docs/pages/any_clip.py --table        rewrite the table of the last result
 
-A moving camera with an instrument is written as an EndoNeRF folder without any loss, and as raw recordings in the
-layout of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends:
-the EndoNeRF folder with depth from its own stereo pairs, and a recording whose video has no loss. They separate the
-cost of the depth, of the layout and of the compression.
-The result is docs/results/any_clip.json; the table stands in docs/guides/prepare.md.
+A scene with a moving camera and an instrument is written as a lossless EndoNeRF folder, and as raw recordings in the
+layout of StereoMIS. A recording is processed by prepare, depth, check, train and render. Two intermediate routes, the
+EndoNeRF folder with depth from its stereo pairs and a recording with lossless video, separate the cost of the depth, of
+the layout and of the compression.
+The result is docs/results/any_clip.json; the table is in docs/guides/prepare.md.
 """
 
 import argparse
@@ -52,7 +52,7 @@ def said(*words: object) -> None:
 
 
 def made(root: Path, way: str) -> list[object]:
-    """Make the folder of a way; returns the words of `train` for it."""
+    """Create the folder of a route; returns its arguments of `train`."""
     clean, clip = root / "clean", root / way
     if way == "endonerf":
         return [clean, "--masks", "gt_masks"]
@@ -69,7 +69,7 @@ def made(root: Path, way: str) -> list[object]:
 
 
 def measured(root: Path, way: str) -> dict[str, float]:
-    """The held-out metrics of a way, those of its renders against the pictures without loss, and its input."""
+    """Held-out metrics of a route, metrics of its renders against the lossless pictures, and its input."""
     clean, run, report = root / "clean", root / f"run-{way}", root / f"{way}.json"
     said("train", *made(root, way), "--out", run, *TRAINING)
     said("render", run, "--film", root / f"{way}.mp4")
@@ -99,7 +99,7 @@ def frames_of(clean: Path, other: Path) -> Iterator[tuple[np.ndarray, np.ndarray
 
 
 def video_psnr(clean: Path, prepared: Path) -> float:
-    """PSNR in dB of the prepared pictures against those without loss, over all frames; infinite for equal ones."""
+    """PSNR in dB of the prepared pictures against the lossless ones, over all frames; infinite if equal."""
     error = np.mean([((a - b) ** 2).mean() for a, b in frames_of(clean, prepared)])
     return float(10 * np.log10(255**2 / error)) if error else float("inf")
 
@@ -107,7 +107,7 @@ def video_psnr(clean: Path, prepared: Path) -> float:
 def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> dict[str, float]:
     """Median absolute error in mm of the depth on tissue, and the fraction of the tissue that has depth.
 
-    wanted    frame -> depth to compare with, (H, W) in mm; where it is 0, nothing is compared
+    wanted    frame -> reference depth, (H, W) in mm; 0 = not compared
     """
     recording = open_common(prepared)
     errors, covered = [], []
@@ -122,7 +122,7 @@ def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> d
 
 
 def table(result: dict[str, Any]) -> str:
-    """One way a row, and what separates them."""
+    """One row per route, and the differences between them."""
     ways, rows = result["ways"], []
     for way, label in WAYS.items():
         if way not in ways:

@@ -1,12 +1,12 @@
-"""Measure where the time goes, and write the generated parts of docs/bench.md and its pictures.
+"""Measure the distribution of time, and write the generated parts of docs/bench.md and its pictures.
 
     python docs/pages/bench.py measure [WHAT ...] [--scenes FILE ...] [--out FOLDER]
-                                            on a machine that has nothing else to do: start, stages, peers and scaling,
-                                            or those named; `effects` belongs to docs/effects.md
+                                            on an otherwise idle machine: start, stages, peers and scaling, or the
+                                            named measurements; `effects` belongs to docs/effects.md
     python docs/pages/bench.py              the page from docs/results
     python docs/pages/bench.py FOLDER       from the files of another folder; pictures are written there too
 
-`endotsr bench` of the package times the stages of this machine alone.
+The command `endotsr bench` only times the stages on this machine.
 """
 
 import sys

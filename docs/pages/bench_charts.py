@@ -26,7 +26,7 @@ from endotsr.report.style import (
     save,
 )
 
-# The stages in five groups: so many colours can be told apart and named. The tables list every stage.
+# The stages in five groups, which five colours can distinguish. The tables list every stage.
 GROUPS = {
     "time bases": (("FDM", "Fourier"), BLUE),
     "splatting": (("projection", "binning", "blend forward", "blend reverse"), ORANGE),
@@ -38,7 +38,7 @@ assert {stage for stages, _ in GROUPS.values() for stage in stages} == {*STAGES,
 
 
 def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """One stacked bar a case with the groups of stages; the time of the whole iteration is printed at its end."""
+    """One stacked bar per case with the groups of stages, labelled with the time of the whole iteration."""
     figure = new_figure(9.6, 1.7 + 0.42 * len(cases))
     axes = figure.subplots()
     labels = [_label(case["case"]) for case in cases]
@@ -89,14 +89,14 @@ def scaling_curves(axes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
 
 
 def _logarithmic(panel: Any, size: Sequence[float], curves: int) -> None:
-    """Make both axes logarithmic with few plain labels: the sizes themselves where their range is small."""
+    """Make both axes logarithmic with few plain labels: the sizes themselves if their range is small."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     panel.set_xscale("log")
     panel.set_yscale("log")
     low, high = panel.get_ylim()
     middle = (low * high) ** 0.5
-    low, high = min(low, middle / 4), max(high, middle * 4)  # so that the noise of a flat curve does not fill the panel
+    low, high = min(low, middle / 4), max(high, middle * 4)  # the noise of a flat curve must not fill the panel
     panel.set_ylim(low / 1.2, high * 9.0 ** (curves / 6.0))  # room for the legend above the curves
     if max(size) < 10 * min(size):
         panel.set_xticks(size)

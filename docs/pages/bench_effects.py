@@ -1,10 +1,10 @@
-"""`bench.py measure effects`: what every part that can be switched off takes of an iteration, and that off is free.
+"""`bench.py measure effects`: the cost of each optional component, and proof that a disabled component is free.
 
-For each part two states of the common workload take turns, one with everything and one with the part off, so that other
-work on the machine disturbs both alike. A third build takes turns with them: the second state, while the functions of
-the part do not exist. It must take the same time and memory. It has the same arrays, because the place of an array in
-memory alone is worth a few percent of the time. Memory is what Gaussians and moments hold that were made in such a
-build, and the most that one iteration allocates beside what is held before it.
+For each component, iterations of two states of the common workload alternate, one with everything and one with the
+component off. Other work on the machine then disturbs both equally. A third build alternates with them: the second
+state, with the functions of the component removed. It must need the same time and memory. It uses the same arrays,
+because the address of an array alone changes the time by a few percent. Memory is the size of Gaussians and moments
+created in such a build, and the peak allocation of one iteration beyond it.
 """
 
 import statistics
@@ -27,7 +27,7 @@ from endotsr.scene.gaussians import arrays
 
 
 class Part(NamedTuple):
-    """A part, the setting that turns it off, and the functions that only it calls."""
+    """A component, the setting that disables it, and the functions that only it calls."""
 
     name: str
     key: str
@@ -48,10 +48,10 @@ PARTS = (
 
 
 def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, config: Config = PAPER) -> dict[str, Any]:
-    """Seconds of processor time of an iteration with everything, with a part off, and without its functions.
+    """Seconds of processor time of an iteration with everything, with a component off, and without its functions.
 
     returns  JSON-able: "parts" {name: {"saved": 1 - off / everything, "off_over_absent", "memory_saved", ...}}, medians
-             of `repeats` turns; held bytes and the bytes that an iteration allocates at most, of all three; sizes
+             of `repeats` turns; stored bytes and peak allocated bytes of an iteration, of all three; sizes
     """
     found = {part.name: _one(part, gaussians, repeats, width, height, config) for part in PARTS}
     return {"gaussians": gaussians, "width": width, "height": height, "repeats": repeats, "parts": found}
@@ -71,7 +71,7 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
     seconds: dict[str, list[float]] = {name: [] for name in builds}
     for turn in range(repeats + 2):
         for name, (state, constants, missing) in builds.items():
-            _iteration(state, constants, missing)  # fills the caches, which the state before it left with its own
+            _iteration(state, constants, missing)  # fills the caches with the data of this state
             taken = _iteration(state, constants, missing)
             if turn >= 2:  # after compilation and one warm turn
                 seconds[name].append(taken)
@@ -92,7 +92,7 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
 
 
 def changed(config: Config, part: Part) -> Config:
-    """The configuration with a part off."""
+    """The configuration with a component off."""
     data = msgspec.to_builtins(config)
     section, name = part.key.split(".")
     data[section][name] = part.off
@@ -118,9 +118,9 @@ def _iteration(state: Any, constants: Any, missing: tuple[tuple[Any, str], ...])
 
 
 def _allocated(state: Any, constants: Any, missing: tuple[tuple[Any, str], ...]) -> int:
-    """The most bytes that NumPy and Python allocate in one iteration beside what is held; not those inside kernels."""
+    """Peak bytes allocated by NumPy and Python in one iteration beyond the stored state; kernels are not included."""
     with _without(missing):
-        for _ in range(3):  # compiles, and allocates what stays
+        for _ in range(3):  # compiles, and allocates lasting arrays
             _step(state, constants)
         tracemalloc.start()
         try:
@@ -131,7 +131,7 @@ def _allocated(state: Any, constants: Any, missing: tuple[tuple[Any, str], ...])
 
 
 def _step(state: Any, constants: Any) -> None:
-    """One iteration, after which the state counts as before."""
+    """One iteration; the iteration count of the state is restored."""
     from endotsr.fitting.trainer import training_step
 
     iteration = state.iteration

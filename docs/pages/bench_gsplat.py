@@ -1,8 +1,8 @@
 """gsplat's pure-torch reference, with autograd, on scenes of this package: an independent image and gradient.
 
 torch and gsplat are optional (`pip install 'endotsr[peers]'`) and imported inside the functions. Covariance,
-projection, harmonics and alpha are gsplat's own Python formulas. Two pieces of that reference need a GPU and are
-replaced here: the list of (Gaussian, pixel) pairs, made by a CUDA kernel, and nerfacc, which adds up along rays.
+projection, harmonics and alpha are gsplat's own Python formulas. Two parts of that reference need a GPU and are
+replaced here: the list of (Gaussian, pixel) pairs, computed by a CUDA kernel, and nerfacc, which sums along rays.
 """
 # pyright: reportMissingImports=false
 
@@ -32,7 +32,7 @@ class PeerRender(NamedTuple):
 
 
 def available() -> str | None:
-    """None if torch and gsplat can be imported, else the reason why they cannot."""
+    """None if torch and gsplat can be imported, else the reason."""
     try:
         import torch  # noqa: F401
         from gsplat.cuda import _torch_impl  # noqa: F401
@@ -42,7 +42,7 @@ def available() -> str | None:
 
 
 def difference_of_rules(scene: Scene, camera: Camera, settings: RasterSettings) -> str | None:
-    """Why gsplat would render this scene by other rules than `settings`, or None. Its constants are fixed."""
+    """The rule of gsplat that differs from `settings` on this scene, or None; the constants of gsplat are fixed."""
     if settings.support == "three_sigma_tiles" or any(settings.deviations):
         return "support by 3 sigma tiles and the deviations of `legacy` have no counterpart"
     if scene.residual is not None:
@@ -79,7 +79,7 @@ def render_with_gradients(
 
     scene, camera, settings, degree, background   as for `endotsr.splatting.render.render_forward`
     d_colour (3, H, W), d_depth (H, W)            gradients of a loss with respect to the two images
-    Raises: ValueError where gsplat's rules and `settings` differ on this scene, see `difference_of_rules`.
+    Raises: ValueError if gsplat's rules and `settings` differ on this scene, see `difference_of_rules`.
     """
     import torch
 
@@ -149,7 +149,7 @@ def pair_list(
     height: int,
     settings: RasterSettings,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which Gaussian is blended into which pixel, pixels row by row and front to back within one.
+    """Pairs of Gaussian and pixel that are blended, pixels row by row and front to back within a pixel.
 
     means2d (N, 2) px, depth (N,) scene units, conics (N, 3) inverse covariance, opacity (N,)
     returns (M,) Gaussian, (M,) pixel = row * width + column, after near plane, cutoff and stop
@@ -179,7 +179,7 @@ def pair_list(
 
 
 def _boxes(means2d, conics, opacity, width, height, settings):
-    """First column, first row, number of columns and of rows that hold every pixel with alpha >= cutoff."""
+    """First column, first row, number of columns and of rows of a box with every pixel of alpha >= cutoff."""
     if settings.alpha_cutoff > 0:
         a, b, c = conics.T
         determinant = a * c - b * b
@@ -195,7 +195,7 @@ def _boxes(means2d, conics, opacity, width, height, settings):
 
 
 def _accumulate(means2d, conics, opacity, channels, gaussian, pixel, camera: Camera) -> tuple[Any, Any]:
-    """gsplat's `accumulate` (H, W, channels), (H, W, 1), with `_along_rays` in place of nerfacc."""
+    """gsplat's `accumulate` (H, W, channels), (H, W, 1), with `_along_rays` instead of nerfacc."""
     import torch
     from gsplat.cuda import _torch_impl as gsplat
 

@@ -10,12 +10,12 @@ from endotsr.errors import InputError
 from endotsr.report.tables import markdown, memory
 
 Result = Mapping[str, Any]
-MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case that targets speak of
-WHOLE = "pulling_paper_seed1"  # the recorded run whose time is asked for
+MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case of the targets
+WHOLE = "pulling_paper_seed1"  # the recorded run with a target time
 
 
 class Target(NamedTuple):
-    """What is asked, what was found, and in which unit."""
+    """A target: what is measured, the measured value, its bounds and unit."""
 
     what: str
     found: float | None
@@ -45,7 +45,7 @@ def machine(stages: Result) -> str:
 
 
 def targets(stages: Result, scaling: Result, peers: Result, start: Result, runs: Mapping[str, Result]) -> str:
-    """Each target with what was found."""
+    """Each target with the measured value."""
     case = main_case(stages)
     double = find(stages["cases"], MAIN | {"precision": "float64"})
     single_ms = case["iteration"]["median_ms"]
@@ -83,7 +83,7 @@ def _target(target: Target) -> list[str]:
 
 
 def stages(found: Result) -> str:
-    """The picture, then every stage of the main case beside its limit."""
+    """The picture, then every stage of the main case with its limit."""
     case = main_case(found)
     total, rows = case["iteration"]["median_ms"], []
     for name, spread in case["stages"].items():
@@ -113,7 +113,7 @@ def _limit(limit: Result | None) -> list[str]:
 
 
 def gain(found: Result) -> str:
-    """The stages with most time above their limit: where the next gain is, and how large it could be at most."""
+    """The stages with most time above their limit, and so the largest possible gains."""
     case = main_case(found)
     above = {
         name: case["stages"][name]["median_ms"] - limit["limit_ms"]
@@ -128,7 +128,7 @@ def gain(found: Result) -> str:
 
 
 def cases(found: Result) -> str:
-    """One line for every case; those of float64 beside float32 where that was measured."""
+    """One line for every case; float64 is compared with float32 if that was measured."""
     same = lambda case: tuple(value for name, value in case["case"].items() if name != "precision")
     single = {same(c): c["iteration"]["median_ms"] for c in found["cases"] if c["case"]["precision"] == "float32"}
     rows = []
@@ -207,7 +207,7 @@ def start(found: Result) -> str:
 
 
 def runs(found: Mapping[str, Result]) -> str:
-    """Whole runs that are recorded beside the benchmarks."""
+    """Recorded whole runs."""
     rows = [
         [
             f"`{name}.json`", run["started"][:10], f"{run['seconds'] / 60:.1f}", str(run["iteration"]),
@@ -221,12 +221,12 @@ def runs(found: Mapping[str, Result]) -> str:
 
 
 def main_case(found: Result) -> Result:
-    """The case that targets speak of."""
+    """The case of the targets."""
     return find(found["cases"], MAIN)
 
 
 def find(results: Sequence[Result], wanted: Mapping[str, Any]) -> Result:
-    """The result whose case has these values. Raises: InputError if there is none: a page of other sizes would lie."""
+    """The result of the case with these values. Raises: InputError if there is none."""
     for result in results:
         if all(result["case"][key] == value for key, value in wanted.items()):
             return result

@@ -1,8 +1,8 @@
 """`bench.py measure peers`: gsplat's pure-torch reference on the same arrays in the same run.
 
 One view of the common workload without time: colour and depth forward, then the gradients of a fixed random
-combination of the two images, one after the other in one process. A substitute makes the lists of pairs, which gsplat
-makes in a CUDA kernel. Its time is shown separately and is not part of the time of gsplat.
+combination of the two images, one renderer after the other in one process. A substitute computes the lists of pairs,
+for which gsplat has a CUDA kernel. Its time is shown separately and is not part of the time of gsplat.
 """
 
 import time
@@ -35,7 +35,7 @@ PIP_LINES = (
 def measure_peers(
     gaussians: Sequence[int], precisions: Sequence[Precision], threads: int, repeats: int
 ) -> dict[str, Any]:
-    """{"cases": of `compare`}. Raises: InputError with the pip lines where torch or gsplat is missing."""
+    """{"cases": of `compare`}. Raises: InputError with the pip commands if torch or gsplat is missing."""
     from bench_gsplat import available
 
     reason = apart(available)  # torch is not imported in this process
@@ -61,7 +61,7 @@ def compare(case: BenchCase) -> dict[str, Any]:
     torch.set_num_threads(case.threads)
     view = _view(case)
     ours, our_seconds = _ours(*view)
-    _theirs(_view(WARM_UP), 1)  # torch initialises itself at its first use
+    _theirs(_view(WARM_UP), 1)  # torch is initialised at first use
     theirs, seconds, lists = _theirs(view, case.repeats)
     return {
         "gaussians": case.gaussians,
@@ -79,7 +79,7 @@ def compare(case: BenchCase) -> dict[str, Any]:
 
 
 def _view(case: BenchCase) -> tuple[Any, ...]:
-    """Scene, camera, settings and the gradients of a loss by colour and depth."""
+    """Scene, camera, settings and the gradients of a loss with respect to colour and depth."""
     from endotsr.fitting.model import raster_settings
     from endotsr.splatting.render import Scene
 
@@ -109,7 +109,7 @@ def _ours(scene: Any, camera: Any, settings: Any, d_colour: FloatArray, d_depth:
 
 
 def _theirs(view: tuple[Any, ...], repeats: int) -> tuple[dict[str, FloatArray], list[float], list[float]]:
-    """Images and gradients by name, the seconds of each repeat without the pair lists, and those of the lists."""
+    """Images and gradients by name, the seconds of each repeat without the pair lists, and the seconds of the lists."""
     import bench_gsplat
 
     seconds, lists, found = [], [], {}
@@ -125,7 +125,7 @@ def _theirs(view: tuple[Any, ...], repeats: int) -> tuple[dict[str, FloatArray],
 
 @contextmanager
 def _list_seconds(peer: ModuleType) -> Iterator[list[float]]:
-    """The seconds that the substitute for the pair lists takes within the block."""
+    """The seconds of the substitute for the pair lists within the block."""
     spent: list[float] = []
     pair_list = peer.pair_list
 

@@ -1,9 +1,9 @@
 """`bench.py measure scaling`: growth of cost with each size alone, with fitted exponents.
 
-Every point is measured in a process of its own, so that its peak memory is that of its size. It is measured twice, once
-with sizes ascending and once descending, and the faster time is used, so that a temporary load of the machine does not
-distort the curve. An exponent is the slope of log time against log size by least squares over the upper decade,
-because fixed costs flatten the curve below it.
+Every point is measured in a separate process, so its peak memory belongs to its size. It is measured twice, with sizes
+ascending and descending, and the faster time is used: a temporary load of the machine does not distort the curve. An
+exponent is the least-squares slope of log time against log size over the upper decade, because fixed costs flatten the
+curve below it.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,20 +28,20 @@ CURVES: dict[str, tuple[str, ...]] = {
     "losses": ("L1 and SSIM", "pyramid", "depth and smoothness"),
 }
 BASE = BenchCase(gaussians=20_000, repeats=7, densifications=0)
-LARGE = 100_000  # Gaussians from which fewer repeats suffice, as an iteration is long then
+LARGE = 100_000  # from this number of Gaussians on, iterations are long and fewer repeats suffice
 
 
 class Axis(NamedTuple):
-    """One size that is varied."""
+    """One varied size."""
 
     unit: str
     cases: tuple[BenchCase, ...]
-    curves: tuple[str, ...]  # that depend on this size, or should not
+    curves: tuple[str, ...]  # curves that depend on this size, or should not
     along: Callable[[dict[str, Any]], float]  # the size of a measured case
 
 
 def axes(largest: int) -> dict[str, Axis]:
-    """Every axis; `largest` is the last size on that of the Gaussians."""
+    """Every axis; `largest` is the largest number of Gaussians."""
     counts = [n for n in (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000) if n <= largest]
     sizes = ((192, 108), (384, 216), (640, 360), (960, 540), (1440, 810), (1920, 1080))
     of_case = lambda name: lambda result: float(result["case"][name])
@@ -117,7 +117,7 @@ def _state_bytes(result: dict[str, Any]) -> int:
 
 
 def upper_decade(size: Sequence[float]) -> np.ndarray:
-    """Which sizes are at least a tenth of the largest."""
+    """Which sizes are at least 10 % of the largest."""
     return np.array(size) >= max(size) / 10.0
 
 

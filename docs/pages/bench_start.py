@@ -1,8 +1,8 @@
 """`bench.py measure start`: from the call of the interpreter to the end of the first training iteration.
 
 A cold start begins with an empty kernel cache, a warm start with a full one. Each runs in a fresh process with the
-initialisation of a real run, and ends with one iteration at which everything is active, which needs the remaining
-kernels. The fresh process runs this module (`python docs/pages/bench_start.py`).
+initialisation of a real run, and ends with one iteration with all components active, which needs the remaining kernels.
+The fresh process runs this module (`python docs/pages/bench_start.py`).
 """
 
 import json
@@ -47,7 +47,7 @@ def fresh_process(cache: str) -> dict[str, float]:
 
 
 def _first_iterations() -> None:
-    """Print each moment as it is reached; the parent process measures the time."""
+    """Print each milestone as it is reached; the parent process measures the time."""
     from endotsr.bench.case import representative
     from endotsr.config import PAPER
     from endotsr.fitting.compile_ahead import compile_ahead

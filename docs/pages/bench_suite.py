@@ -1,6 +1,6 @@
 """`python docs/pages/bench.py measure`: every measurement in one call, as JSON in one folder.
 
-The measurements are made one after the other, each in processes of its own, on a machine that has nothing else to do.
+The measurements run one after the other, each in separate processes, on an otherwise idle machine.
 """
 
 import argparse

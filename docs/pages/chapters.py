@@ -1,10 +1,10 @@
-"""What every chapter of the book has: motive, derivation, figures, exercises, and the time it takes to run.
+"""The elements of every chapter of the book: motive, derivation, figures, exercises and run time.
 
     python docs/pages/chapters.py measure   run every notebook at its small size, one after the other, on one thread
-    python docs/pages/chapters.py           write the table in notebooks/index.md again
+    python docs/pages/chapters.py           rewrite the table in notebooks/index.md
 
-The times are docs/results/chapters.json. Everything else is read from the text of the notebooks. A chapter that lacks
-an element is named by `missing`, which a test asks of every chapter.
+The times are docs/results/chapters.json. Everything else is read from the text of the notebooks. A test checks every
+chapter with `missing`.
 """
 
 import os
@@ -28,12 +28,12 @@ NOTEBOOKS, PAGE = ROOT / "notebooks", ROOT / "notebooks" / "index.md"
 FILE = ROOT / "docs" / "results" / "chapters.json"
 COMMAND = "docs/pages/chapters.py measure"
 MEASURES = {"00_why", "16_tradeoff", "17_effects"}
-"""Chapters that measure what the others derive, and so have no derivation of their own."""
+"""Chapters that measure the results of other derivations and have none of their own."""
 LEAST_WORDS, EXERCISES, LONGEST = 12, 3, 600.0  # words of a motive; exercises; seconds of all chapters together
 
 
 class Chapter(NamedTuple):
-    """What the text of a notebook has."""
+    """The elements of a notebook."""
 
     title: str
     motive: str  # the first sentences before the first section
@@ -60,7 +60,7 @@ def chapter_of(text: str) -> Chapter:
 
 
 def missing(name: str, chapter: Chapter) -> list[str]:
-    """What a chapter lacks."""
+    """The missing elements of a chapter."""
     wanted = {
         "motive": len(chapter.motive.split()) >= LEAST_WORDS,
         "derivation": name in MEASURES or chapter.derived or chapter.steps > 0,
@@ -92,7 +92,7 @@ def measured() -> dict[str, Any]:
 
 
 def table(found: dict[str, Chapter], times: dict[str, Any]) -> str:
-    """One row a chapter, and how long all of them take."""
+    """One row per chapter, and the total run time."""
     rows = []
     for name, chapter in found.items():
         spent = times["chapters"].get(name, {}).get("processor_seconds")

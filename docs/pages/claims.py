@@ -1,11 +1,11 @@
-"""Write the generated parts of docs/claims.md and docs/guides/sweep.md, and pictures, from the results that are there.
+"""Write the generated parts of docs/claims.md and docs/guides/sweep.md, and pictures, from the existing results.
 
     python docs/pages/claims.py            from docs/results
     python docs/pages/claims.py FOLDER     from the files of another folder
 
-The differences are made from the stored runs each time, and written into the file of the ablation.
+The differences are recomputed from the stored runs each time, and written to the file of the ablation.
 
-To measure, on a machine that has nothing else to do (each command continues where it was interrupted):
+To measure, on an otherwise idle machine (each command continues where it was interrupted):
 
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
         --json docs/results/ablation_pulling.json
@@ -22,7 +22,7 @@ To measure, on a machine that has nothing else to do (each command continues whe
     endotsr ablate simulated --preset paper --iterations 1500 --no-fixed-count --out runs/ablation_simulated_paper \
         --configurations base A S L A+S A+S+L --json docs/results/ablation_simulated_paper.json
 
-A result that is not there is called "not measured yet"; a result of some seeds is shown with their number.
+A missing result is shown as "not measured yet"; a result of some seeds is shown with their number.
 """
 
 import sys
@@ -55,7 +55,7 @@ RUNS = "pulling*.json"  # records of single runs, by docs/results/record.py
 
 
 def read(folder: Path) -> dict[str, Any]:
-    """The ablations by name; None where there is no result yet. Raises: InputError for a file that cannot be read."""
+    """The ablations by name; None if there is no result yet. Raises: InputError for an unreadable file."""
     found = {name: folder / file for name, file in FILES.items()}
     return {
         name: compared(read_json(path, "endotsr ablate")) if path.exists() else None for name, path in found.items()
@@ -63,7 +63,7 @@ def read(folder: Path) -> dict[str, Any]:
 
 
 def compared(record: Any) -> Any:
-    """The record of an ablation with the differences that `COMPARISONS` asks of its runs."""
+    """The record of an ablation with the differences listed in `COMPARISONS`."""
     rows: Any = [{**row, "status": FINISHED} for row in record["rows"]]
     again = ablation_record(rows, record["command"])
     return {**record, "levels": again["levels"], "increments": again["increments"]}

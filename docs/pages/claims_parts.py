@@ -16,7 +16,7 @@ Record = Any  # what a file of docs/results holds
 
 
 def tables(found: Record | None) -> str:
-    """Means and paired differences of an ablation, and how they were made."""
+    """Means and paired differences of an ablation, and the conditions of the measurement."""
     if found is None:
         return NOT_YET
     runs, machine = found["runs"], found["machine"]
@@ -31,7 +31,7 @@ def tables(found: Record | None) -> str:
 
 
 def differences(found: Record, split: str) -> str:
-    """The paired differences without those on tissue: the PSNR of a frame is the same there, but for a constant."""
+    """The paired differences without PSNR on tissue, which differs from the full PSNR of a frame by a constant."""
     return "\n".join(row for row in increment_table(found, split).splitlines() if "| PSNR tissue, dB |" not in row)
 
 
@@ -128,9 +128,9 @@ def cost(found: Record | None, runs: list[Record]) -> str:
 def planned_hours(runs: int, cores: int, core_minutes: float, threads: int = 1, begin: float = BEGIN_MINUTES) -> float:
     """Hours until the last of the runs has ended, planned from the time of one run.
 
-    W workers make R runs of equal length in ceil(R / W) rounds. A run on k threads takes 1 / k of its core minutes at
-    best, so that threads never finish a sweep sooner than workers do. The start of a worker (imports, kernels, the
-    sequence) is paid once. Assumed: workers do not slow each other down, which holds on separate machines.
+    W workers need ceil(R / W) rounds for R runs of equal length. A run on k threads needs at least 1 / k of its core
+    minutes, so threads never finish a sweep sooner than workers. The start of a worker (imports, kernels, the sequence)
+    is paid once. Workers are assumed not to slow each other down, as on separate machines.
 
     runs          in the sweep
     cores         of all machines together, divided among workers of `threads` threads

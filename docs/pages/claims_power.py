@@ -1,7 +1,7 @@
-"""Power of the paired t test of the claims: the smallest true difference that a number of seeds can tell from 0.
+"""Power of the paired t test of the claims: the smallest true difference that a number of seeds distinguishes from 0.
 
 The spread of a difference between two runs of one seed is pooled over the comparisons of a kind (free number of
-Gaussians, fixed number), because three differences alone say little about their own spread.
+Gaussians, fixed number), because three differences alone estimate their spread badly.
 """
 
 from functools import lru_cache
@@ -36,7 +36,7 @@ def power(size: float, pairs: int) -> float:
 
 @lru_cache
 def least_size(pairs: int) -> float:
-    """The mean over the standard deviation that is told from 0 with a probability of POWER."""
+    """The mean over the standard deviation that is distinguished from 0 with a probability of POWER."""
     from scipy import optimize
 
     found = optimize.root_scalar(lambda size: power(size, pairs) - POWER, bracket=(1e-3, 100.0), method="brentq")
@@ -45,7 +45,7 @@ def least_size(pairs: int) -> float:
 
 @lru_cache
 def pairs_needed(size: float) -> int:
-    """The smallest number of seeds that tells a mean over the standard deviation from 0."""
+    """The smallest number of seeds that distinguishes a mean over the standard deviation from 0."""
     pairs = 2
     while power(size, pairs) < POWER:
         pairs += 1 if pairs < 20 else pairs // 10
@@ -67,7 +67,7 @@ def kind_of(claim: str) -> str:
 
 
 def least_difference(found: Record | None, claim: str, metric: str = "psnr_full") -> float | None:
-    """The smallest true difference that the pairs of a claim tell from 0; None without pairs."""
+    """The smallest true difference that the pairs of a claim distinguish from 0; None without pairs."""
     rows = [] if found is None else [r for r in found["increments"] if (r["claim"], r["metric"]) == (claim, metric)]
     if not rows or rows[0]["pairs"] < 2:
         return None
@@ -75,7 +75,7 @@ def least_difference(found: Record | None, claim: str, metric: str = "psnr_full"
 
 
 def sentences(found: Record | None) -> str:
-    """What the seeds can see, and how many the published gains would take."""
+    """The smallest difference that the seeds resolve, and the seeds needed for the published gains."""
     if found is None or not found["increments"]:
         return "Not measured yet."
     pairs = max(row["pairs"] for row in found["increments"])

@@ -1,9 +1,9 @@
 """Rows of docs/claims.md on other held-out frames, the right camera and a fixed count, where nothing is published.
 
 They come from ablations at half size (`ablation_pulling_half*.json`), paired by seed: the whole method minus the base,
-and at a fixed count the whole method minus that without the detail loss.
-The right camera is measured by `endotsr evaluate --measures right_view` on two sets of frames: held-out ones, where
-time and view are new, and training frames, where only the view is.
+and at a fixed count the whole method minus the method without the detail loss.
+`endotsr evaluate --measures right_view` measures the right camera on two sets of frames: held-out frames, with a new
+time and view, and training frames, with only a new view.
 """
 
 from typing import Any
@@ -26,19 +26,19 @@ PROTOCOLS = (  # what is held out, comparison, split, metric
     ("Blocks of 2 frames held out", WHOLE, "blocks 2", "psnr_full"),
     ("The end of the clip held out", WHOLE, "end 8", "psnr_full"),
 )
-MOVED = "left picture moved by the prior depth"  # needs no model, and no time but that of the frame
-LEAST_PAIRS = 3  # below, nothing is decided
+MOVED = "left picture moved by the prior depth"  # needs no model, and no other frame
+LEAST_PAIRS = 3  # with fewer, no verdict
 UNMEASURED = ["not at hand", "not measured", "-", "-", "-"]
 
 
 def protocol_rows(half: list[Record | None]) -> list[list[str]]:
-    """Claim, configurations, published value, verdict, mean, 95 % interval, least difference that is seen."""
+    """Claim, configurations, published value, verdict, mean, 95 % interval, smallest resolved difference."""
     rows = [with_right_eye(row) for found in half if found is not None for row in found["rows"]]
     return [_row(rows, *protocol) for protocol in PROTOCOLS]
 
 
 def with_right_eye(row: Record) -> Record:
-    """A row with the PSNR of the right camera among its metrics, where it was measured."""
+    """A row with the PSNR of the right camera among its metrics, if measured."""
     measured = row.get("measures", {}).get("right_view", {}).get("rows", [])
     model = next((found for found in measured if found["label"] == "this model"), {})
     return {**row, "status": FINISHED, **{key: model.get(key) for key in ("held_out_psnr", "training_psnr")}}

@@ -1,9 +1,9 @@
 """The verdicts of docs/claims.md, claim by claim.
 
-A verdict is decided by numbers alone. For a difference with the published value p and Student's 95 % interval I of its
-mean: I holds p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: the direction alone, or
-its opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0. Which two
-configurations a claim compares stands in `sweeps.ablation.COMPARISONS` alone.
+Verdicts follow from numbers alone. For a difference with the published value p and Student's 95 % interval I of its
+mean: I contains p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: only the direction,
+or the opposite. A claim of no change (p = 0) is reproduced if I is within HUNDREDTH of 0.
+`sweeps.ablation.COMPARISONS` defines the two configurations of each claim.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ from endotsr.sweeps.ablation_page import interval_text
 
 NOT_YET = "Not measured yet."
 HUNDREDTH = 0.01  # dB
-SCOPE = ", mean over EndoNeRF"  # what the published gains of the steps are
+SCOPE = ", mean over EndoNeRF"  # scope of the published gains of the steps
 FULL, SPLIT = "A+S+L", "every_eighth"
 LEVELS = (  # key, key of the published value, name, larger is better, unit of the last published digit
     ("psnr_full", "psnr_full", "PSNR full", "{:.2f} dB", True, 0.01),
@@ -38,7 +38,7 @@ Record = Any  # what a file of docs/results holds
 
 
 def verdicts(found: Record | None, half: list[Record | None], runs: list[Record]) -> str:
-    """Claim by claim: the compared configurations, what is published, verdict, number, interval."""
+    """Claim by claim: the compared configurations, the published value, verdict, number, interval."""
     rows = [_level_row(found, runs, *level) for level in LEVELS]
     rows += [_increment_row(found, comparison) for comparison in COMPARISONS if comparison.says]
     rows += [_range_row(found, *claim) for claim in RANGES]
@@ -60,7 +60,7 @@ def increment_verdict(
 ) -> str:
     """The verdict on a difference; see the module docstring.
 
-    last   other end of a published range: the interval then holds what is published if it meets the range
+    last   other end of a published range, which the interval must then intersect
     """
     first, last = sorted((published, published if last is None else last))
     if low is None or high is None or pairs < LEAST_PAIRS:
@@ -140,7 +140,7 @@ def _increment_row(found: Record | None, comparison: Contrast) -> list[str]:
 
 
 def _range_row(found: Record | None, label: str, metric: str, ends: tuple[float, float], form: str) -> list[str]:
-    """The whole method against the base with matched input, which is what the paper calls SurgicalGS."""
+    """The whole method against the base with matched input, called SurgicalGS in the paper."""
     claim = [
         f"{label}, over SurgicalGS with matched input (our base)", f"{FULL} - base",
         f"{form.format(ends[0])} to {form.format(ends[1])}, by sequence",
@@ -175,7 +175,7 @@ def _largest_row(found: Record | None) -> list[str]:
 
 
 def _motion_row(found: Record | None) -> list[str]:
-    """Not stated by the paper, but what its motion is for."""
+    """Not stated in the paper: whether the motion improves times between frames."""
     claim = ["Ours: between the frames the motion is better than a cross-fade of the model's own renders",
              f"{FULL} - cross-fade, tissue", "-"]  # fmt: skip
     rows = [] if found is None else [r for r in found["rows"] if (r["configuration"], r["split"]) == (FULL, SPLIT)]

@@ -1,4 +1,4 @@
-"""Measure what `endotsr inspect` finds and what `--effects auto` saves, and write the tables of docs/effects.md.
+"""Measure the detections of `endotsr inspect` and the savings of `--effects auto`; write the tables of docs/effects.md.
 
     python docs/pages/effects.py detect [SEEDS [FIRST]]      simulated clips: detections, false positives
     python docs/pages/effects.py train [SEEDS [NAME ...]]    held-out PSNR and time, `auto` against `everything`;
@@ -51,7 +51,7 @@ SCENES = {
 
 
 def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
-    """The study of the tests, with seeds that were not used to set a threshold."""
+    """The study of the tests, with seeds on which no threshold was tuned."""
     from effects_study import FIRST_SEED, answer_of, summary, trials, wrong
 
     chosen = range(FIRST_SEED if first is None else first, (FIRST_SEED if first is None else first) + seeds)
@@ -112,7 +112,7 @@ def _clip(name: str, seed: int) -> Any:
 
 
 def _load_kernels() -> None:
-    """A short training, so that the times hold no compilation."""
+    """A short training, to exclude compilation from the times."""
     from endotsr.api import make_config
     from endotsr.api import train as fit
     from endotsr.kernels.threads import use_threads
@@ -145,7 +145,7 @@ def _pair(sequence: Any, seed: int, iterations: int) -> dict[str, Any]:
 
 
 def real(folders: list[Path]) -> dict[str, Any]:
-    """Verdicts and plans on folders; clips that were inspected before and are not among them keep their results."""
+    """Verdicts and plans on folders; results of other clips are kept."""
     from endotsr.effects.inspect import inspect_sequence, inspection_record
     from endotsr.effects.plan import make_plan, plan_record
 
@@ -167,7 +167,7 @@ def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
 
 
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
-    """Every generated part of the page by name; a part without its measurement says so."""
+    """Every generated part of the page by name; a missing measurement is marked."""
     makers = {
         "answer": (lambda result: effects_parts.answer(result, found.get("real")), "train"),
         "costs": (effects_parts.costs, "bench"),
@@ -211,7 +211,7 @@ def main(words: list[str], page: Path = PAGE) -> None:
 
 
 def _number(words: list[str], place: int, usual: int | None) -> Any:
-    """The number at a place of the words. Raises: InputError for a word that is no whole number of 0 or more."""
+    """The number at an index of the words. Raises: InputError unless it is a whole number of at least 0."""
     if len(words) <= place:
         return usual
     if not words[place].isdigit():

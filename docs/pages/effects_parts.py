@@ -35,7 +35,7 @@ def machine(result: dict[str, Any]) -> str:
 
 
 def costs(result: dict[str, Any]) -> str:
-    """Effect, what it looks like, the component that answers it, its cost, when it is worth it."""
+    """Effect, appearance, the component that models it, its cost, and its use."""
     rows = []
     for effect, (looks, component, part, worth) in ANSWERED.items():
         measured = result["parts"].get(part)
@@ -78,7 +78,7 @@ def detections(result: dict[str, Any]) -> str:
 
 
 def amplitudes(result: dict[str, Any]) -> str:
-    """The smallest amplitude that every seed shows, and the next smaller one."""
+    """The smallest amplitude found in every seed, and the next smaller one."""
     rows = []
     for effect, found in result["sweeps"].items():
         missed = max((x["size"] for x in found if x["detected"] < x["clips"]), default=-1.0)
@@ -96,7 +96,7 @@ def amplitudes(result: dict[str, Any]) -> str:
 
 
 def answer(result: dict[str, Any], plans: dict[str, Any] | None = None) -> str:
-    """The still clip and the real one, as trained with `demo`; and what the plan for `paper` saves on the real one."""
+    """The still clip and the real one, trained with `demo`, and the savings of the plan for `paper` on the real one."""
     name, *_ = result["real"]
     still, real = (savings(result["scenes"][clip]) for clip in ("still", name))
     nothing = abs(real.time) < 0.005 and abs(real.gain) < 0.005
@@ -109,7 +109,7 @@ def answer(result: dict[str, Any], plans: dict[str, Any] | None = None) -> str:
 
 
 def _without_tracks(plan: dict[str, Any]) -> str:
-    """Why a clip can save nothing with `demo` while its plan for `paper` switches the Fourier translation off."""
+    """The reason for no savings with `demo` if the plan for `paper` disables the Fourier translation."""
     if [change["key"] for change in plan["changes"]] != ["model.spectral_motion"]:
         return ""
     return (
@@ -121,7 +121,7 @@ def _without_tracks(plan: dict[str, Any]) -> str:
 
 
 def answer_figure(result: dict[str, Any]) -> Any:
-    """Time that `auto` saves, and what it changes in quality with its 95 % interval, one bar per clip."""
+    """Time saved by `auto`, and its change of quality with the 95 % interval, one bar per clip."""
     found = {name: savings(pairs) for name, pairs in result["scenes"].items()}
     figure = new_figure(9.0, 0.32 * len(found) + 0.9)
     left, right = figure.subplots(1, 2, sharey=True)

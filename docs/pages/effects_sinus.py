@@ -1,4 +1,4 @@
-"""The clip `sinus_endoscopy` as a `Sequence`: JPEG frames, one mask, poses, and sparse points in place of depth."""
+"""The clip `sinus_endoscopy` as a `Sequence`: JPEG frames, one mask, poses, and sparse points instead of depth."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def is_sinus(folder: Path) -> bool:
 
 
 def read_sinus(folder: Path) -> Sequence:
-    """All frames at a third of the size; the depth of a frame is interpolated between the points that it sees."""
+    """All frames at 1/3 of the size; the depth of a frame is interpolated between its visible points."""
     from PIL import Image
 
     with np.load(folder / "cameras_points.npz") as stored:

@@ -1,10 +1,10 @@
-"""How reliable the tests are: simulated clips with known effects, several seeds, a sweep of amplitudes.
+"""Reliability of the tests: simulated clips with known effects, several seeds, a sweep of amplitudes.
 
-In: seeds and a number of frames. Out: one JSON-able answer a clip (`answer_of`), so that a study that was interrupted
-goes on where it stopped; and their summary (`summary`): detections and false positives of each effect, and how often
-each amplitude is found, in the unit of the effect (px, percent, degrees, mm).
+In: seeds and a number of frames. Out: one JSON-serialisable answer per clip (`answer_of`), with which an interrupted
+study continues; and their summary (`summary`): detections and false positives of each effect, and the detection rate
+of each amplitude, in the unit of the effect (px, percent, degrees, mm).
 
-Thresholds were set with seeds below `FIRST_SEED`. A study takes seeds from there on, which no threshold has seen.
+Thresholds were tuned on seeds below `FIRST_SEED`; a study uses the seeds from there on.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -35,7 +35,7 @@ SWEEPS: dict[str, tuple[float, ...]] = {
     "cutting": (0.25, 0.5, 1.0, 2.0, 4.0),
 }
 STRENGTH = {"highlights": "strength", "depth_errors": "sigma", "cutting": "opening"}
-"""The setting that is swept; otherwise `amplitude`."""
+"""The swept setting; otherwise `amplitude`."""
 MIXTURES = (
     ("noise", "breathing", "pulsation", "instrument", "highlights"),
     ("noise", "pull", "exposure", "instrument"),
@@ -76,10 +76,10 @@ def settings_of(names: tuple[str, ...], seed: int, frames: int, amplitude: float
 
 
 def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
-    """What the tests should say of a clip with these effects.
+    """The correct answers of the tests on a clip with these effects.
 
-    Tissue that moves under the lamp, or a lamp that moves with the camera, does change the light: not counted. The
-    same holds for the view, which is a matter of degree. A slit moves the tissue beside it, once.
+    Tissue that moves under the lamp, and a lamp that moves with the camera, do change the light: such clips are
+    excluded. Changes of the view are excluded as well, because they are gradual. A slit moves the nearby tissue once.
     """
     on = set(names)
     moves = bool(on & {*MOTIONS, "cutting"})
@@ -100,7 +100,7 @@ def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
 
 
 def _beats(on: set[str]) -> bool | None:
-    """A rate is expected, or none; beside a pull or a moving camera, a beat may be hidden: not counted."""
+    """Whether a rate is expected; None with a pull or a moving camera, which may hide a beat."""
     beats = bool(on & {"breathing", "pulsation"})
     return None if beats and on & {"pull", "camera_motion"} else beats
 
@@ -120,7 +120,7 @@ def trials(seeds: Iterable[int]) -> Iterator[Trial]:
 
 
 def clip_of(trial: Trial, frames: int) -> tuple[Sequence, float]:
-    """The clip of a trial, and the size of what is swept in the unit of the table (0 without a sweep)."""
+    """The clip of a trial, and the size of the swept effect in the unit of the table (0 without a sweep)."""
     if trial.swept in SPOILED:
         still = simulate(settings_of(("noise",), trial.seed, frames)).sequence
         spoil = {"blur": blurred, "smoke": smoky}[trial.swept]
@@ -132,7 +132,7 @@ def clip_of(trial: Trial, frames: int) -> tuple[Sequence, float]:
 
 
 def size_of(effect: str, amplitude: float, made: SimulatedSequence) -> float:
-    """The amplitude as it is seen: px of the largest flow (RMS over time), percent, degrees, mm."""
+    """The observable amplitude: px of the largest flow (RMS over time), percent, degrees, mm."""
     if effect in MOTIONS:
         sequence = made.sequence
         middle = int(sequence.train_index[len(sequence.train_index) // 2])
@@ -179,20 +179,20 @@ def _spoiled(sequence: Sequence, count: int, change: Callable[[np.ndarray], np.n
 
 
 def answers(inspection: Inspection) -> dict[str, bool]:
-    """What the tests say, by effect."""
+    """The answers of the tests, by effect."""
     said = {name: verdict.present for name, verdict in inspection.verdicts.items()}
     return said | {"periodic motion": bool(inspection.lines)}
 
 
 def answer_of(trial: Trial, frames: int) -> dict[str, Any]:
-    """What the tests say of a clip, JSON-able: "key", "size", "noise" and "said" {effect: found}."""
+    """The answers of the tests on a clip, JSON-serialisable: "key", "size", "noise" and "said" {effect: found}."""
     sequence, size = clip_of(trial, frames)
     inspection = inspect_sequence(sequence)
     return {"key": trial.key, "size": size, "noise": inspection.noise.level, "said": answers(inspection)}
 
 
 def wrong(trial: Trial, said: dict[str, bool]) -> list[str]:
-    """The effects on which the answer is not what is expected."""
+    """The effects with an unexpected answer."""
     return [name for name, expected in trial.expected.items() if expected is not None and said[name] != expected]
 
 

@@ -1,9 +1,9 @@
 """Errors of trained scenes against the truth of the simulator, and the leakage between light and motion.
 
-Two scenes: one whose light alone changes, and one whose tissue alone moves. Each is trained with presets, and with
-components of the preset `paper` taken out. Measured are depth, trajectories, and the colour residual at pieces of
-tissue against the true change of their light. In the first scene all motion is wrong, and in the second all colour
-that differs from the change of light which motion under a lamp causes.
+In one scene only the light changes; in the other only the tissue moves. Each is trained with presets, and with
+components removed from the preset `paper`. The measurements are depth, trajectories, and the colour residual at pieces
+of tissue against the true change of their light. In the first scene all motion is wrong. In the second, every change of
+colour is wrong except for the change of light caused by motion under the lamp.
 """
 
 from pathlib import Path
@@ -99,9 +99,9 @@ def light_scores(run: Any, simulated: Any) -> dict[str, float]:
 
 
 def light_courses(run: Any, simulated: Any) -> tuple[np.ndarray, np.ndarray]:
-    """True display colour, and the colour residual of the model, of pieces of tissue seen in all frames, (n, 3, P).
+    """True display colour, and the colour residual of the model, of pieces of tissue visible in all frames, (n, 3, P).
 
-    The residual is the difference of the renders with and without component A, at the pixel that shows the piece.
+    The residual is the difference of the renders with and without component A, at the pixel of the piece.
     """
     from endotsr.simulator.folder import tissue_light
     from endotsr.simulator.frames import make_scene

@@ -1,4 +1,4 @@
-"""How well the light tells depth that is stored upside down or mirrored: clips as they are, and their flips.
+"""Detection of flipped or mirrored depth by the light: clips as stored, and their flips.
 
 python docs/pages/flips.py CLIP ...      sequence folders; writes the table in docs/guides/prepare.md
 """
@@ -19,7 +19,7 @@ PAGE = Path(__file__).parents[1] / "guides" / "prepare.md"
 
 
 def row(folder: Path) -> list[str]:
-    """Name, frames, the fits of the depth as stored and flipped, and what is said of each."""
+    """Name, frames, the fits of the depth as stored and flipped, and the findings for each."""
     clip = read_sequence(folder, PAPER.sequence, PAPER.raster.near)
     frames = np.unique(np.linspace(0, clip.count - 1, min(SAMPLED, clip.count)).astype(int))
     stored, named = {}, 0

@@ -1,12 +1,12 @@
-"""Trainings of a simulated clip at full size beside predictions without a model: by frame, by pixel, in pictures.
+"""Trainings of a simulated clip at full size, and predictions without a model: by frame, by pixel, in pictures.
 
     endotsr simulate pulling --out CLIP
     endotsr train CLIP --preset PRESET --out RUN [--sequence.split blocks --sequence.block-length 8]
     python docs/pages/full_size.py measure RUN ...    finished runs of the clip, to docs/results/full_size
-    python docs/pages/full_size.py                    the page docs/full_size.md once more from the stored files
+    python docs/pages/full_size.py                    rewrite the page docs/full_size.md from the stored files
 
-A run is stored under its preset and its held-out frames, and replaces the one stored there before. The folder holds
-numbers and small pictures, no model. Only runs of a simulated clip are accepted: a picture of a patient is not stored.
+A run is stored under its preset and its held-out frames, and replaces the previous one. The folder contains numbers and
+small pictures, no model. Only runs of a simulated clip are accepted: pictures of patients are not stored.
 """
 
 import sys
@@ -91,8 +91,8 @@ def about_run(run: endotsr.Run) -> dict[str, Any]:
 def noise_of(clip: Path, scale: float) -> float:
     """Standard deviation of noise and rounding of a frame, display units, from the truth of a simulated clip.
 
-    Raises: InputError for a clip without truth, so that no picture of a patient is stored, and for a reduced one, whose
-    noise is not known.
+    Raises: InputError for a clip without truth (no picture of a patient may be stored), and for a reduced clip, whose
+    noise is unknown.
     """
     truth = clip / "truth" / "light.npz"
     if not truth.is_file() or scale != 1:
@@ -122,7 +122,7 @@ def chosen(frames: list[dict[str, Any]]) -> dict[str, int]:
 
 
 def store(folders: list[Path]) -> None:
-    """Measure runs, and write their numbers and pictures beside those that are stored."""
+    """Measure runs, and add their numbers and pictures to the stored ones."""
     stored = read_json(FILE, COMMAND) if FILE.exists() else {}
     for folder in folders:
         name, numbers, pictures = measured(folder)

@@ -30,7 +30,7 @@ LINES = {"nearest_frame": ":", "two_neighbours": "--", "flow_interpolation": "-.
 def sample_picture(
     sequence: Sequence, index: int, predict: Mapping[str, Callable[[int], FloatArray]]
 ) -> NDArray[np.uint8]:
-    """Truth and predictions of a held-out frame where the model's error is largest, and below each its error."""
+    """Truth and predictions of a held-out frame around the model's largest error, with the error of each below."""
     truth, tissue = unit_image(sequence, index), sequence.masks[index]
     images = {name: predict[name](index) for name in PREDICTIONS}
     errors = {name: tissue_error(image, truth, tissue) for name, image in images.items()}
@@ -87,7 +87,7 @@ def curves_figure(runs: dict[str, Any]) -> Any:
 def _curve(axes: Any, run: dict[str, Any], name: str, label: str, line: str, colour: str) -> None:
     frames = np.array([row["frame"] for row in run["frames"]], float)
     values = np.array([psnr(row["squared_error"][name]) for row in run["frames"]])
-    ends = np.flatnonzero(np.diff(frames) > LONGEST_STEP) + 1  # of the blocks: the line does not join them
+    ends = np.flatnonzero(np.diff(frames) > LONGEST_STEP) + 1  # the line does not join the blocks
     frames, values = np.insert(frames, ends, np.nan), np.insert(values, ends, np.nan)
     axes.plot(frames, values, linestyle=line, color=colour, marker="o", markersize=3, linewidth=1.4, label=label)
 

@@ -39,12 +39,12 @@ def mean_psnr(run: dict[str, Any], name: str) -> float:
 
 
 def ahead(run: dict[str, Any]) -> float:
-    """How far the model is above the blend, dB."""
+    """Gain of the model over the blend, dB."""
     return mean_psnr(run, "model") - mean_psnr(run, "two_neighbours")
 
 
 def encoded(picture: NDArray[np.uint8]) -> bytes:
-    """The bytes of a webp file; a picture of noise has a quarter of the size it has as png."""
+    """The bytes of a webp file; a picture of noise has 25 % of the size of its png."""
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -140,7 +140,7 @@ def noise_table(runs: dict[str, Any]) -> str:
 
 
 def motion_table(runs: dict[str, Any]) -> str:
-    """Every held-out frame with the motion between its neighbours, and how far the predictions are apart."""
+    """Every held-out frame with the motion between its neighbours, and the differences of the predictions."""
     parts = []
     for split, words in SPLITS.items():
         same = [run for run in runs.values() if run["split"] == split]
@@ -185,7 +185,7 @@ def pictures(name: str, run: dict[str, Any]) -> str:
 
 
 def made(runs: dict[str, Any]) -> str:
-    """What was trained, when and where."""
+    """Trainings, date and machine."""
     first = next(iter(runs.values()))
     each = [
         f"`{run['preset']}`, {SPLITS[run['split']]}: {run['iterations_done']} iterations, {run['gaussians']} Gaussians"

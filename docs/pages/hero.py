@@ -1,7 +1,7 @@
 """The moving picture of the front page and of the README: python docs/pages/hero.py [RUN]
 
-It shows every frame of a run: the frame itself, the scene from the same camera without the instrument, and the scene
-from a camera that moves left and right. Without RUN, the demo is trained first, which takes minutes.
+For every frame of a run it shows the frame, the render from the same camera without the instrument, and the render from
+a camera that moves left and right. Without RUN, the demo is trained first, which takes minutes.
 """
 
 import sys
@@ -27,7 +27,7 @@ ANGLE = 8.0  # largest turn of the moving camera, degrees
 
 
 def pictures(scene: MovingScene) -> list[ByteImage]:
-    """One picture a frame: the frame, the render, and the render from the moving camera."""
+    """One picture per frame: the frame, the render, and the render from the moving camera."""
     assert scene.folder is not None
     sequence = load_run_sequence(scene.folder, None)
     size = WIDTH, round(WIDTH * sequence.height / sequence.width)

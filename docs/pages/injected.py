@@ -1,4 +1,4 @@
-"""How often the judge names a mistake: the table of docs/guides/port.md, made by `python docs/pages/injected.py`.
+"""Rates at which the judge names mistakes: the table of docs/guides/port.md, by `python docs/pages/injected.py`.
 
 The counts are those of `python tests/golden/injected/inject.py --json docs/results/injected.json`.
 """
@@ -22,7 +22,7 @@ PORTS = {
 
 
 def fragments(result: dict[str, Any]) -> dict[str, str]:
-    """Counts by port, and every mistake that is not named, with the reason."""
+    """Counts by port, and every unnamed mistake with the reason."""
     mistakes = [o for o in result["outcomes"] if o["flag"]]
     rows = [(title, str(len(of)), str(sum(map(_right, of)))) for name, title in PORTS.items()
             if (of := [o for o in mistakes if o["port"] == name])]  # fmt: skip
@@ -43,7 +43,7 @@ def _right(outcome: dict[str, Any]) -> bool:
 
 
 def _reason(outcome: dict[str, Any]) -> str:
-    """What the report says instead."""
+    """The content of the report instead."""
     others = [flag for flag in outcome["named"] if flag != outcome["flag"]]
     if others:
         second = "; it is named second" if outcome["named"][1:2] == [outcome["flag"]] else ""

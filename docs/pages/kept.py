@@ -1,7 +1,7 @@
-"""Answers of a long measurement, kept one per line as they are found, so that an interrupted one goes on.
+"""Results of a long measurement, stored one per line, with which an interrupted measurement continues.
 
-The first line says what was measured: settings, and a hash of the sources. A file of another measurement is refused.
-The file stands beside the result, whose name it has with `.part`, until the result is written.
+The first line identifies the measurement: settings, and a hash of the sources. A file of another measurement is
+rejected. The file has the name of the result with `.part`, until the result is written.
 """
 
 import hashlib
@@ -25,13 +25,13 @@ def measured(
     measure: Callable[[str], dict[str, Any]],
     jobs: int = 1,
 ) -> dict[str, dict[str, Any]]:
-    """The answers for all keys; those that are kept are read, the others are measured and kept.
+    """The answers for all keys; stored answers are read, the others are measured and stored.
 
-    about    JSON-able; kept answers must have the same
-    jobs     processes that measure at a time, among which the cores are divided. More than one needs a `measure`
-             that can be sent to a process: a function of a module, or a `functools.partial` of one
+    about    JSON-serialisable identity of the measurement, which stored answers must match
+    jobs     concurrent processes, which share the cores. More than one needs a picklable `measure`: a function of a
+             module, or a `functools.partial` of one
 
-    Raises: InputError naming the file, if it belongs to another measurement or is damaged.
+    Raises: InputError with the name of the file if it belongs to another measurement or is damaged.
     """
     path = part_of(result)
     about = json.loads(json.dumps(about))
@@ -50,7 +50,7 @@ def measured(
 def _answers(
     missing: list[str], measure: Callable[[str], dict[str, Any]], jobs: int
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Keys and answers, as they are found."""
+    """Keys and answers, in the order of their completion."""
     if jobs < 2:
         yield from ((key, measure(key)) for key in missing)
         return
@@ -69,7 +69,7 @@ def _with_threads(count: int) -> None:
 def sources(*rooms: str, beside: Iterable[str] = ()) -> str:
     """First 16 hex digits of the SHA-256 over the source files of rooms of the package; "" is the whole package.
 
-    beside  names of modules of this folder that take part in the measurement
+    beside  names of modules of this folder that are part of the measurement
     """
     package, digest = Path(endotsr.__file__).parent, hashlib.sha256()
     for room in rooms:
@@ -81,17 +81,17 @@ def sources(*rooms: str, beside: Iterable[str] = ()) -> str:
 
 
 def part_of(result: Path) -> Path:
-    """The file of the kept answers of a result."""
+    """The file of the stored answers of a result."""
     return result.with_name(result.name + ".part")
 
 
 def finished(result: Path) -> None:
-    """Remove the kept answers of a result that is written."""
+    """Remove the stored answers of a written result."""
     part_of(result).unlink(missing_ok=True)
 
 
 def _read(path: Path, about: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The kept answers. A last line without its end is left out and removed: the measurement stopped while writing."""
+    """The stored answers. An incomplete last line is removed: the measurement stopped while writing it."""
     if not path.exists():
         return {}
     text = path.read_text(encoding="utf-8")

@@ -1,15 +1,14 @@
-"""Train `sharp` with some of its settings changed, over seeds and scenes, and write the tables.
+"""Train `sharp` with changed settings, over seeds and scenes, and write the tables.
 
     python docs/pages/levers.py changes [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
     python docs/pages/levers.py weights [CLIP ...]    several weights of the similarity, for the rulings
-    python docs/pages/levers.py changes --table       write the tables of the last result again
+    python docs/pages/levers.py changes --table       rewrite the tables of the last result
 
-`changes` trains `sharp`, `paper`, and `sharp` with one of its changes taken back at a time.
-Two scenes are simulated, so their true motion is known. A CLIP is a sequence folder; it is read at half size, and
-its held-out frames are left out: every eighth frame of the others is held out in their place. Every run has the
-length `--iterations` and the initial points of `demo`. Every run is kept when it ends, and a command that was stopped
-goes on with the runs that are missing. The tables stand in a page between their marks; no frame that a preset is judged
-by takes part.
+`changes` trains `sharp`, `paper`, and `sharp` with one of its changes reverted at a time.
+Two scenes are simulated, so their true motion is known. A CLIP is a sequence folder, read at half size. Its held-out
+frames are excluded, and every eighth frame of the others is held out instead: no frame on which a preset is evaluated
+is used. Every run has the length `--iterations` and the initial points of `demo`. Finished runs are kept, and a stopped
+command continues with the missing runs. The tables are written between their marks in a page.
 """
 
 import argparse
@@ -79,7 +78,7 @@ def scene_of(name: str, clips: dict[str, str]) -> Sequence:
 
 
 def inner(sequence: Sequence) -> Sequence:
-    """The training frames alone, of which every eighth is held out; they keep their times."""
+    """The training frames only, with every eighth held out; they keep their times."""
     own = sequence.train_index
     train, test = every_eighth(len(own))
     return replace(
@@ -93,7 +92,7 @@ def inner(sequence: Sequence) -> Sequence:
 def measured(
     key: str, runs: dict[str, tuple[str, str, int]], iterations: int, clips: dict[str, str], rows: Rows
 ) -> dict[str, float]:
-    """Train one run (scene, row, seed), and measure it; trajectories where their truth is known."""
+    """Train one run (scene, row, seed), and measure it, with trajectories if the truth is known."""
     import endotsr
 
     scene, label, seed = runs[key]
@@ -114,7 +113,7 @@ def measured(
 
 
 def found(file: Path, rows: Rows, clips: dict[str, str], seeds: int, iterations: int, jobs: int) -> dict[str, Any]:
-    """Scene -> row -> numbers of the runs in the order of their seeds; runs that are kept are not trained again."""
+    """Scene -> row -> numbers of the runs in the order of their seeds; finished runs are not repeated."""
     about, scenes = {"iterations": iterations, "sources": kept.sources("")}, (*SIMULATED, *clips)
     runs = {
         f"{scene}, {label}, seed {seed}": (scene, label, seed)
@@ -131,7 +130,7 @@ def found(file: Path, rows: Rows, clips: dict[str, str], seeds: int, iterations:
 
 
 def motion_table(result: dict[str, Any]) -> str:
-    """Both presets on the simulated scenes: means with intervals, and what the tissue itself moves."""
+    """Both presets on the simulated scenes: means with intervals, and the motion of the tissue."""
     rows = []
     for scene in SIMULATED:
         for label in (PAPER, SHARP):
@@ -175,7 +174,7 @@ def _about(result: dict[str, Any]) -> str:
 
 
 def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:
-    """The mean for the row of `sharp`, the paired difference for the others, and a dash where nothing is known."""
+    """The mean for the row of `sharp`, the paired difference for the others, and a dash if nothing is known."""
     if key not in runs[0]:
         return "-"
     if runs is sharp:
@@ -184,7 +183,7 @@ def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, 
 
 
 class Study(NamedTuple):
-    """Rows that are compared, and where the tables of them stand."""
+    """Compared rows, and the locations of their tables."""
 
     rows: Rows
     file: Path  # of the result

@@ -1,14 +1,13 @@
-"""Measure the memory of a training on a long clip, which repeats the frames of a short one.
+"""Measure the memory of a training on a long clip that repeats the frames of a short one.
 
     python docs/pages/long_clip.py --frames 2000 --memory 4     the memory of an 8 GB machine: half of it is the limit
     python docs/pages/long_clip.py --frames 300 --memory 0.6    the same proportions, in a few minutes
-    python docs/pages/long_clip.py --table                      write the table of the measured clips again
+    python docs/pages/long_clip.py --table                      rewrite the table of the measured clips
 
-The frames of the source (--source, by default ../shared/data/endonerf_pulling) are linked again and again into a folder
-of temporary files. The training has as many iterations as training frames, so that every frame is used about once, and
-then makes the whole evaluation. While it runs, /proc says how much of its memory is its own (RssAnon) and how much is
-pages of files that the system can drop at any time (RssFile). Results are added to docs/results/long_clip.json; the
-table stands in docs/guides/prepare.md.
+The frames of the source (--source, by default ../shared/data/endonerf_pulling) are linked repeatedly into a temporary
+folder. The training has as many iterations as training frames, so every frame is used about once, and ends with the
+whole evaluation. Meanwhile /proc reports its own memory (RssAnon) and pages of files that the system can drop at any
+time (RssFile). Results are added to docs/results/long_clip.json; the table is in docs/guides/prepare.md.
 """
 
 import argparse
@@ -99,7 +98,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """One measured training a row."""
+    """One row per measured training."""
     headings = ["Frames", "Size", "Preset", "`sequence.memory`, GB", "estimated, GB", "own memory, GB",
                 "file of the frames, GB"]  # fmt: skip
     cells = [

@@ -1,6 +1,6 @@
 """Generated parts of a page, between marks `<!-- ROOM:NAME:start -->` and `<!-- ROOM:NAME:end -->`.
 
-What lies between two marks is replaced; all words around them are written by hand.
+The text between two marks is replaced; all other text is written by hand.
 """
 
 import json
@@ -14,7 +14,7 @@ from endotsr.untrusted.writing import replace_file
 
 
 def write_marked(page: Path, made: Mapping[str, str], room: str) -> None:
-    """Write the page anew with every part between marks of `room` replaced, complete or not at all."""
+    """Rewrite the page atomically, with every part between marks of `room` replaced."""
     text = replaced(page.read_text(encoding="utf-8"), made, page, room)
     replace_file(page, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
@@ -22,7 +22,7 @@ def write_marked(page: Path, made: Mapping[str, str], room: str) -> None:
 def replaced(text: str, made: Mapping[str, str], page: Path, room: str) -> str:
     """The text with every part between marks of `room` replaced.
 
-    Raises: InputError naming the page and the mark, if a mark has no end or its name is not among those of `made`.
+    Raises: InputError with page and mark if a mark has no end or its name is not in `made`.
     """
     for name in re.findall(rf"<!-- {room}:(\w+):start -->", text):
         head, rest = text.split(f"<!-- {room}:{name}:start -->", 1)
@@ -34,7 +34,7 @@ def replaced(text: str, made: Mapping[str, str], page: Path, room: str) -> str:
 
 
 def read_json(path: Path, made_by: str) -> dict[str, Any]:
-    """A file of results. Raises: InputError naming the file and the command that makes it."""
+    """A file of results. Raises: InputError with the file and the command that generates it."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -1,11 +1,11 @@
 """Measure the proposed masks against true ones, and write the table of docs/guides/prepare.md.
 
     python docs/pages/masks.py [--data ../shared/data/endonerf_pulling]      measure, a minute or two
-    python docs/pages/masks.py --table                                       write the table of the last result again
+    python docs/pages/masks.py --table                                       rewrite the table of the last result
 
-Simulated scenes know which pixels an instrument covers, margin included (`gt_masks`). The masks `gt_masks` of the real
-clip are polygons drawn by hand with a wide border. The intersection over union is the mean over the frames in which the
-true mask is not empty; a scene without instruments should give no proposal. The result is docs/results/masks.json.
+For simulated scenes, the pixels covered by an instrument are known, margin included (`gt_masks`). The masks `gt_masks`
+of the real clip are polygons drawn by hand with a wide border. The intersection over union is averaged over the frames
+with a nonempty true mask; a scene without instruments should give no proposal. The result is docs/results/masks.json.
 """
 
 import argparse
@@ -62,7 +62,7 @@ def measured(pictures: list[Picture], truth: list[BoolArray]) -> dict[str, Any]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """One clip a row."""
+    """One row per clip."""
     rows = []
     for name, row in result["clips"].items():
         numbers = [f"{row[key]:.2f}" for key in ("iou", "least_iou", "precision", "recall")] if "iou" in row else []

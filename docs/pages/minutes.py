@@ -1,7 +1,7 @@
-"""Which quality a training of some minutes reaches on one clip, beside the methods that need no model.
+"""Quality of trainings of some minutes on one clip, compared with methods that need no model.
 
     python docs/pages/minutes.py add RUN... --name "sharp"    add finished runs (seeds) as one row, or replace that row
-    python docs/pages/minutes.py                              write the picture and the table again
+    python docs/pages/minutes.py                              rewrite the picture and the table
 
 The runs come from `endotsr train CLIP --preset sharp --seed 1 --lpips FILE` or `--minutes 3`; all rows are of one clip.
 The result is docs/results/minutes.json; the table is part of docs/bench.md.
@@ -24,11 +24,11 @@ from endotsr.runs.log import log_until
 DOCS = Path(__file__).parents[1]
 FILE, PICTURE, PAGE = DOCS / "results" / "minutes.json", DOCS / "results" / "minutes.svg", DOCS / "bench.md"
 METRICS = {"psnr_full": ("PSNR full, dB", "{:.2f}"), "ssim_full": ("SSIM", "{:.4f}"), "lpips": ("LPIPS", "{:.4f}")}
-LEVELS = {"two_neighbours": "blend", "flow_interpolation": "flow"}  # baselines that are drawn
+LEVELS = {"two_neighbours": "blend", "flow_interpolation": "flow"}  # drawn baselines
 
 
 def run_row(folder: Path) -> dict[str, Any]:
-    """What one finished run shows; its seconds are those of its iterations alone."""
+    """Results of one finished run; its seconds count only its iterations."""
     metrics = read_json(folder / "metrics.json", "endotsr train")
     run = metrics["run"]
     return {
@@ -45,7 +45,7 @@ def run_row(folder: Path) -> dict[str, Any]:
 
 
 def add(folders: list[Path], name: str) -> None:
-    """Keep the runs as one row, and the baselines of their clip."""
+    """Store the runs as one row, and the baselines of their clip."""
     metrics = read_json(folders[0] / "metrics.json", "endotsr train")
     source = metrics["run"]["input"]
     clip = {
@@ -72,19 +72,19 @@ def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
 
 
 def levels(result: dict[str, Any]) -> dict[str, Any]:
-    """What is known without a training: the baselines, and the numbers that the paper gives for this clip."""
+    """Levels without a training: the baselines, and the numbers published for this clip."""
     published = next((row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]), None)
     return result["baselines"] | ({"as published": published} if published else {})
 
 
 def label(name: str) -> str:
-    """The first word of a name as code, so that the others can stand on another line."""
+    """The first word of a name as code; the other words may wrap to another line."""
     first, *others = name.split()
     return " ".join((f"`{first}`", *others))
 
 
 def table(result: dict[str, Any]) -> str:
-    """One training a row, then the baselines and the published numbers."""
+    """One row per training, then the baselines and the published numbers."""
     names = [name for name, _ in METRICS.values()]
     headings = ["Training", "Threads", "Minutes", "Iterations", "Gaussians", "GB", *names]
     rows = [

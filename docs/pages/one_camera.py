@@ -1,12 +1,13 @@
-"""What the depth of a clip from one camera costs: a network's relative depth, and none, beside the true depth.
+"""Cost of missing depth with one camera: a network's relative depth, and no depth, compared with the true depth.
 
     python docs/pages/one_camera.py              measure, some minutes on two cores
-    python docs/pages/one_camera.py --table      write the table of the last result again
+    python docs/pages/one_camera.py --table      rewrite the table of the last result
 
-Two simulated scenes: a resting camera, where scale and shift of the relative depth are assumed, and a moving one, where
-they are taken from sparse points in every frame. The relative depth is an affine map of the true 1 / z, another one in
-every frame of the moving camera, rounded to 16 bits. The points are true depth at a few hundred pixels per frame, of
-which a tenth is wrong. The result is docs/results/one_camera.json; the table stands in docs/guides/prepare.md.
+Two scenes are simulated: with a resting camera, scale and shift of the relative depth are assumed; with a moving
+camera, they are fitted to sparse points in every frame. The relative depth is an affine map of the true 1 / z, rounded
+to 16 bits, with a different map in every frame of the moving camera. The points have the true depth at a few hundred
+pixels per frame; 10 % of them are wrong. The result is docs/results/one_camera.json; the table is in
+docs/guides/prepare.md.
 """
 
 import argparse
@@ -49,7 +50,7 @@ WAYS = {
 
 
 def relative_files(clean: Path, place: Path, each: bool) -> None:
-    """A 16-bit picture of an affine map of 1 / z a frame; `each`: another map in every frame."""
+    """One 16-bit picture of an affine map of 1 / z per frame; `each`: a different map in every frame."""
     truth, rng = read_truth(clean), np.random.default_rng(5)
     place.mkdir()
     inverse = [1.0 / truth.frame(i).depth for i in range(len(list((clean / "images").iterdir())))]
@@ -61,7 +62,7 @@ def relative_files(clean: Path, place: Path, each: bool) -> None:
 
 
 def sparse_files(clean: Path, place: Path) -> None:
-    """Depth at the pixels of some points a frame, in steps of 0.01 mm."""
+    """Depth at the pixels of some points per frame, in steps of 0.01 mm."""
     truth, rng = read_truth(clean), np.random.default_rng(6)
     place.mkdir()
     for i in range(len(list((clean / "images").iterdir()))):
@@ -74,7 +75,7 @@ def sparse_files(clean: Path, place: Path) -> None:
 
 
 def made(root: Path, scene: str, way: str) -> Path:
-    """The clip of a way; its poses are the true ones."""
+    """The clip of a route, with true poses."""
     clean, clip = root / scene, root / f"{scene}-{way}"
     said("prepare", clean, "--out", clip, "--masks", clean / "gt_masks")
     if way == "true":
@@ -98,7 +99,7 @@ def made(root: Path, scene: str, way: str) -> Path:
 
 
 def _forget_depth(clip: Path) -> None:
-    """The clip without its depth, as one camera gives it."""
+    """Remove the depth of the clip, as from one camera."""
     shutil.rmtree(clip / "depth")
     text = (clip / "sequence.toml").read_text(encoding="utf-8")
     head, _, rest = text.partition("[depth]")
@@ -106,7 +107,7 @@ def _forget_depth(clip: Path) -> None:
 
 
 def _interpolate(clip: Path) -> None:
-    """Planes between the points, as `endotsr prepare` makes them of a reconstruction."""
+    """Planes between the points, as computed by `endotsr prepare` from a reconstruction."""
     from endotsr.sequences.points import depth_from_points
     from endotsr.sequences.recording import Pose
 
@@ -125,7 +126,7 @@ def _interpolate(clip: Path) -> None:
 
 
 def measured(root: Path, scene: str, way: str) -> dict[str, float]:
-    """Held-out metrics of a way, and its depth against the true one after the best scale for the clip."""
+    """Held-out metrics of a route, and its depth against the true one after the best scale for the clip."""
     clip, run = made(root, scene, way), root / f"run-{scene}-{way}"
     said("train", clip, "--out", run, *TRAINING)
     metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
@@ -134,7 +135,7 @@ def measured(root: Path, scene: str, way: str) -> dict[str, float]:
 
 
 def _depth_error(clip: Path, clean: Path) -> dict[str, float]:
-    """Median relative error of the prior depth on tissue, after one scale for the clip where its unit is arbitrary."""
+    """Median relative error of the prior depth on tissue, after one scale for the clip if its unit is arbitrary."""
     recording, truth = open_common(clip), read_truth(clean)
     assert recording.depth is not None and recording.masks is not None
     ratios = []
@@ -148,7 +149,7 @@ def _depth_error(clip: Path, clean: Path) -> dict[str, float]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """One way a row."""
+    """One row per route."""
     rows = []
     for scene, ways in WAYS.items():
         for way, label in ways.items():

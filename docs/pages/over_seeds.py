@@ -1,4 +1,4 @@
-"""Means over seeds, as the tables show them."""
+"""Means over seeds, formatted for the tables."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ def interval(values: Sequence[float]) -> tuple[float, float]:
 
 
 def shown(values: Sequence[float], digits: int, sign: str = "") -> str:
-    """The mean with its 95 % interval; one value alone without, none as a dash. sign = "+" shows the sign."""
+    """The mean with its 95 % interval; no interval for one value, a dash for none. sign = "+" shows the sign."""
     if not len(values):
         return "-"
     mean, half = interval(values)

@@ -1,12 +1,12 @@
 """Train on a clip from its own stereo pictures, as png, jpg and video, without its depth, and write the table.
 
     python docs/pages/own_pictures.py CLIP [--seeds 3] [--iterations 1500]
-    python docs/pages/own_pictures.py --table    write the table of the last result again
+    python docs/pages/own_pictures.py --table    rewrite the table of the last result
 
-CLIP is a folder in the layout of EndoNeRF with right pictures. Everything goes through `prepare` at half size. The
-first way keeps the depth of the folder; the others make it by `depth` from the pictures. The distance of the cameras is
-fitted once to the given depth. The renders of every way are also compared with the pictures without loss. The result is
-docs/results/own_pictures.json; the table stands in docs/guides/prepare.md.
+CLIP is a folder in the layout of EndoNeRF with right pictures. All routes use `prepare` at half size. The first route
+keeps the depth of the folder; the others compute it by `depth` from the pictures. The distance of the cameras is fitted
+once to the given depth. The renders of every route are also compared with the lossless pictures. The result is
+docs/results/own_pictures.json; the table is in docs/guides/prepare.md.
 """
 
 import argparse
@@ -78,7 +78,7 @@ def recordings(clip: Path, root: Path) -> dict[str, Path]:
 
 
 def prepared(clip: Path, root: Path) -> dict[str, Path]:
-    """The common format of every way."""
+    """The common format of every route."""
     camera, baseline = rectified_pair(clip)
     lens: list[object] = [camera.fx, camera.fy, camera.cx, camera.cy]
     common: list[object] = ["--scale", SCALE, "--baseline", f"{baseline:.4f}"]
@@ -112,7 +112,7 @@ def measured(key: str, clips: dict[str, Path], iterations: int) -> dict[str, flo
 
 
 def about_input(clips: dict[str, Path], way: str) -> dict[str, float]:
-    """Pictures against those without loss, and depth against the given one on tissue."""
+    """Pictures against the lossless ones, and depth against the given one on tissue."""
     if way == GIVEN:
         return {}
     given = open_common(clips[GIVEN]).depth
@@ -122,7 +122,7 @@ def about_input(clips: dict[str, Path], way: str) -> dict[str, float]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """One way a row."""
+    """One row per route."""
     rows = []
     for way, found in result["ways"].items():
         runs = [[run[key] for run in found["runs"]] for key, _ in RUN]

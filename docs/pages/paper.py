@@ -1,10 +1,10 @@
-"""Write the generated parts of docs/paper.md: the method sentence by sentence, and the systems it is compared with.
+"""Write the generated parts of docs/paper.md: the method sentence by sentence, and the compared systems.
 
     python docs/pages/paper.py
 
 Every sentence is in our own words. Its functions, checks and notebooks come from the map of the equations, its ruling
-is a row of docs/specification/rulings.md, and its verdict a row of docs/claims.md: a name that no longer exists stops
-the command.
+is a row of docs/specification/rulings.md, and its verdict a row of docs/claims.md. A name that does not exist is an
+error.
 """
 
 import re
@@ -148,7 +148,7 @@ def definition_of(function: str) -> str:
 
 
 def rulings(names: tuple[str, ...]) -> str:
-    """Questions and answers, from the tables of the rulings. Raises: InputError for a question that is not there."""
+    """Questions and answers, from the tables of the rulings. Raises: InputError for a missing question."""
     known = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|", RULINGS.read_text(encoding="utf-8"), re.MULTILINE))
     if missing := [name for name in names if name not in known]:
         raise InputError(f"docs/specification/rulings.md: no row: {', '.join(missing)}")
@@ -156,7 +156,7 @@ def rulings(names: tuple[str, ...]) -> str:
 
 
 def verdict(start: str) -> str:
-    """The verdict of the claim that starts so, from the page of claims. Raises: InputError if there is none."""
+    """The verdict of the claim with this start, from the page of claims. Raises: InputError if there is none."""
     if not start:
         return "-"
     verdicts = CLAIMS.read_text(encoding="utf-8").partition("<!-- claims:verdicts:start -->")[2].partition("<!--")[0]

@@ -1,13 +1,13 @@
 """Train with disturbed poses, with and without their correction (B16), over seeds, and write the table.
 
     python docs/pages/poses.py [CLIP ...] [--seeds 3] [--jobs 2]
-    python docs/pages/poses.py --table     write the table of the last result again
+    python docs/pages/poses.py --table     rewrite the table of the last result
 
-Two simulated scenes are seen by a moving camera: in one nothing else moves, in the other one the tissue breathes. Their
-poses are disturbed by a smooth error of some pixels, as that of a tracking program. The error of the poses is the
-distance in pixels of points of the surface, after the common motion and scale of all cameras that fits best. A CLIP is
-a sequence folder with a pose for each frame; its poses are taken as they are. Every run is kept when it ends, and a
-command that was stopped goes on. The result is docs/results/poses.json; the table stands in docs/guides/prepare.md.
+Two simulated scenes have a moving camera; in one of them the tissue also breathes. Their poses are disturbed by a
+smooth error of some pixels, like the error of a tracking program. The pose error is the distance in pixels of points of
+the surface, after the best common motion and scale of all cameras. A CLIP is a sequence folder with a pose for each
+frame, which is used unchanged. Finished runs are kept, and a stopped command continues. The result is
+docs/results/poses.json; the table is in docs/guides/prepare.md.
 """
 
 import argparse
@@ -35,7 +35,7 @@ FILE, PAGE = DOCS / "results" / "poses.json", DOCS / "guides" / "prepare.md"
 SIZE, FRAMES, ITERATIONS, CLIP_ITERATIONS = (160, 128), 24, 800, 1000
 SWING, BREATH = 8.0, 1.0  # mm, of the camera and of the tissue
 ERROR = (0.006, 0.3)  # rad and mm, of one sine of the disturbance; there are three
-STEP = 16  # pixels between the points that the error is measured at
+STEP = 16  # pixels between the points at which the error is measured
 SCENES = {"a rigid scene": (), "breathing tissue": ("breathing",)}
 MOVING, RIGID = "`paper`", "`paper`, no deformation"
 SETTINGS: dict[str, dict[str, Any]] = {MOVING: {}, RIGID: {"deformation": False}}
@@ -54,7 +54,7 @@ def scene_of(name: str, seed: int) -> Sequence:
 
 
 def disturbed(sequence: Sequence, seed: int) -> Sequence:
-    """The same pictures with poses that are off by a smooth error."""
+    """The same pictures with a smooth error of the poses."""
     rng, t = np.random.default_rng(seed), sequence.times
 
     def smooth(size: float) -> np.ndarray:
@@ -135,7 +135,7 @@ def found(clips: dict[str, str], seeds: int, jobs: int) -> dict[str, Any]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """One row of settings and poses."""
+    """One row per settings and poses."""
     rows = []
     for scene, variants in result["scenes"].items():
         for label, by_poses in variants.items():

@@ -1,4 +1,4 @@
-"""Figures that the paper gives, beside the measured ones."""
+"""Figures published in the paper, for comparison with measured ones."""
 
 from endotsr.evaluation.records import LabelledMeans
 

@@ -34,13 +34,13 @@ def parts() -> dict[str, str]:
 
 
 def faults(result: dict[str, Any]) -> str:
-    """One row a fault."""
+    """One row per fault."""
     rows = [f"| {r['fault']} | {r['as_promised']} of {r['trials']} | {r['what']} |" for r in result["faults"]]
     return "\n".join(["| Fault | As promised | What happens |", "|---|---|---|", *rows, "", made(result)])
 
 
 def fuzz(result: dict[str, Any]) -> str:
-    """One row a reader, and the sum."""
+    """One row per reader, and the sum."""
     readers = result["readers"]
     rows = [f"| {r['reader']} | {r['inputs']} | {r['seconds']} | {r['findings']} |" for r in readers]
     total = [sum(r[key] for r in readers) for key in ("inputs", "seconds", "findings")]

@@ -1,9 +1,9 @@
 """Tabulate and draw the minutes and the memory of a training against the number of frames, for every preset.
 
-    python docs/pages/scale.py      write the part `scale:minutes` of docs/bench.md and docs/results/scale.svg again
+    python docs/pages/scale.py      rewrite the part `scale:minutes` of docs/bench.md and docs/results/scale.svg
 
-Nothing is trained here. The numbers are those that `endotsr check` and the start of a training print
-(`sequences/checks/cost.py`); the trainings that were timed for docs/results/minutes.json follow below the table.
+Nothing is trained. The numbers are the estimates printed by `endotsr check` and at the start of a training
+(`sequences/checks/cost.py`), with the timed trainings of docs/results/minutes.json for comparison.
 """
 
 import json
@@ -21,7 +21,7 @@ DOCS = Path(__file__).parents[1]
 PAGE, PICTURE = DOCS / "bench.md", DOCS / "results" / "scale.svg"
 FRAMES = (16, 32, 63, 160, 256, 512)
 SIZES = ((320, 256), (640, 512), (1280, 1024))
-MEMORY = 8.0  # GB allowed to a training: part of its frames and targets lie in files beyond a share of it
+MEMORY = 8.0  # GB for a training; frames and targets beyond a fraction of it are kept in files
 COLOURS = {"quick": GREEN, "paper": BLUE, "sharp": ORANGE}  # by preset
 
 

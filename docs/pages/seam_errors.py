@@ -1,4 +1,4 @@
-"""Errors of points that are followed across the seams of windows, against a known truth.
+"""Errors of points followed across the seams of windows, against a known truth.
 
 In: the scene of the windows, masks and true positions. Out: mean lengths across seams, and inside of windows.
 """
@@ -14,11 +14,11 @@ from endotsr.windows.follow import followed, seam
 from endotsr.windows.scene import WindowedScene
 
 STEP = 16  # frames over which errors are measured
-EVERY = 3  # pixels, in rows and columns, of which one is followed
+EVERY = 3  # pixels between followed points, in rows and columns
 
 
 class SeamErrors(NamedTuple):
-    """Mean lengths over points, scene units: after 16 frames that cross a seam, and after 16 frames that cross none."""
+    """Mean lengths over points, scene units: after 16 frames across a seam, and after 16 frames inside a window."""
 
     across: float
     across_motion: float  # true displacement: the error of points that do not move
@@ -30,7 +30,7 @@ class SeamErrors(NamedTuple):
 def seam_errors(
     scene: WindowedScene, masks: Callable[[int], BoolArray], positions: Callable[[int, int], FloatArray]
 ) -> SeamErrors:
-    """Errors of followed points against the truth, across seams and as far from them as the windows allow.
+    """Errors of followed points against the truth, across seams and as far from seams as the windows allow.
 
     masks      frame -> (H, W), tissue
     positions  (frame g, other g') -> (3, H, W): where the points that g shows at its pixels are at g'
@@ -54,7 +54,7 @@ def seam_errors(
 def _lengths(
     scene: WindowedScene, masks: Callable[[int], BoolArray], positions: Callable[[int, int], FloatArray], frame: int
 ) -> list[tuple[float, float]]:
-    """Mean error and true motion of points of a frame after 16 frames; nothing without tissue or behind the end."""
+    """Mean error and true motion of points of a frame after 16 frames; nothing without tissue or beyond the end."""
     if frame < scene.frames[0] or frame + STEP > scene.frames[-1]:
         return []
     start, truth = positions(frame, frame), positions(frame, frame + STEP)

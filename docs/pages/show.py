@@ -1,8 +1,8 @@
 """The table of docs/guides/show.md: python docs/pages/show.py RUN
 
-Measures what a viewer page, films and files of a trained run take: seconds of the command on all cores (start of
-Python included) and megabytes of what it wrote. The page is opened in a headless browser that draws with the processor:
-milliseconds a picture, and PSNR of its picture against the reference renderer.
+Measures the cost of a viewer page, films and files of a trained run: seconds of the command on all cores (start of
+Python included) and megabytes of its output. A headless browser opens the page and draws with the processor:
+milliseconds per picture, and PSNR of its picture against the reference renderer.
 """
 
 import subprocess
@@ -65,7 +65,7 @@ def _one(run: Path, words: tuple[str, ...], folder: Path) -> dict[str, float]:
 
 
 def _in_browser(run: Run, page: Path) -> dict[str, float]:
-    """Milliseconds a picture, and PSNR against the reference renderer."""
+    """Milliseconds per picture, and PSNR against the reference renderer."""
     sys.path.insert(0, str(DOCS.parent / "tests" / "views"))
     from browser import drawn
     from frame_rate import milliseconds_a_picture
@@ -77,7 +77,7 @@ def _in_browser(run: Run, page: Path) -> dict[str, float]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """What is written, seconds, megabytes."""
+    """Output, seconds, megabytes."""
     rows = [(name, f"{x['seconds']:.1f} s", f"{x['mb']:.1f} MB") for name, x in result["commands"].items()]
     page = result["page"]
     slim = result["commands"]["slim model"]["mb"] / result["checkpoint_mb"]

@@ -1,10 +1,10 @@
 """The picture and the times of docs/guides/simulate.md.
 
     python docs/pages/simulate.py          the named scenes, one per row
-    python docs/pages/simulate.py times    measure how long a frame of each scene takes, and write the table
+    python docs/pages/simulate.py times    measure the time of a frame of each scene, and write the table
 
-Time is processor time on one core, for a frame with its right picture and its truth, files included; the median of
-`FRAMES` frames from the middle of the clip, where every effect of a scene has begun.
+Time is processor time on one core, for a frame with its right picture and its truth, files included. It is the median
+of `FRAMES` frames from the middle of the clip, where every effect of a scene has started.
 """
 
 import statistics
@@ -41,7 +41,7 @@ def row(name: str) -> np.ndarray:
 
 
 def times() -> dict[str, Any]:
-    """Seconds of processor time a frame of every named scene at its full size, and the time before the first frame."""
+    """Seconds of processor time per frame of every named scene at full size, and the time before the first frame."""
     return {"frames": FRAMES, "scenes": {name: _seconds(name) for name in SCENES}}
 
 
@@ -55,7 +55,7 @@ def _seconds(name: str) -> dict[str, float]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """Seconds a frame by scene."""
+    """Seconds per frame by scene."""
     rows = [(f"`{name}`", f"{x['frame']:.2f} s") for name, x in result["scenes"].items()]
     note = f"Processor time on one core, right picture, truth and files included ({machine(result)})."
     return f"{markdown(('Scene', 'A frame of 640x512'), rows)}\n\n{note}"

@@ -1,11 +1,11 @@
-"""Train on the real clip with a moving camera, from its own files in one `prepare`, and write the table of the result.
+"""Train on the real clip with a moving camera, prepared from its original files, and write the table of the result.
 
     python docs/pages/sinus.py [--data ../shared/data/sinus_endoscopy] [--scale 0.16667] [--iterations 1500]
-    python docs/pages/sinus.py --run RUN    write the result of a run that exists
-    python docs/pages/sinus.py --table      write the table of the last result again
+    python docs/pages/sinus.py --run RUN    write the result of an existing run
+    python docs/pages/sinus.py --table      rewrite the table of the last result
 
 The clip has 35 frames, poses, intrinsics and sparse points of a reconstruction, and one mask of the field of view. Its
-anatomy is rigid; the camera and the light move. The result is docs/results/sinus.json; the table stands in
+anatomy is rigid; the camera and the light move. The result is docs/results/sinus.json; the table is in
 docs/guides/prepare.md.
 """
 
@@ -28,7 +28,7 @@ COLUMNS = (("psnr_tissue", "PSNR tissue, dB", 2), ("psnr_full", "PSNR full, dB",
 
 
 def result(run: Path) -> dict[str, Any]:
-    """What is kept of a run: held-out rows, settings and versions; paths of the machine are left out."""
+    """The stored results of a run: held-out rows, settings and versions, without paths of the machine."""
     metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
     rows = {"endotsr": metrics["held_out"]["mean"], "cross_fade": metrics["cross_fade"]["mean"]}
     labels = {"endotsr": "endotsr", "cross_fade": "blend of its own renders"}

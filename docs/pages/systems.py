@@ -20,7 +20,7 @@ def parts() -> dict[str, str]:
 
 
 def resolved(result: dict[str, Any]) -> str:
-    """One row a system, one column a version of Python; a cell names the versions of Numba, NumPy and OpenCV."""
+    """One row per system, one column per version of Python; cells list the versions of Numba, NumPy and OpenCV."""
     rows = result["rows"]
     pythons = list(dict.fromkeys(row["python"] for row in rows))
     heads = ["System", *(f"Python {version}" for version in pythons)]

@@ -1,9 +1,9 @@
-"""How near the targets between the frames (B14) come to held-out frames, which they do not read.
+"""PSNR of the targets between the frames (B14) against held-out frames, which they do not read.
 
     python docs/pages/targets.py SEQUENCE [--scale S]   write docs/results/targets.json, then the table
-    python docs/pages/targets.py                        write the table of the last result again
+    python docs/pages/targets.py                        rewrite the table of the last result
 
-The table stands in docs/specification/b14_between.md between its marks.
+The table is in docs/specification/b14_between.md between its marks.
 """
 
 import argparse
@@ -34,7 +34,7 @@ KINDS = {"still": "both frames as they are", "moved": "both frames moved", "targ
 
 
 def measured(sequence: Sequence) -> dict[str, float]:
-    """PSNR in dB over the tissue that has a target, for every kind; `covered`, that fraction of the tissue."""
+    """PSNR in dB over the tissue with a target, for every kind; `covered` is the fraction of such tissue."""
     flows: dict[tuple[int, int], Flows] = {}
     error, covered, tissue = dict.fromkeys(KINDS, 0.0), 0, 0
     for index in (int(i) for i in sequence.test_index):
@@ -56,14 +56,14 @@ def measured(sequence: Sequence) -> dict[str, float]:
 
 
 def _moved(sequence: Sequence, pair: tuple[int, int], fraction: float, flows: Flows) -> np.ndarray:
-    """The blend of both frames moved by the motion field, without the still pair and without masks."""
+    """The blend of both frames moved by the motion field, without the static pair and without masks."""
     field, a = motion_between(flows, fraction), np.float32(fraction)
     before, after = (unit_image(sequence, i) for i in pair)
     return (1 - a) * warp_cubic(before, -a * field) + a * warp_cubic(after, (1 - a) * field)
 
 
 def table(result: dict[str, Any]) -> str:
-    """One row a split."""
+    """One row per split."""
     rows = [
         [split, *(f"{row[kind]:.2f}" for kind in KINDS), f"{100 * row['covered']:.1f} %"]
         for split, row in result["splits"].items()

@@ -1,12 +1,12 @@
-"""Measure what accuracy costs in time, and write docs/tradeoff.md from it.
+"""Measure the cost of accuracy in time, and write docs/tradeoff.md.
 
     python docs/pages/tradeoff.py render [SPLATS.npz ...]    the simulated scene, then trained scenes
     python docs/pages/tradeoff.py train SEQUENCE [OPTIONS]   trainings; `train --help` lists OPTIONS
     python docs/pages/tradeoff.py draw DIR                   pictures of a measurement of `endotsr tradeoff --out DIR`
-    python docs/pages/tradeoff.py                            pictures and page once more from the files
+    python docs/pages/tradeoff.py                            rewrite pictures and page from the files
 
-Run it while the machine has nothing else to do. `train` goes on where it was interrupted: its file is kept in
-docs/_build/tradeoff until the study is complete. A SEQUENCE is a sequence folder or the word `simulated`.
+Run it on an otherwise idle machine. An interrupted `train` continues: its file is kept in docs/_build/tradeoff until
+the study is complete. A SEQUENCE is a sequence folder or the word `simulated`.
 """
 
 import shutil
@@ -47,7 +47,7 @@ def measure(name: str, splats: Path | None = None) -> None:
 
 
 def draw_measured(folder: Path) -> None:
-    """Pictures of the measurements in a folder, beside them. Raises: InputError if there is none."""
+    """Draw the pictures of the measurements in a folder, into that folder. Raises: InputError if there is none."""
     drawn = []
     if (folder / RESULT).exists():
         drawn += draw(read_result(folder / RESULT), folder)
@@ -78,12 +78,12 @@ def read_trainings() -> dict[str, dict[str, Any]]:
 
 
 def _read(start: str) -> dict[str, dict[str, Any]]:
-    """JSON files of docs/results whose names begin so, by the rest of their names."""
+    """JSON files of docs/results with this prefix, by the rest of their names."""
     return {p.stem.removeprefix(start): read_json(p, COMMAND) for p in sorted(RESULTS.glob(f"{start}*.json"))}
 
 
 def write_page() -> None:
-    """The pictures that the page shows, and its generated parts."""
+    """Write the pictures of the page, and its generated parts."""
     result, trainings = read_json(RESULTS / "tradeoff.json", COMMAND), read_trainings()
     draw(result, RESULTS)
     for name, study in trainings.items():

@@ -1,11 +1,11 @@
 """Verification of the reference: the exact path against its own limit, and against 30 decimal digits.
 
-Three statements, each with its figure. The exact path equals a cutoff of 1e-14, so nothing is lost in a support, a
-stop or a clamp. Cutoffs of 1e-12 and 1e-14 agree, so the limit is reached. Twenty pixels, computed from the raw
-parameters in mpmath by the formulas alone, equal those of the exact path.
+Three statements, each with its figure. The exact path equals a cutoff of 1e-14, so no support, stop or clamp loses
+anything. Cutoffs of 1e-12 and 1e-14 agree, so the limit is reached. Twenty pixels, computed in mpmath from the raw
+parameters by the formulas alone, equal the pixels of the exact path.
 
 The difference between 1e-12 and 1e-14 depends on the scene: a few 1e-12 on a surface, and tens of 1e-12 where hundreds
-of faint Gaussians overlap, each of which loses its rim. The reference itself is a hundred times nearer.
+of faint Gaussians overlap, each of which loses its rim. The error of the reference is a hundred times smaller.
 """
 
 from typing import Any, NamedTuple
@@ -38,7 +38,7 @@ class Certificate(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether every statement holds."""
+        """Whether every statement is true."""
         return (
             self.exact_against_1e14 <= ROUNDING
             and self.cut_1e12_against_1e14 <= LIMIT

@@ -10,7 +10,7 @@ from endotsr.report.style import GREY, LIGHT, SMALL, name_axes, new_figure
 
 
 def training_figure(result: dict[str, Any]) -> Any:
-    """PSNR against time: one panel a question, the base in grey beside the trainings that answer it."""
+    """PSNR against time: one panel per question, the base in grey with the trainings that answer it."""
     by_name = {c["name"]: c for c in result["configurations"]}
     dials = [d for d in dict.fromkeys(c["dial"] for c in result["configurations"]) if d != "base"] or ["base"]
     rows, columns = -(-len(dials) // 3), min(3, len(dials))
@@ -55,5 +55,5 @@ def _room(panels: Any) -> None:
 
 
 def draw_training(result: dict[str, Any], folder: Path, name: str) -> list[str]:
-    """PSNR against time; returns the stems that were written."""
+    """PSNR against time; returns the written stems."""
     return save_pictures({name: training_figure(result)}, folder) if result["configurations"] else []

@@ -1,7 +1,7 @@
-"""The dials between exact and fast: their measured values, and what is left out and why.
+"""The dials between exact and fast: their measured values, and omissions with their reasons.
 
-Each dial is varied alone, with accurate values for everything else. The joint sweep of the three most important ones
-is that of `endotsr.tradeoff.settings`.
+Each dial is varied alone, with accurate values for everything else. `endotsr.tradeoff.settings` has the joint sweep of
+the three most important ones.
 """
 
 from typing import NamedTuple
@@ -41,7 +41,7 @@ OMITTED = {
 def dials(degree: int, bases: int, frequencies: int, near: float) -> list[Dial]:
     """All dials that apply to a scene, each varied from `ACCURATE`.
 
-    degree, bases, frequencies   of the trained scene; 0 bases or frequencies: it has no such component
+    degree, bases, frequencies   of the trained scene; 0 bases or frequencies: no such component
     near                         near plane, scene units
     """
     base = ACCURATE._replace(raster=CLOSE._replace(near=near), degree=degree)

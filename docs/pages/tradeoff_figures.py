@@ -1,4 +1,4 @@
-"""Work-precision diagrams from `tradeoff.json`: logarithmic, labelled on the curves, legible without colour."""
+"""Work-precision diagrams from `tradeoff.json`: logarithmic, with labelled curves, legible without colour."""
 
 import math
 from pathlib import Path
@@ -81,7 +81,7 @@ def _short(point: dict[str, Any], cost: str) -> str:
 
 
 def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
-    """One panel a dial, on common axes; values beside the points.
+    """One panel per dial, on common axes, with labelled points.
 
     cost    `forward`, `both` or `visits` (dials of the temporal model count basis terms there)
     error   `max` or `gradient`
@@ -125,7 +125,7 @@ def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, e
 
 
 def _room(axes: Any) -> None:
-    """At least two decades of cost around the points, so that curves can be compared and labels fit."""
+    """Show at least two decades of cost around the points, for comparable curves and space for labels."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     low, high = axes.get_xlim()
@@ -174,7 +174,7 @@ def logarithmic_axes(axes: Any, name: str, sizes: Sizes = NORMAL, title: str = "
 
 
 def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
-    """Every figure as STEM.png and STEM.svg; returns the stems."""
+    """Write every figure as STEM.png and STEM.svg; returns the stems."""
     for stem, figure in pictures.items():
         for ending in ("png", "svg"):
             save(figure, folder / f"{stem}.{ending}")
@@ -182,7 +182,7 @@ def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
 
 
 def draw(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> list[str]:
-    """All pictures of a study; returns the stems that were written."""
+    """All pictures of a study; returns the written stems."""
     pictures = {name: main_figure(result)} if result["joint"] else {}
     if result.get("dials"):
         pictures |= {

@@ -1,7 +1,7 @@
-"""Variants of the compositing kernels for this study alone: other exponentials, other tiles.
+"""Variants of the compositing kernels, only for this study: other exponentials, other tiles.
 
-A variant is the body of the package's kernel, compiled again with a few of its names bound to other values, so that
-no code is repeated. Variants of the fast path are compiled like the fast path, with contraction.
+A variant is the body of the package's kernel, recompiled with a few of its names bound to other values; no code is
+repeated. Variants of the fast path are compiled like the fast path, with contraction.
 """
 
 import contextlib

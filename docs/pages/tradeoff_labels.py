@@ -1,4 +1,4 @@
-"""Labels beside points: each is placed at the first position around its point that no other label and no line takes."""
+"""Labels of points, each at the first position around its point that is free of other labels and lines."""
 
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-STEP = 3.0  # pixels between the points that stand for a line
+STEP = 3.0  # pixels between the sampled points of a line
 COINCIDENT = 4.0  # pixels within which points have one common label
 RADII = (6, 13, 22, 34)  # points of the page
 DIRECTIONS = ((1, 0.5), (-1, -0.5), (1, -0.5), (-1, 0.5), (0, 1), (0, -1))
@@ -26,7 +26,7 @@ class Label(NamedTuple):
 
 
 def place_labels(figure: Any, labels: list[Label]) -> None:
-    """Write the labels; the layout of the figure is fixed from here on. A label without a free place is left out."""
+    """Write the labels and fix the layout of the figure. A label without a free position is omitted."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     renderer = figure.canvas.get_renderer()
@@ -37,7 +37,7 @@ def place_labels(figure: Any, labels: list[Label]) -> None:
         taken += [_around(axes.transData.transform((label.x, label.y))) for label in mine]
         lines = _line_points(axes)
         for label in mine:
-            # A place that no line crosses, or else one that covers no other label and no point.
+            # A position without lines, or else one without other labels and points.
             box = _write(label, renderer, room, taken, lines) or _write(label, renderer, room, taken, lines[:0])
             if box is not None:
                 taken.append(box)

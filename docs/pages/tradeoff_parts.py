@@ -22,7 +22,7 @@ TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", 
 def fragments(
     result: dict[str, Any], others: dict[str, dict[str, Any]], trainings: dict[str, dict[str, Any]]
 ) -> dict[str, str]:
-    """Every generated part by name; a part without its measurement says so.
+    """Every generated part by name; a missing measurement is marked.
 
     result      tradeoff.json of the simulated scene
     others      the same of trained real scenes, by name
@@ -43,7 +43,7 @@ def fragments(
 
 
 def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
-    """What a smaller error costs, in one sentence, and the setting that is right to 8 bits on every scene."""
+    """The cost of a smaller error in one sentence, and the setting that is right to 8 bits on every scene."""
     by_name, chosen = {p["name"]: p for p in result["points"]}, eight_bit_setting(result)
     if chosen is None:
         return "No setting of float32 is right to the last of 8 bits."
@@ -145,7 +145,7 @@ def _scene_row(scene: dict[str, Any], simulated: dict[str, Any]) -> list[str]:
 
 
 def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any]) -> str:
-    """Whether the first two sentences of advice hold on a scene, and if not, what to do there."""
+    """Whether the first two sentences of advice are right on a scene, and otherwise the alternative."""
     wrong = []
     if paper["error"]["rms"] > scene["lines"]["eight_bit"]:
         wrong.append("the average error of `paper` exceeds half a step of 8 bit")
@@ -157,7 +157,7 @@ def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any])
 
 
 def training(name: str, result: dict[str, Any]) -> str:
-    """One study of training: what was run, its picture, the table, and what is not worth its time."""
+    """One study of training: its conditions, its picture, the table, and the dominated trainings."""
     m = result["machine"]
     head = (
         f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "

@@ -1,6 +1,6 @@
-"""Why a looser stop costs so much: python docs/pages/tradeoff_stop.py trains two models, renders them with each.
+"""The cost of a looser stop: `python docs/pages/tradeoff_stop.py` trains two models and renders each with all stops.
 
-The result is docs/results/stop.json; `python docs/pages/tradeoff.py` writes its sentences into docs/tradeoff.md.
+The result is docs/results/stop.json; `python docs/pages/tradeoff.py` writes its sentences to docs/tradeoff.md.
 """
 
 from datetime import date
@@ -41,7 +41,7 @@ def measured() -> dict[str, Any]:
 
 
 def sentences(result: dict[str, Any]) -> str:
-    """What the loose stop costs in the render, and what it costs in the training."""
+    """The cost of the loose stop in the render and in the training."""
     tight, loose = (result["psnr_tissue"][f"{trained:g}"] for trained in TRAINED)
     first, _, last = (f"{rendered:g}" for rendered in RENDERED)
     scene = f"{SCENE['width']}x{SCENE['height']}, {SCENE['frames']} frames, {ITERATIONS} iterations of `demo`, one seed"

@@ -1,7 +1,6 @@
 """The whole study of one scene: the measurement of `endotsr tradeoff`, every dial alone, and the certificate.
 
-In: a scene. Out: tradeoff.json with the keys `dials`, `omitted` and `reference.certificate` beside those that the
-command writes.
+In: a scene. Out: tradeoff.json with the keys of the command and `dials`, `omitted` and `reference.certificate`.
 """
 
 from collections.abc import Callable
@@ -49,7 +48,7 @@ def run_whole_study(
 
 
 def omitted(scene: StudyScene) -> dict[str, str]:
-    """Dials that are not measured, with the reason."""
+    """Omitted dials, with the reason."""
     if exact_is_possible(scene):
         return OMITTED
     pairs = f"{scene.gaussians.count} Gaussians on {scene.camera.width}x{scene.camera.height} pixels"

@@ -1,4 +1,4 @@
-"""The studies of error against time as text: advice, presets that are dominated, and the table of the trainings."""
+"""The studies of error against time as text: advice, dominated presets, and the table of the trainings."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,7 +7,7 @@ from endotsr.report.tables import duration, plain
 from endotsr.tradeoff.study import Ranked
 from endotsr.tradeoff.text import levels
 
-# Dominated presets that are kept, with the reason. A test fails for a dominated preset that is missing here.
+# Dominated presets with the reason to keep them. A test fails for a dominated preset without a reason.
 KEPT = {
     "legacy": "reproduces the released CUDA program, its three-sigma tiles and its gradients, for comparison",
 }
@@ -19,7 +19,7 @@ def small(number: float) -> str:
 
 
 def advice(result: dict[str, Any]) -> list[str]:
-    """Three pieces, each with the figures of this measurement."""
+    """Three sentences of advice, each with the figures of this measurement."""
     by_name = {p["name"]: p for p in result["points"]}
     paper = by_name[result["presets"]["paper"]]
     chosen = eight_bit_setting(result)
@@ -51,7 +51,7 @@ def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def error_over_cutoff(result: dict[str, Any]) -> float:
-    """Largest error over the cutoff, in float64, where the cutoff decides: at the tightest stop, below it."""
+    """Largest error over the cutoff, in float64, where the cutoff limits the error: at the tightest stop, below it."""
     rasters = [(p["error"]["max"], p["setting"]["raster"]) for p in _joint(result, "float64")]
     ratios = [
         error / raster["alpha_cutoff"]
@@ -80,7 +80,7 @@ def _joint(result: dict[str, Any], precision: str) -> list[dict[str, Any]]:
 
 
 def dominates(a: Ranked, b: Ranked) -> bool:
-    """Whether a is nowhere worse than b and somewhere better."""
+    """Whether a is nowhere worse than b and somewhere strictly better."""
     ours, theirs = (a.cost, *a.errors), (b.cost, *b.errors)
     return all(x <= y for x, y in zip(ours, theirs, strict=True)) and ours != theirs
 
@@ -91,7 +91,7 @@ def dominated_by(point: Ranked, points: Sequence[Ranked]) -> list[str]:
 
 
 def judge_presets(points: Sequence[dict[str, Any]], presets: dict[str, str]) -> dict[str, dict[str, Any]]:
-    """For every preset: the settings that dominate it, and the reason why it is kept.
+    """For every preset: the settings that dominate it, and the reason to keep it.
 
     A preset serves rendering and training, so another setting dominates it only if it visits no more pairs and is no
     worse in the largest error, the RMS error and every gradient block. The comparison is within one precision, where a
@@ -125,7 +125,7 @@ def training_lines(result: dict[str, Any]) -> list[str]:
 
 
 def summary(result: dict[str, Any]) -> list[str]:
-    """The variation by rounding alone, and the trainings that a faster one exceeded by more than that variation."""
+    """The variation due to rounding, and the trainings that a faster one exceeds by more than this variation."""
     ends = {c["name"]: (c["seconds"], c["milestones"][-1]["psnr_full"]) for c in result["configurations"]}
     if "base" not in ends or None in [psnr for _, psnr in ends.values()]:
         return []
@@ -144,7 +144,7 @@ def summary(result: dict[str, Any]) -> list[str]:
 
 
 def training_rows(result: dict[str, Any]) -> list[list[str]]:
-    """Name, PSNR, gain on the base, SSIM, LPIPS, time, time over that of the base, Gaussians."""
+    """Name, PSNR, gain on the base, SSIM, LPIPS, time, time relative to the base, Gaussians."""
     by_name = {c["name"]: c for c in result["configurations"]}
     if "base" not in by_name:
         return []

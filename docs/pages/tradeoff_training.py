@@ -1,8 +1,8 @@
 """Held-out quality against training seconds and iterations, with one setting changed at a time.
 
-Every configuration is one training that is measured at milestones; the evaluation time is not counted. The schedule of
-the learning rates spans the whole training, so a milestone shows an unfinished training; a shorter training of that
-length ends with a slightly higher quality.
+Every configuration is one training, measured at milestones; the evaluation time is excluded. The schedule of the
+learning rates spans the whole training, so a milestone shows an unfinished training. A shorter training of that length
+ends with a slightly higher quality.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ from endotsr.tradeoff.results import FORMAT, read_result
 
 METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
 MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # fractions of the iterations
-LPIPS_FROM = 1 / 2  # it takes several times as long as all other metrics together
+LPIPS_FROM = 1 / 2  # LPIPS takes several times as long as all other metrics together
 PROBE_WARM, PROBE = 5, 15  # iterations
 GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
 
@@ -42,10 +42,10 @@ class StudyTraining(NamedTuple):
     name: str
     dial: str  # title of the question that it answers
     changes: dict[str, dict[str, Any]]  # settings that differ from the base
-    cost: float  # estimated seconds over those of the base; plans the study, enters no result
+    cost: float  # estimated seconds relative to the base; used to plan the study, not in results
 
     def words(self) -> list[str]:
-        """The options of `endotsr train` that make the changes."""
+        """The options of `endotsr train` for the changes."""
         return [
             word
             for section, values in self.changes.items()
@@ -59,7 +59,7 @@ def _plain(value: Any) -> str:
 
 
 def configurations(base: Config) -> list[StudyTraining]:
-    """The base first, then the cheap and informative ones, so that a shortened study gives the main results."""
+    """The base first, then the cheap and informative ones: a shortened study gives the main results."""
     first, other = base.initialisation.first_frame_points, base.initialisation.other_frame_points
 
     def points(factor: float) -> dict[str, dict[str, Any]]:
@@ -91,7 +91,7 @@ def changed(base: Config, configuration: StudyTraining) -> Config:
 
 
 def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights: LpipsWeights | None) -> int:
-    """Length of every training so that all of them, measured at their milestones, take about `seconds`.
+    """Length of every training for which all of them, measured at their milestones, take about `seconds`.
 
     A few iterations and one evaluation are timed first.
     """
@@ -118,7 +118,7 @@ def measured(
     """Held-out means at full size, independent of the image scale of the training.
 
     sequence   sequence of the training; its training times define the atoms
-    full       the frames that are predicted
+    full       the predicted frames
     """
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     seen = with_corrected_cameras(full, state.frames)
@@ -141,7 +141,7 @@ def run_configuration(
 ) -> dict[str, Any]:
     """Train once; the entry of training.json.
 
-    Seconds count from the initialisation to the end of a milestone's iteration, compilation and evaluations left out.
+    Seconds count from the initialisation to the end of a milestone's iteration, without compilation and evaluations.
     """
     rehearse(config)
     total = config.training.iterations
@@ -185,7 +185,7 @@ def run_training_study(
     begin: Callable[[int], None] = lambda steps: None,
     step: Callable[[], None] = lambda: None,
 ) -> dict[str, Any]:
-    """Train every configuration that the time allows, writing `file` after each; those it holds already are kept.
+    """Train every configuration that the time allows, and write `file` after each; stored ones are kept.
 
     load         settings -> sequence, which depends on the image scale
     iterations   of every training; None = as many as fit the minutes (a resumed study keeps its number)
@@ -193,7 +193,7 @@ def run_training_study(
     """
     full = load(base)
     result = _begun(file, base, full, name, minutes, iterations, weights)
-    file.parent.mkdir(parents=True, exist_ok=True)  # only now, so that a refused sequence leaves no file
+    file.parent.mkdir(parents=True, exist_ok=True)  # only now: a rejected sequence leaves no file
     base = with_iterations(base, result["iterations"])
     done = {entry["name"]: entry for entry in result["configurations"]}
     left = [c for c in configurations(base) if c.name not in done]
@@ -216,7 +216,7 @@ def run_training_study(
 
 
 def _expected_seconds(configuration: StudyTraining, base: dict[str, Any] | None) -> float:
-    """Training and evaluation of a configuration, from those of the base training; 0 before it was measured."""
+    """Seconds of training and evaluation of a configuration, scaled from the base; 0 before the base is measured."""
     return configuration.cost * base["seconds"] + base["evaluation_seconds"] if base else 0.0
 
 
@@ -229,7 +229,7 @@ def _begun(
     iterations: int | None,
     weights: LpipsWeights | None,
 ) -> dict[str, Any]:
-    """The study that `file` holds if it is of the same sequence and settings, else a new one without trainings."""
+    """The study in `file` if it has the same sequence and settings, else a new one without trainings."""
     digest = hashlib.sha256(config_to_toml(base).encode() + full.images.tobytes() + full.depth.tobytes()).hexdigest()
     if file.exists():
         found = read_result(file)

@@ -1,7 +1,7 @@
-"""The pictures of docs/guides/tutorial.md, made by `python docs/pages/tutorial.py`: the steps of the tutorial, small.
+"""The pictures of docs/guides/tutorial.md, by `python docs/pages/tutorial.py`: the steps of the tutorial at small size.
 
-A raw recording is simulated in the layout of StereoMIS. Every step is the command that the page shows, at a size that
-takes a few minutes on two cores.
+A raw recording is simulated in the layout of StereoMIS. Every step is a command of the page, at a size that takes a few
+minutes on two cores.
 """
 
 import tempfile

@@ -1,4 +1,4 @@
-"""How often the judge recognises a mistake that is on no list: part of docs/guides/port.md, made by
+"""Rates at which the judge recognises unlisted mistakes: part of docs/guides/port.md, by
 
     python docs/pages/unseen.py
 

@@ -4,13 +4,13 @@
     python docs/pages/windows.py recording --frames 2000 --size 320x256 --windows auto --chain 4 --preset quick
     python docs/pages/windows.py clip SEQUENCE --windows 64 36 27 --preset quick      one clip in 1, 2 and 3 windows
     python docs/pages/windows.py warm RUN                                             iterations saved by warm starts
-    python docs/pages/windows.py table                                                write the tables again
+    python docs/pages/windows.py table                                                rewrite the tables
 
 `recording` simulates breathing, pulsation, a moving camera, an instrument and a drift of the light as a StereoMIS
-recording, and makes the film with the commands of the guide; with `--keep` the same command continues what was
-interrupted. `warm` reads a run whose windows started warm: it trains every one of them again from a cold start, on the
-whole schedule, and finds the iteration at which the cold run reaches the training loss with which the warm one ends.
-Results are added to docs/results/windows.json; the tables stand in docs/guides/recording.md.
+recording, and renders the film with the commands of the guide; with `--keep` an interrupted command continues. `warm`
+retrains the warm windows of a run from a cold start, on the whole schedule, and finds the iteration at which the cold
+run reaches the final training loss of the warm one. Results are added to docs/results/windows.json; the tables are in
+docs/guides/recording.md.
 """
 
 import argparse
@@ -44,18 +44,18 @@ FILE, PAGE = DOCS / "results" / "windows.json", DOCS / "guides" / "recording.md"
 EFFECTS = "breathing,pulsation,camera_motion,exposure,instrument,highlights,noise"
 FRAMES_A_BREATH, FRAMES_A_BEAT, FRAMES_A_SWING = 80, 24, 160
 LONGEST = 10**9  # iterations: the whole log
-LAST = 0.1  # of the log of a run, whose mean loss is compared
+LAST = 0.1  # last fraction of the log of a run, with the compared mean loss
 
 
 def command(*words: str) -> tuple[float, float]:
-    """Run a command of endotsr; seconds, and the largest peak memory of any process so far, bytes."""
+    """Run a command of endotsr; returns seconds, and the largest peak memory of any process so far, bytes."""
     begun = time.monotonic()
     subprocess.run([sys.executable, "-m", "endotsr", *words], check=True)
     return time.monotonic() - begun, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024.0
 
 
 def row_of(run: Path, name: str, seconds: float, preset: str) -> dict[str, Any]:
-    """What a trained and measured run of windows shows."""
+    """Results of a trained and measured run of windows."""
     metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
     means = {"model": metrics["held_out"]["mean"]} | {k: v["mean"] for k, v in metrics["baselines"].items()}
     return {
@@ -78,7 +78,7 @@ def row_of(run: Path, name: str, seconds: float, preset: str) -> dict[str, Any]:
 
 
 def trained(source: Path, run: Path, name: str, options: argparse.Namespace, windows: str) -> dict[str, Any]:
-    """One training in windows, with its evaluation; a run that was begun is continued."""
+    """One training in windows, with its evaluation; an interrupted run is continued."""
     words = ["train", str(source), "--out", str(run), "--windows", windows, "--preset", options.preset]
     words += ["--chain", str(options.chain), "--sequence.split", options.split]
     words += ["--iterations", str(options.iterations)] if options.iterations else []
@@ -92,25 +92,25 @@ def trained(source: Path, run: Path, name: str, options: argparse.Namespace, win
 
 
 class Steps:
-    """The seconds of commands, kept in a folder: a command whose output exists is not run again."""
+    """The seconds of commands, stored in a folder: a command with existing output is not repeated."""
 
     def __init__(self, folder: Path) -> None:
         self._file = folder / "steps.json"
         self.seconds = json.loads(self._file.read_text(encoding="utf-8")) if self._file.exists() else {}
 
     def make(self, name: str, out: Path, *words: str) -> None:
-        """Run a command, unless its output is there."""
+        """Run a command unless its output exists."""
         if not out.exists():
             self.keep(name, command(*words)[0])
 
     def keep(self, name: str, seconds: float) -> None:
-        """Note the seconds of a step, added to those of earlier parts of it."""
+        """Add seconds to the recorded time of a step."""
         self.seconds[name] = self.seconds.get(name, 0.0) + seconds
         write_json(self._file, self.seconds)
 
 
 def followed_errors(run: Path, raw: Path) -> dict[str, Any]:
-    """Errors of points that are followed across seams and inside of windows; the truth is that of the raw recording."""
+    """Errors of points followed across seams and inside windows, against the truth of the raw recording."""
     scene = open_windows(run)
     frames, place = WindowFrames(scene), {g: i for i, g in enumerate(scene.frames)}
     camera = scene.cameras[0]
@@ -152,7 +152,7 @@ def recording(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def warm(run: Path, most: int) -> list[dict[str, Any]]:
-    """For the first warm windows: their iterations, and those of a cold run that reach the same loss."""
+    """For the first warm windows: their iterations, and the iterations of a cold run with the same loss."""
     record, config, found = read_record(run), recording_settings(run), []
     for k in [k for k, window in enumerate(record.windows) if window.start == "warm"][:most]:
         window = record.windows[k]
@@ -181,7 +181,7 @@ def losses(folder: Path) -> np.ndarray:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """One run a row."""
+    """One row per run."""
     headings = ["Recording, preset", "Windows (warm)", "Steps", "Time, min", "Memory, GB",
                 "PSNR, dB", "blend", "flow", "LPIPS", "Flicker"]  # fmt: skip
     cells = []
@@ -197,7 +197,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def seam_table(rows: list[dict[str, Any]]) -> str:
-    """Points that are followed for 16 frames, and the minutes of the commands, for every raw recording."""
+    """Points followed for 16 frames, and the minutes of the commands, for every raw recording."""
     headings = ["Recording", "Seams", "Across, of the motion", "Inside, of the motion",
                 "Minutes: prepare, depth, train, film", "Page, largest window, MB"]  # fmt: skip
     cells = []
@@ -214,7 +214,7 @@ def seam_table(rows: list[dict[str, Any]]) -> str:
 
 
 def warm_table(rows: list[dict[str, Any]]) -> str:
-    """One warm window a row."""
+    """One row per warm window."""
     if not rows:
         return "Not measured yet."
     headings = ["Window", "Iterations, warm", "Loss at the end", "A cold start reaches it after", "Its loss at the end"]
