@@ -1,13 +1,13 @@
-"""Make the golden vectors of this folder, and ports that each make one mistake.
+"""Generate the golden vectors of this folder, and ports with one mistake each.
 
     python golden/make.py check [--within-tolerance] [--golden DIR]    compare the files with a fresh computation
     python golden/make.py write [--golden DIR]                         replace the files, and print what moved
     python golden/make.py wrong                                        list the mistakes
     python golden/make.py wrong FLAG OUTDIR [--golden DIR]             write what a port with this mistake answers
 
-`check` compares bit by bit on the class of machine that the manifest names, and elsewhere, or with
-`--within-tolerance`, within the float64 tolerance. It ends with exit code 1 if anything differs. `write` always ends
-with exit code 1, so that no test run rewrites its own expected values. `wrong` writes in float64.
+`check` compares bitwise on the class of machine named in the manifest, and otherwise, or with `--within-tolerance`,
+within the float64 tolerance. It ends with exit code 1 if anything differs. `write` always ends with exit code 1: no
+test run may rewrite its own expected values. `wrong` writes in float64.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Makers of the golden cases: one module a family, with its cases, and beside it a file with its wrong ports.
+"""Generators of the golden cases: per family a module with its cases and a TOML file with its wrong ports.
 
-`golden/make.py` is their program. It runs in the repository and is no part of the installed package.
+`golden/make.py` is their program. It runs in the repository and is not part of the installed package.
 """

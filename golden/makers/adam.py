@@ -1,7 +1,7 @@
 """Family `adam`: the optimiser (B10) for some steps with given gradients.
 
-A parameter and one gradient a step come in. The cases fix the bias correction, the place and size of epsilon with tiny
-gradients, and that a second moment of 0 moves nothing.
+Inputs: a parameter and one gradient per step. The cases test the bias correction, the position and size of epsilon with
+tiny gradients, and a second moment of 0, which moves nothing.
 """
 
 from makers.making import Made, Seeds, Spec, changed

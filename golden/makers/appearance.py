@@ -1,7 +1,7 @@
 """Family `appearance`: equation (2), the bounded colour residual beta tanh(A phi_bar) / Y00.
 
-Coefficients A, normalised atoms and a gradient by the residual come in. The cases separate the factor 1 / Y00 from the
-bound, show that zero coefficients still have a gradient, and saturate the tanh.
+Inputs: coefficients A, normalised atoms and the gradient with respect to the residual. The cases distinguish the factor
+1 / Y00 from the bound, have zero coefficients with a nonzero gradient, and saturate the tanh.
 """
 
 from makers.making import Seeds, Spec

@@ -1,7 +1,7 @@
 """Family `calibration`: equation (7), the weight of the Laplacian loss from gradient images.
 
-The gradient images of some views come in, photometric and Laplacian, so that their RMS is part of the case. The cases
-have an odd and an even number of views, a view without photometric gradient, and no valid view at all.
+Inputs: photometric and Laplacian gradient images of some views, so the cases include the RMS. The cases have an odd and
+an even number of views, a view without photometric gradient, and no valid view.
 """
 
 import numpy as np

@@ -7,7 +7,7 @@ from makers.making import Made, given
 
 
 def omegas(count: int, high: float = 16.0) -> Made:
-    """Frequencies as an input: rounded to float32, so that the case does not depend on how they were made."""
+    """Frequencies as an input, rounded to float32: the case does not depend on their computation."""
     return given(frequencies(count, 1.0, high), f"1 * {high!r}^(k / {count - 1}), rounded", "cycles per sequence")
 
 
@@ -17,6 +17,6 @@ def stamps(count: int) -> Made:
 
 
 def train_index(count: int) -> Made:
-    """All frames but (k - 1) % 8 == 0."""
+    """All frames except (k - 1) % 8 == 0."""
     keep = np.flatnonzero((np.arange(count) - 1) % 8 != 0)
     return given(keep, "all k but (k - 1) % 8 == 0", "frame")

@@ -1,8 +1,8 @@
 """Family `composite`: blending of screen Gaussians (B5) and its gradients; `composite_limits` has its thresholds.
 
-Screen means, screen covariances, logits, colours, depths, a background and gradients by the three images come in. The
-cases fix the order (by depth, ties by index), the background, the place of pixel centres, the reach of tiles in preset
-legacy, and gradients that need no division by 1 - alpha.
+Inputs: screen means, screen covariances, logits, colours, depths, a background and gradients with respect to the three
+images. The cases test the order (by depth, ties by index), the background, the position of pixel centres, the tiles of
+the preset legacy, and gradients without division by 1 - alpha.
 """
 
 import numpy as np
@@ -72,9 +72,9 @@ def _tile_case(
 
 
 def _tile_ends() -> list[Spec]:
-    """Discs whose radius or centre puts the end of their tiles between the right rule and a wrong one.
+    """Discs with a radius or centre for which the right rule and a wrong rule give different tiles.
 
-    3 sqrt(2.458 + sqrt(0.1)) is 4.997: a larger number under the inner root makes the radius 6 in place of 5.
+    3 sqrt(2.458 + sqrt(0.1)) is 4.997: a larger number under the inner root makes the radius 6 instead of 5.
     """
     flags = ("tiles_from_the_mean", "tiles_root_without_floor", "tiles_unbounded")
     ends = "Where the tiles of a Gaussian end: centre less half a pixel, the root at least 0.1"

@@ -1,8 +1,8 @@
 """Family `composite`, its thresholds: the cutoff and the clamp of alpha, and the stop at small transmittance (B5).
 
-Most cases are flat over the image, so that every pixel takes the same decision. The values lie just below, at and above
-a threshold. Two cases are exactly on the cutoff, where rounding may decide either way: in one, some pixels may flip; in
-the other, image and gradient have to take the same decision.
+Most cases are flat over the image, so all pixels make the same decision. The values are just below, at and above a
+threshold. Two cases are exactly on the cutoff, where rounding may decide either way: in one, some pixels may flip; in
+the other, image and gradient must make the same decision.
 """
 
 import math
@@ -69,7 +69,7 @@ def _on_the_cutoff() -> Spec:
 
 
 def _one_on_the_cutoff() -> Spec:
-    """One decision that rounding may take either way and that determines the whole answer, gradients included."""
+    """One decision that depends on rounding and determines the whole answer, gradients included."""
     inputs, settings = screen_inputs(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0), raster_settings(PAPER)
     one = (slice(None), 1)
     inputs["mean2d"] = changed(inputs["mean2d"], one, [9.5, 6.5], "[:, 1] is (9.5, 6.5), a pixel centre")

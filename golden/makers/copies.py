@@ -1,11 +1,11 @@
-"""Copies of the reference in which some lines of source are changed: what a wrong port is.
+"""Wrong ports: copies of the reference with some changed lines of source.
 
-In: edits, each a module of the package, the text to replace and its replacement. Out: the operations of a copy, loaded
-beside the reference, that has these lines and is otherwise the same text. The reference itself is not touched.
+In: edits, each a module of the package, the text to replace and its replacement. Out: the operations of a changed copy,
+loaded in the same process as the reference, which remains unchanged.
 
-A copy whose changed lines may be part of a kernel runs without the compiler, since a changed kernel would have to be
-compiled once for each mistake; the pages of the golden cases are small enough for that. Otherwise only the changed
-modules and those that import them are loaded again, and the compiled kernels of the reference are used.
+If the changed lines may be part of a kernel, the copy runs without the compiler: compiling it for each mistake would
+take too long, and the images of the golden cases are small enough. Otherwise only the changed modules and their
+importers are reloaded, and the compiled kernels of the reference are used.
 """
 
 import ast
@@ -42,7 +42,7 @@ class Edit(NamedTuple):
 
 
 def changed_text(module: str, edits: Sequence[Edit]) -> str:
-    """The source of a module after the edits. Raises ValueError where an old text is not there as often as it says."""
+    """The source of a module after the edits. Raises ValueError if an old text does not occur exactly `times` times."""
     text = _files()[f"{ROOT}.{module}"].read_text(encoding="utf-8")
     for edit in edits:
         if text.count(edit.old) != edit.times:
@@ -52,7 +52,7 @@ def changed_text(module: str, edits: Sequence[Edit]) -> str:
 
 
 def without_compiler(edits: Sequence[Edit]) -> bool:
-    """Whether a copy with these edits runs without the compiler: one of the modules holds kernels or their formulas."""
+    """Whether a copy with these edits runs without the compiler: a module has kernels or their formulas."""
     return any(_holds_kernels(edit.module) for edit in edits)
 
 
@@ -63,7 +63,7 @@ def _holds_kernels(module: str) -> bool:
 
 @contextmanager
 def changed_copy(edits: Sequence[Edit]) -> Iterator[Callable[[str], Stage]]:
-    """The operations, by name, of a copy of the reference with these edits; they are usable inside the context only.
+    """The operations, by name, of a copy of the reference with these edits; valid only inside the context.
 
     Raises: ValueError as `changed_text`.
     """
@@ -93,7 +93,7 @@ def _operation(name: str) -> Stage:
 
 
 def _exchange(names: set[str], modules: Mapping[str, ModuleType]) -> None:
-    """Forget the modules of these names, and put others in their place."""
+    """Replace the loaded modules of these names by others."""
     root = sys.modules[ROOT]
     for name in names:
         sys.modules.pop(name, None)
@@ -112,7 +112,7 @@ class _Finder(importlib.abc.MetaPathFinder):
         self.names, self.texts = names, texts
 
     def find_spec(self, fullname, path=None, target=None):
-        """Modules that are not of the copy are found as ever."""
+        """Find modules of the copy only; others are left to the usual finders."""
         if fullname not in self.names:
             return None
         file = _files()[fullname]

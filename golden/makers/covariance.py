@@ -1,7 +1,8 @@
 """Family `covariance`: rotation and semi-axes of a Gaussian (B2) from its raw quaternion and log-scale.
 
-Quaternions of any length, log-scales and gradients by rotation and scale come in. The cases fix the order w, x, y, z,
-the normalisation and its gradient, the zero quaternion (the identity, gradient 0) and the clip of a log-scale at +-40.
+Inputs: quaternions of any length, log-scales, and gradients with respect to rotation and scale. The cases test the
+order w, x, y, z, the normalisation and its gradient, the zero quaternion (the identity, gradient 0) and the clip of a
+log-scale at +-40.
 """
 
 from makers.making import Made, Seeds, Spec, changed, given

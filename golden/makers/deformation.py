@@ -1,7 +1,7 @@
 """Family `deformation`: the offsets of the flexible deformation model (B1) at one time, in both time bases.
 
-Weights, centres, widths, a time and a gradient by the offsets come in. The cases fix the two bases, that the sign of a
-width matters to its gradient only, and the floor of a squared width.
+Inputs: weights, centres, widths, a time and the gradient with respect to the offsets. The cases test the two bases, the
+sign of a width, which affects only its gradient, and the floor of a squared width.
 """
 
 import numpy as np

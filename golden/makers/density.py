@@ -1,8 +1,8 @@
 """Family `density`: density control (B11), the statistics of some views and one densification.
 
-Raw parameters, screen gradients and visibility by view, the noise of splits and camera poses come in. The cases fix
-which Gaussians are pruned, cloned and split, in which order the new Gaussians follow, which candidates are taken when
-there is no room for all, the extent of moving cameras, and on which side of a threshold its own value lies.
+Inputs: raw parameters, screen gradients and visibility by view, the noise of splits, and camera poses. The cases test
+the selection of pruned, cloned and split Gaussians, the order of the new Gaussians, the selection of candidates if
+there is too little room, the extent of moving cameras, and values exactly on the thresholds.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ VIEWS, COUNT = 3, 12
 
 
 def _screen_gradients(seeds: Seeds) -> dict[str, Made]:
-    """Two thirds of the Gaussians are steep; 0 is never visible, 1 is exactly on the threshold of 1/4."""
+    """67 % of the Gaussians are steep; 0 is never visible, 1 is exactly on the threshold of 1/4."""
     d_mean = seeds.uniform("d_mean2d", -1.0, 1.0, VIEWS, 2, COUNT, unit="loss per px")
     steep = np.where(permutation(seeds.seed("steep"), COUNT) % 3 > 0, 2.0**-3, 2.0**-8)
     d_mean = changed(d_mean, ..., d_mean.array * steep, "times 2^-3, or 2^-8 where rank % 3 = 0 of the words of " +
@@ -34,7 +34,7 @@ def _screen_gradients(seeds: Seeds) -> dict[str, Made]:
 
 
 def _inputs(seeds: Seeds, moving: bool) -> dict[str, Made]:
-    """An image of 16 x 8 pixels; a Gaussian of log-scale 0 is larger than a hundredth of the extent."""
+    """An image of 16 x 8 pixels; a Gaussian of log-scale 0 is larger than 1 % of the extent."""
     large = np.where(permutation(seeds.seed("large"), COUNT) % 2 > 0, 0.0, -4.0)
     scale = seeds.uniform("log_scale", -0.5, 0.5, 3, COUNT)
     logit = seeds.uniform("opacity_logit", -1.0, 2.0, COUNT)
@@ -87,7 +87,7 @@ def _decisions() -> list[Spec]:
 
 
 def _on_the_thresholds() -> Spec:
-    """Opacity 1/2 at a prune threshold of 1/2, largest axis 1 at a limit of 1: neither is beyond."""
+    """Opacity 1/2 at a prune threshold of 1/2, largest axis 1 at a limit of 1: neither exceeds its threshold."""
     seeds, count = Seeds("density", "on_the_thresholds"), 6
     noise, turned = seeds.uniform("split_noise", -1.5, 1.5, 2, 3, count), pose()["rotation_matrix"]
     logit = seeds.uniform("opacity_logit", 0.5, 2.0, count)

@@ -1,8 +1,8 @@
 """Family `normalised_depth`: the depth loss (B8) of depths over their largest value.
 
-A rendered depth, a prior depth with holes and a tissue mask come in. The cases fix which pixels count (a finite prior
-above 0, under the mask), which pixels give the largest value, that this value has a gradient, that ties split it, and
-that fewer than ten priors give no loss.
+Inputs: a rendered depth, a prior depth with holes and a tissue mask. The cases test the set of valid pixels (tissue
+with a finite prior above 0), the pixels of the maximum, its gradient, the sharing of that gradient by ties, and the
+zero loss below ten priors.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Families `frequencies`, `dictionary` and `atoms`: equation (1), atoms of a time and their normalisation.
 
-Frequencies, a time and training stamps come in. The cases fix the order of sines and cosines, the factor 2 pi, the
+Inputs: frequencies, a time and training stamps. The cases test the order of sines and cosines, the factor 2 pi, the
 statistics (over distinct training stamps, of the centred atom) and the dead atom, which is 0 in value and in gradient.
 """
 

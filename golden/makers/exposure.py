@@ -1,7 +1,7 @@
 """Family `exposure`: equation (B13), gain and bias of each colour channel of one frame.
 
-Colours, logarithmic gains, biases and a gradient by the exposed colours come in. The gains lie on both sides of 1. One
-case has exposed colours below 0 and the other has them above 1, so that a clamp at either end shows.
+Inputs: colours, logarithmic gains, biases and the gradient with respect to the exposed colours. The gains are on both
+sides of 1. One case has exposed colours below 0 and the other above 1, which reveals a clamp at either end.
 """
 
 from makers.making import Seeds, Spec

@@ -1,8 +1,8 @@
 """Cases at the ends of the ranges, where ports that passed all others were wrong.
 
-A residual far in saturation, a rotation of angle 0, Gaussians too faint for a sum of 1, bases on either side of their
-cut, an epsilon that is not small, views of the calibration that fall between two frames, and a Gaussian that is visible
-in its box but hidden by others.
+A deeply saturated residual, a rotation of angle 0, Gaussians too faint for a sum of 1, bases on either side of their
+cut, an epsilon that is not small, views of the calibration between two frames, and a Gaussian that is visible in its
+box but hidden by others.
 """
 
 from typing import Any
@@ -24,9 +24,9 @@ OPERATIONS = ("appearance", "pose", "composite", "deformation", "density", "trai
 
 
 def _deep_saturation() -> Spec:
-    """Whole columns with |x| from 20 to 30; the gradients that come in are as large as the slopes are small.
+    """Whole columns with |x| from 20 to 30; the upstream gradients are as large as the slopes are small.
 
-    From 20 on tanh is 1 in both precisions, so that 1 - tanh^2 is 0 in every port.
+    From 20 on tanh is 1 in both precisions, so 1 - tanh^2 is 0 in every port.
     """
     seeds = Seeds("appearance", "deep_saturation")
     size = np.linspace(20.0, 30.0, 7)
@@ -80,7 +80,7 @@ def _cut(basis: str) -> Spec:
 
 
 def _hidden_statistics() -> Spec:
-    """Four Gaussians, visible in both views, without a gradient in one; opacity 0.01 lies between thresholds."""
+    """Four Gaussians, visible in both views, without a gradient in one; opacity 0.01 is between thresholds."""
     count, seeds = 4, Seeds("density", "hidden")
     d = np.zeros((2, 2, count))
     d[0] = [[0.046875, 2.0**-5, 2.0**-4, 2.0**-3], [0.0, 2.0**-5, 2.0**-4, 0.0]]
@@ -103,7 +103,7 @@ def _hidden_statistics() -> Spec:
 
 
 def _hidden_in_training() -> Spec:
-    """Gaussian 4 is small and behind three opaque ones, which end every pixel of its box."""
+    """Gaussian 4 is small and behind three opaque Gaussians, which finish every pixel of its box."""
     config = Config(
         model=ModelConfig(bases=BASES, harmonics_degree=0, appearance=False, spectral_motion=False, laplacian=False),
         loss=LossConfig(smoothness_weight=0.0, lambda_lap=0.0),
@@ -130,6 +130,6 @@ def _hidden_in_training() -> Spec:
 
 
 def cases() -> list[Spec]:
-    """One for each end of a range."""
+    """One case for each end of a range."""
     return [_deep_saturation(), *_angles(), _faint(), _cut("quartic"), _cut("gaussian"), _hidden_statistics(),
             _hidden_in_training()]  # fmt: skip

@@ -1,7 +1,7 @@
 """The generated files of `golden/` as bytes: cases, schemas, the list of mistakes, the manifest.
 
-A case or mistake that the manifest already lists keeps its place there, and a new one follows in the order of the
-families; a new version of the vectors differs from the last one in what was added or changed and in nothing else.
+Cases and mistakes already in the manifest keep their position, and new ones follow in the order of the families. A new
+version of the vectors therefore differs from the last one only by additions and changes.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from makers.wrong import WrongPort
 
 
 def machine_class() -> str:
-    """On machines of one class the reference gives the same bits."""
+    """The class of this machine; the reference is bitwise reproducible within a class."""
     import numba
 
     return f"{platform.machine()} {compiled_for()} numpy {np.__version__} numba {numba.__version__}"
@@ -29,7 +29,7 @@ def machine_class() -> str:
 def rendered_files(
     solved: list[Solved], wrong_ports: dict[str, WrongPort], version: str, published: Manifest | None
 ) -> dict[str, bytes]:
-    """Every generated file by its path within golden/, the manifest last, in the order of the published manifest."""
+    """Every generated file by its path in golden/, in the order of the published manifest, which is last."""
     solved, wrong_ports = _in_published_order(solved, wrong_ports, published)
     files: dict[str, bytes] = {}
     for one in solved:

@@ -24,15 +24,15 @@ GENERATED = ("cases", "schemas")
 
 @functools.cache
 def solve_all(mistakes: bool = True) -> list[Solved]:
-    """Every case with its answers, computed once a process; without its mistakes that takes a tenth of the time.
+    """Every case with its answers, computed once per process; without mistakes this takes 10 % of the time.
 
-    Raises: ValueError where a case does not show the mistakes it was made for.
+    Raises: ValueError if a case does not reveal its intended mistakes.
     """
     return solve_these(all_specs(), all_wrong_ports().values() if mistakes else None)
 
 
 def solve_these(specs: Iterable[Spec], wrong_ports: Iterable[WrongPort] | None) -> list[Solved]:
-    """These cases with their answers; None leaves the mistakes out. Raises ValueError as `solve_all`."""
+    """These cases with their answers; None omits the mistakes. Raises ValueError as `solve_all`."""
     specs, operations = list(specs), all_operations()
     if wrong_ports is None:
         return [solve(spec, operations[spec.operation], None) for spec in specs]
@@ -49,8 +49,8 @@ def solve_these(specs: Iterable[Spec], wrong_ports: Iterable[WrongPort] | None) 
 def check(folder: Path, *, bitwise: bool = True) -> tuple[list[str], str]:
     """Differences from the folder, one line each, and one line of summary.
 
-    On the machine class that wrote the folder every file must have its bits. Elsewhere, and with `bitwise` off,
-    expected values must agree within their float64 tolerance; settings, titles and flags must be the same.
+    On the machine class of the folder every file must be bitwise equal. Elsewhere, and with `bitwise` off, expected
+    values must agree within their float64 tolerance; settings, titles and flags must be the same.
     """
     try:
         published = read_struct(folder / "manifest.json", Manifest)
@@ -75,7 +75,7 @@ def check(folder: Path, *, bitwise: bool = True) -> tuple[list[str], str]:
 
 
 def moved(folder: Path, one: Solved) -> list[str]:
-    """Which expected values of a case differ from the folder's, and by how much."""
+    """The differences of a case's expected values from the folder's."""
     root = folder / "cases" / one.case.family / one.case.case
     lines = []
     for name, file, value in one.files():

@@ -1,8 +1,8 @@
-"""Settings that a port may not hard-code: the values that each takes in the cases, and the cases that refuse each one.
+"""Settings that a port must not hard-code: their values in the cases, and a case that rejects each fixed value.
 
-In: the golden cases. Out: for every setting of the configuration and of the rasteriser, the values that some case
-gives, and for each of these values, and the published one, a case that refuses a port that always uses it. Such a port
-is the reference, asked with the one setting replaced. A value that no case refuses is a gap.
+In: the golden cases. Out: for every setting of the configuration and of the rasteriser, its values in the cases, and
+for each of these values and the published one, a case that rejects a port with this fixed value. Such a port is the
+reference with the one setting replaced. A value that no case rejects is a gap.
 """
 
 from collections.abc import Iterator, Mapping
@@ -43,31 +43,31 @@ FREE = {
     "training.precision": "the precision is that of the request",
     "training.checkpoint_every": "changes no result",
 }
-"""Settings that no case has to move, each with the reason. `preset` and the section `sequence` belong to the reader."""
+"""Settings that no case must vary, with the reason. `preset` and the section `sequence` belong to the reader."""
 ALONE = {
     "appearance": "model.beta", "matern": "model.correlation_length", "deformation": "model.basis",
     "laplacian": "loss.upsampling", "calibration": "loss.gradient_ratio",
     "smoothness": "loss.total_variation_factor",
 }  # fmt: skip
-"""Operation -> the setting of the configuration that its one setting is."""
+"""Operation with one setting -> the corresponding setting of the configuration."""
 OTHERS = {"rate": "", "beta1": "optimiser.beta1", "beta2": "optimiser.beta2", "epsilon": "optimiser.epsilon",
           "count": "model.frequencies", "low": "model.frequency_min", "high": "model.frequency_max"}  # fmt: skip
 
 
 class Row(NamedTuple):
-    """A setting, and for each value a case that refuses a port which always uses it; "" where none does."""
+    """A setting, and for each value a case that rejects a port with this fixed value; "" if there is none."""
 
     setting: str
     refused_by: dict[str, str]
 
     @property
     def gaps(self) -> list[str]:
-        """Values that a port may hard-code, unnoticed."""
+        """Values that a port could hard-code undetected."""
         return [value for value, case in self.refused_by.items() if not case]
 
 
 def wanted_settings() -> dict[str, Any]:
-    """Every setting that a case has to move, with its published value."""
+    """Every setting that a case must vary, with its published value."""
     config = msgspec.to_builtins(Config())
     found = {f"{section}.{key}": value for section in SECTIONS for key, value in config[section].items()}
     raster = RasterSettings()._asdict()
@@ -78,7 +78,7 @@ def wanted_settings() -> dict[str, Any]:
 
 
 def places(case: Case, setting: str) -> Iterator[Place]:
-    """Where the settings of a case hold a setting."""
+    """Locations of a setting in the settings of a case."""
     path = tuple(setting.split("."))
     for start in ((), ("config",)):
         if _at(case.settings, (*start, *path)) is not None:
@@ -91,7 +91,7 @@ def places(case: Case, setting: str) -> Iterator[Place]:
 
 
 def _at(settings: Mapping[str, Any], place: Place) -> Any:
-    """The value of a setting, None where there is none; that of the preset where the setting says so."""
+    """The value of a setting, resolved through its preset; None if missing."""
     value: Any = settings
     for key in place:
         if not isinstance(value, Mapping) or key not in value:
@@ -101,7 +101,7 @@ def _at(settings: Mapping[str, Any], place: Place) -> Any:
 
 
 def refuses(golden: Golden, case: Case, settings: dict[str, Any], precision: str) -> bool:
-    """Whether a case refuses the reference, asked with other settings."""
+    """Whether a case rejects the reference with other settings."""
     with np.errstate(all="ignore"):
         try:
             found = reference(all_operations()[case.operation], golden.inputs(case), settings, precision, "definition")
@@ -118,7 +118,7 @@ def refuses(golden: Golden, case: Case, settings: dict[str, Any], precision: str
 
 
 def row_of(golden: Golden, setting: str, published: Any, precision: str = "float64") -> Row:
-    """Every value of a setting in the cases, and the published one, with the first case that refuses it."""
+    """Every value of a setting in the cases, and the published one, with the first case that rejects it."""
     held = [(case, place) for case in golden.cases for place in places(case, setting)]
     values = {msgspec.json.encode(v).decode(): v for v in (published, *(_at(c.settings, p) for c, p in held))}
     refused = {}
@@ -130,6 +130,6 @@ def row_of(golden: Golden, setting: str, published: Any, precision: str = "float
 
 
 def table(golden: Golden, precision: str = "float64") -> list[Row]:
-    """A row for every setting that a case has to move."""
+    """A row for every setting that a case must vary."""
     order = sorted(golden.cases, key=lambda case: case.level)
     return [row_of(golden._replace(cases=order), name, value, precision) for name, value in wanted_settings().items()]

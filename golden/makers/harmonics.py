@@ -1,8 +1,8 @@
 """Family `harmonics`: the colour of a Gaussian (B4) from harmonics of degree 0 to 3 and its residual.
 
-Coefficients, residual, position, optical centre and a gradient by the colour come in. The cases fix the signs and the
-order of the coefficients, the clamp at 0 (none at 1), the gradient through the view direction, and a Gaussian at the
-optical centre, which has no direction.
+Inputs: coefficients, residual, position, optical centre and the gradient with respect to the colour. The cases test the
+signs and the order of the coefficients, the clamp at 0 (none at 1), the gradient through the view direction, and a
+Gaussian at the optical centre, which has no direction.
 """
 
 from makers.making import Seeds, Spec, changed

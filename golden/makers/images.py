@@ -1,4 +1,4 @@
-"""Masks and image pairs, and the cases that every masked mean over an image has."""
+"""Masks and image pairs, and the cases common to all masked means over an image."""
 
 import numpy as np
 
@@ -48,19 +48,19 @@ def two_images(seeds: Seeds) -> dict[str, Made]:
 
 
 def equal_images(seeds: Seeds) -> dict[str, Made]:
-    """A rendered image that is the observed one."""
+    """A rendered image equal to the observed one."""
     same = seeds.uniform("observed", 0.0, 1.0, 3, HEIGHT, WIDTH, unit="display")
     return {"rendered": same, "observed": same}
 
 
 def not_finite_images(seeds: Seeds) -> dict[str, Made]:
-    """Two images with numbers that are not finite where `tool_mask` is False."""
+    """Two images with non-finite numbers where `tool_mask` is False."""
     images = {n: seeds.uniform(n, 0.0, 1.0, 3, HEIGHT, WIDTH, unit="display") for n in ("rendered", "observed")}
     return {name: spoiled(made, tool_mask()) for name, made in images.items()}
 
 
 def spoiled(made: Made, mask: Made) -> Made:
-    """NaN or infinity at excluded pixels, by turns."""
+    """NaN and infinity alternating at excluded pixels."""
     holes = np.where(np.arange(mask.array.size).reshape(mask.array.shape) % 2 > 0, np.inf, np.nan)
     values = np.where(mask.array, made.array, holes)
     return changed(made, ..., values, "where the mask is False: NaN at even pixels, infinity at odd ones, "

@@ -1,7 +1,7 @@
 """Family `initialisation`: the first Gaussians, from depth maps of the training frames (B12).
 
-Images, masks, prior depths and camera poses come in; every candidate is taken, so that no random number is drawn. The
-cases are three training frames of six, a clip long enough that frames are skipped, and a single point.
+Inputs: images, masks, prior depths and camera poses. Every candidate is selected, so no random number is drawn. The
+cases are three training frames of six, a clip long enough for skipped frames, and a single point.
 """
 
 import msgspec
@@ -17,7 +17,7 @@ LENS = {"fx": 7.0, "fy": 9.0, "cx": 2.75, "cy": 2.25, "width": 6, "height": 5}
 
 
 def frames(seeds: Seeds, count: int, train: list[int]) -> dict[str, Made]:
-    """Each frame differs from a common depth map by a step of its own, clearly more or less than the threshold of 5."""
+    """Each frame differs from a common depth map by its own step, clearly above or below the threshold of 5."""
     height, width = int(LENS["height"]), int(LENS["width"])
     shape = (count, height, width)
     grey = seeds.uniform("images", 0.0, 256.0, count, 3, height, width).array

@@ -1,7 +1,7 @@
 """Family `laplacian`: equation (5), the pyramid of the observed image, its valid pixels and the Laplacian loss.
 
-A rendered and an observed image, a tissue mask and an up-sampling rule come in. The cases are odd, even and tiny sizes,
-a level without valid pixels, an image without tissue, equal images, and numbers under the mask that are not finite.
+Inputs: a rendered and an observed image, a tissue mask and an up-sampling rule. The cases are odd, even and tiny sizes,
+a level without valid pixels, an image without tissue, equal images, and non-finite numbers under the mask.
 """
 
 import numpy as np
@@ -54,5 +54,5 @@ def _not_finite() -> Spec:
 
 
 def cases() -> list[Spec]:
-    """Sizes, empty levels, equal images, numbers that are not finite."""
+    """Sizes, empty levels, equal images, non-finite numbers."""
     return [*_generic(), _equal(), _not_finite()]

@@ -1,8 +1,8 @@
 """A golden case before its answers are computed: inputs with their recipes, settings, and the mistakes it reveals.
 
 Every array has its own seed, the text "family/case/array" (a draw number may follow). The top 24 bits of a word of
-`judge.words`, over 2^24, are a number in [0, 1). Every real number that leaves this module is a float32 number, so that
-ports of either precision start from the same.
+`judge.words`, over 2^24, are a number in [0, 1). All real outputs are float32 numbers, so ports of either precision
+have equal inputs.
 """
 
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from endotsr.golden.judge.words import fnv1a, words
 
 
 class Made(NamedTuple):
-    """An input array, how it was made, and its unit."""
+    """An input array, its recipe, and its unit."""
 
     array: NDArray
     recipe: str
@@ -22,7 +22,7 @@ class Made(NamedTuple):
 
 
 def single(values: NDArray | float | list) -> NDArray[np.float64]:
-    """The values rounded to float32, held in float64."""
+    """The values rounded to float32, as float64."""
     return np.asarray(values, np.float64).astype(np.float32).astype(np.float64)
 
 
@@ -38,7 +38,7 @@ def permutation(seed: str, count: int) -> NDArray[np.intp]:
 
 
 def given(values: NDArray | float | list, recipe: str, unit: str = "1") -> Made:
-    """Values from a closed formula or written down; reals are rounded to float32, other kinds kept."""
+    """Values from a closed formula or a list; reals are rounded to float32, other kinds kept."""
     array = np.asarray(values)
     return Made(single(array) if array.dtype.kind == "f" else array, recipe, unit)
 
@@ -49,7 +49,7 @@ def scalar(value: float, unit: str = "1") -> Made:
 
 
 def changed(made: Made, index: object, values: NDArray | float | list, recipe: str) -> Made:
-    """A copy with some entries replaced; the recipe says which."""
+    """A copy with some entries replaced, as described by the recipe."""
     array = made.array.copy()
     array[index] = single(values) if array.dtype.kind == "f" else values  # type: ignore[index]
     return Made(array, f"{made.recipe}; then {recipe}", made.unit)

@@ -1,7 +1,7 @@
-"""Family `masked_l1`: the masked L1 (B6), and the mistakes that every mean over tissue pixels can make.
+"""Family `masked_l1`: the masked L1 (B6), and the mistakes common to all means over tissue pixels.
 
-A rendered and an observed image and a tissue mask come in. The cases are an instrument, one pixel of tissue, no tissue,
-equal images, and numbers under the mask that are not finite: excluded values must never be read.
+Inputs: a rendered and an observed image and a tissue mask. The cases are an instrument, one pixel of tissue, no tissue,
+equal images, and non-finite numbers under the mask: excluded values must have no effect.
 """
 
 from makers.images import masked_mean
@@ -11,7 +11,7 @@ OPERATIONS = ("masked_l1",)
 
 
 def cases() -> list[Spec]:
-    """Masks, equal images, numbers that are not finite."""
+    """Masks, equal images, non-finite numbers."""
     return masked_mean(
         "masked_l1",
         "d_loss",

@@ -1,7 +1,7 @@
 """Family `masked_ssim`: the masked SSIM (B7), a mean of the similarity map over tissue pixels.
 
-A rendered and an observed image and a tissue mask come in. The cases repeat those of `masked_l1`; the mistakes concern
-the window, its border, and whether the images are set to 0 outside tissue before they are filtered.
+Inputs: a rendered and an observed image and a tissue mask. The cases are those of `masked_l1`; the mistakes concern the
+window, its border, and images that are not set to 0 outside tissue before filtering.
 """
 
 from makers.images import masked_mean

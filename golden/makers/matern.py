@@ -1,8 +1,8 @@
 """Family `matern`: equation (4), the Matern weights rho and the penalty on the motion coefficients.
 
-Frequencies, coefficients and a correlation length come in. The lengths are the published one, 0 (all weights alike) and
-a long one (weights like omega^6); they fix the mean 1 of the weights, the factor 2 pi, the power, and the order of the
-weights along the atoms.
+Inputs: frequencies, coefficients and a correlation length. The lengths are the published one, 0 (equal weights) and a
+long one (weights proportional to omega^6). They test the mean 1 of the weights, the factor 2 pi, the power, and the
+order of the weights along the atoms.
 """
 
 from makers.clock import omegas

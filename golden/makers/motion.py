@@ -1,7 +1,7 @@
 """Family `motion`: equation (3), the translation C phi.
 
-Coefficients C, raw atoms and a gradient by the translation come in. One case: the stage is linear, and its only choice
-is that sines and cosines both take part.
+Inputs: coefficients C, raw atoms and the gradient with respect to the translation. One case suffices: the stage is
+linear, and its only possible mistake is to omit sines or cosines.
 """
 
 from makers.making import Seeds, Spec

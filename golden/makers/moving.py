@@ -1,4 +1,4 @@
-"""A moving scene of every component, for the families of the whole method."""
+"""A moving scene with every component, for the families of the whole method."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ def model_settings(**changes: Any) -> dict[str, Any]:
 def moving_inputs(
     seeds: Seeds, degree: int, static: bool, count: int = COUNT, frequencies: int = FREQUENCIES
 ) -> dict[str, Made]:
-    """Raw parameters of every component, off zero."""
+    """Raw parameters of every component, all nonzero."""
     shape, atoms = (10, BASES, count), 2 * frequencies
     centre = seeds.uniform("fdm_centre", 0.1, 0.7, *shape)
     return scene_inputs(seeds, count, degree, pose(static)) | {

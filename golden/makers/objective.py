@@ -1,8 +1,8 @@
 """Families `objective` and `determinism`: the loss of one view (6) with every term and every gradient.
 
-A moving scene, an observed image with mask, prior depth and edges, and the weights of the terms come in. The cases are
+Inputs: a moving scene, an observed image with mask, prior depth and edges, and the weights of the terms. The cases are
 the presets, the other up-sampling rule, a pyramid level without valid pixels, and a rigid scene without components.
-`determinism` requests the same objective twice: the bits must be equal.
+`determinism` requests the same objective twice: the results must be bitwise equal.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
-"""Cases of several families in which the settings have other values than the published ones.
+"""Cases of several families with settings that differ from the published ones.
 
-A port that reads a setting passes them; a port that has the published value in its code does not. `hard_coded` shows
-that every setting takes two values in the cases, and that no fixed value passes.
+A port that reads a setting passes them; a port with the published value in its code does not. `hard_coded` verifies
+that every setting has two values in the cases, and that no fixed value passes.
 """
 
 from typing import Any
@@ -71,7 +71,7 @@ def _stages() -> list[Spec]:
 
 
 def _tiny(case: str, raster: RasterSettings) -> Spec:
-    """Gaussians of a tenth of a pixel, without a low-pass: their determinants show what is added to them."""
+    """Gaussians of 0.1 px without a low-pass: terms added to their determinants are visible."""
     seeds = Seeds("composite", case)
     inputs = screen_inputs(seeds, 4, 0.03, 0.05)
     middles = given([[2.625, 6.5, 9.375, 13.5], [3.5, 9.625, 5.375, 10.5]], "beside pixel centres", "px")
@@ -116,7 +116,7 @@ def _initialisation() -> Spec:
 
 
 def _moving(family: str, case: str, title: str, loss: dict[str, Any], without: tuple[str, ...], **model: Any) -> Spec:
-    """The moving scene of `scene` or `objective`; arrays of components that are off are left out."""
+    """The moving scene of `scene` or `objective`, without the arrays of disabled components."""
     seeds = Seeds(family, case)
     settings = msgspec.to_builtins(msgspec.structs.replace(ModelConfig(), **(MODEL | model)))
     inputs = moving_inputs(seeds, 1, True, frequencies=MODEL["frequencies"])
@@ -175,7 +175,7 @@ def _schedule() -> list[Spec]:
 
 
 def _config() -> Config:
-    """A trajectory in which no setting is the published one."""
+    """A trajectory in which every setting differs from the published one."""
     return Config(
         model=ModelConfig(**{**MODEL, "harmonics_degree": 1}),
         raster=RasterConfig(near=0.5, alpha_cutoff=0.02, transmittance_stop=0.01, alpha_max=0.9),

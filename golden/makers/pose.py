@@ -1,8 +1,8 @@
 """Family `pose`: equation (B16), a rotation and a translation on top of a camera pose.
 
-A matrix, a translation, the rotation vector, the offset, and the gradients by the corrected pose come in. The matrix is
-no rotation, since its nine entries are independent. One case turns by more than a right angle, the other one by an
-angle at which the closed forms lose digits.
+Inputs: a matrix, a translation, the rotation vector, the offset, and the gradients with respect to the corrected pose.
+The matrix is not a rotation: its nine entries are independent. One case rotates by more than a right angle, the other
+by an angle at which the closed forms lose digits.
 """
 
 from makers.making import Made, Seeds, Spec

@@ -1,7 +1,8 @@
 """Family `projection`: screen mean, screen covariance and depth of a Gaussian (B3).
 
-Position, rotation and semi-axes, a pose and gradients by the projected values come in, under each preset. Centres lie
-off axis on all sides, behind the camera and just inside the near plane; one case has needles of hundreds of pixels.
+Inputs, for each preset: position, rotation and semi-axes, a pose and gradients with respect to the projected values.
+Centres are off axis on all sides, behind the camera and just inside the near plane; one case has needles of hundreds of
+pixels.
 """
 
 import numpy as np

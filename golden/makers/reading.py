@@ -1,7 +1,7 @@
 """Family `reading`: how arrays, masks and pixels are addressed, and the generator of words.
 
-A port echoes parts of its inputs. The cases are those of level 0: a port that misreads the axes, the mask or the
-pixel centres is refused here, before its equations are judged.
+A port echoes parts of its inputs. These are the cases of level 0: they reject a port that misreads the axes, the mask
+or the pixel centres before its equations are judged.
 """
 
 import numpy as np

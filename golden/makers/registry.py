@@ -1,10 +1,10 @@
-"""The families of golden cases with their contents, and what a port answers to every operation.
+"""The families of golden cases with their contents, and the outputs of every operation.
 
-A family module has two names: OPERATIONS (the operations of its cases) and cases(). Its mistakes stand in a TOML file
-beside it, see `makers.wrong.wrong_ports`. A mistake belongs to the family of the rule that it breaks; if it also spoils
-cases of later families, it names their operations.
-`JUDGED` states of every output, further output and gradient of an operation, in their order, at which level a port owes
-it, in which unit and scale it is compared, and which independent program gives its value.
+A family module defines OPERATIONS (the operations of its cases) and cases(). Its mistakes are in a TOML file of the
+same name, see `makers.wrong.wrong_ports`. A mistake belongs to the family of the rule that it breaks; if it also
+affects cases of later families, it lists their operations. `JUDGED` lists, in order, every output, further output and
+gradient of an operation with its level, its unit, the scale of its comparison, and the independent program that
+computes its value.
 """
 
 import importlib
@@ -33,7 +33,7 @@ def families() -> list[ModuleType]:
 
 
 def all_specs() -> list[Spec]:
-    """Every case, in the order of the families. Raises ValueError if two have one name."""
+    """Every case, in the order of the families. Raises ValueError for duplicate names."""
     found = [spec for family in families() for spec in family.cases()]
     names = [spec.name for spec in found]
     if len(set(names)) != len(names):
@@ -42,7 +42,7 @@ def all_specs() -> list[Spec]:
 
 
 def all_wrong_ports() -> dict[str, WrongPort]:
-    """Every wrong port by its flag. Raises ValueError if two have one flag."""
+    """Every wrong port by its flag. Raises ValueError for duplicate flags."""
     found: dict[str, WrongPort] = {}
     for wrong_port in (port for family in FAMILIES for port in wrong_ports(family)):
         if wrong_port.flag in found:

@@ -1,8 +1,8 @@
 """Family `render`: one view of deformed Gaussians, (B2) to (B5) together, with every gradient.
 
-Raw parameters, a pose, a background and gradients by the three images come in. The cases are the presets and degrees,
-then scenes that reveal mistakes of ports: the near plane, needles, a zero quaternion, equal depths, centres beside the
-image, no Gaussian at all, and which Gaussians count as visible.
+Inputs: raw parameters, a pose, a background and gradients with respect to the three images. The cases are the presets
+and degrees, then scenes that reveal mistakes of ports: the near plane, needles, a zero quaternion, equal depths,
+centres outside the image, no Gaussian, and the visibility of Gaussians.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ def _presets() -> list[Spec]:
 
 
 def _hard(case: str, title: str, flags: tuple[str, ...], change: Callable[[dict[str, Made]], None], **more) -> Spec:
-    """Eight Gaussians of degree 1 before a static camera, with a change."""
+    """Eight Gaussians of degree 1 in front of a static camera, with a change."""
     inputs = _view(case, 8, 1, True)
     change(inputs)
     return Spec("render", case, "render", title, flags, lens_settings(PAPER, degree=1), inputs,
@@ -82,7 +82,7 @@ def _empty(inputs: dict[str, Made]) -> None:
 
 
 def _long_needles() -> Spec:
-    """A needle of three thousand pixels across the image, and two whose centres lie a thousand pixels outside."""
+    """A needle of 3000 pixels across the image, and two needles with centres 1000 pixels outside."""
     angle, along = np.array([0.7, 2.2, -0.4]), np.array([0.0, 260.0, -300.0])
     axis = np.stack([np.cos(angle), np.sin(angle), 0 * angle])
     middle = np.array([[0.1, -0.3, 0.2], [-0.2, 0.1, 0.4], [4.0, 4.5, 5.0]])
@@ -102,7 +102,7 @@ def _long_needles() -> Spec:
 
 
 def _out_of_view() -> Spec:
-    """In view; beside the image, near and far; behind; too faint; between the pixel centres."""
+    """In view; outside the image, near and far; behind; too faint; between the pixel centres."""
     u = np.array([8.25, -2.0, -30.0, 10.0, 23.5, 9.0, 7.0, 12.0])
     v = np.array([9.5, 6.0, 8.0, 40.0, 4.0, 9.0, 8.0, 7.0])
     z = np.array([4.0, 5.0, 3.0, 6.0, 3.5, -2.0, 4.5, 5.5])

@@ -1,7 +1,7 @@
 """Family `scene`: the raw parameters at one time, with the deformation and both residuals applied.
 
-Raw parameters, coefficients of every component and the training stamps come in. One case a time basis. They fix which
-atoms are normalised, the order of the ten offsets, and that offsets act before activation.
+Inputs: raw parameters, coefficients of every component and the training stamps. There is one case per time basis. They
+test the normalisation of the atoms, the order of the ten offsets, and offsets before activation.
 """
 
 from makers.making import Seeds, Spec

@@ -1,6 +1,6 @@
 """Family `schedule`: learning rates, weights and switches by iteration (6), (B10).
 
-A configuration and a list of iterations come in. The cases are the milestones of preset `paper`, with the iterations
+Inputs: a configuration and a list of iterations. The cases are the milestones of preset `paper`, with the iterations
 before and after them, and a short run with the opposite choices.
 """
 

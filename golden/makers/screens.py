@@ -16,7 +16,7 @@ def raster_settings(raster: RasterSettings) -> dict:
 
 
 def screen_inputs(seeds: Seeds, count: int, low: float, high: float) -> dict[str, Made]:
-    """Overlapping Gaussians whose covariances have diagonals from `low` to `high` px^2, and gradients by the images."""
+    """Overlapping Gaussians, with covariance diagonals of `low` to `high` px^2, and gradients of the images."""
     a, c = (seeds.uniform(name, low, high, count).array for name in ("a", "c"))
     skew = seeds.uniform("skew", -0.6, 0.6, count).array
     across = seeds.uniform("mean2d", 0.0, 1.0, 2, count)
@@ -39,6 +39,6 @@ def screen_inputs(seeds: Seeds, count: int, low: float, high: float) -> dict[str
 
 
 def flat_covariance(count: int) -> Made:
-    """Gaussians whose alpha is the same at every pixel of the image."""
+    """Gaussians with constant alpha over the image."""
     wide = np.array([[4e6] * count, [0.0] * count, [4e6] * count])
     return given(wide, "a = c = 4e6, b = 0: flat over the image", "px^2")

@@ -1,6 +1,6 @@
-"""The settings of a case as the vectors hold them: with the keys that the configuration had when they were made.
+"""The settings of a case as stored: with the keys of the configuration at the time of their generation.
 
-A port reads these keys, so a key that leaves the configuration stays in the cases, at the value that remains.
+Ports read these keys, so a key removed from the configuration stays in the cases, at its remaining value.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ KEPT: dict[str, dict[str, dict[str, Any]]] = {
         "bridge_fraction": {"bridge_target": "neighbour", "bridge_flow": "dis"},
     },
 }
-"""Section -> key -> what follows it in a case."""
+"""Section -> key -> the keys that follow it in a case."""
 
 
 def written(config: Config) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Family `training`: calibration and twenty iterations, everything together.
 
-First Gaussians, a short clip, the order of frames and the noise of splits come in. One case covers every event of a
+Inputs: the first Gaussians, a short clip, the order of frames and the noise of splits. One case covers every event of a
 training: two densifications, the activation of both residuals, the ramp of the Laplacian weight, two degrees.
 """
 
@@ -45,7 +45,7 @@ def _settings() -> Config:
 
 
 def _first_gaussians(seeds: Seeds, degree: int) -> dict[str, Made]:
-    """One faint Gaussian, which is pruned, and five small ones, which are cloned."""
+    """One faint Gaussian, which is pruned, and five small Gaussians, which are cloned."""
     inputs = scene_inputs(seeds, COUNT, degree, pose(static=True))
     for name in ("rotation_matrix", "translation"):
         del inputs[name]
@@ -80,7 +80,7 @@ def clip(seeds: Seeds) -> dict[str, Made]:
 
 
 def trajectory_inputs(seeds: Seeds, iterations: int, degree: int = 2) -> dict[str, Made]:
-    """What a trajectory reads."""
+    """The inputs of a trajectory."""
     order = seeds.uniform("frame_order", 0.0, 10.0, iterations).array
     return _first_gaussians(seeds, degree) | clip(seeds) | {
         "frame_order": given(np.floor(order).astype(np.int64), f"floor of uniform(0.0, 10.0) seed "
@@ -90,9 +90,9 @@ def trajectory_inputs(seeds: Seeds, iterations: int, degree: int = 2) -> dict[st
 
 
 def _out_of_view() -> Spec:
-    """Every second frame is seen from one side or the other, where some of the Gaussians are out of view.
+    """Every second frame is seen from one side or the other, with some Gaussians out of view.
 
-    Without residuals: where a Gaussian has no gradient but rounding, Adam moves a coefficient by a whole rate.
+    Without residuals: if the gradient of a Gaussian is rounding noise, Adam moves a coefficient by the full rate.
     """
     seeds, config = Seeds("training", "out_of_view"), _settings()
     inputs = trajectory_inputs(seeds, SHORT)
@@ -112,7 +112,7 @@ def _out_of_view() -> Spec:
 
 
 def cases() -> list[Spec]:
-    """The trajectory, and a shorter one whose Gaussians leave the view."""
+    """The trajectory, and a shorter one in which Gaussians leave the view."""
     settings = {"camera": LENS, "config": written(_settings())}
     flags = ("skipped_step_when_densifying", "residuals_activated_late", "rates_not_decaying",
              "laplacian_weight_not_ramped", "penalty_dropped_in_training", "calibration_of_half_ratio",

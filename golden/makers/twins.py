@@ -1,8 +1,8 @@
 """The comparison of every compiled function with its definition in plain NumPy (`endotsr.definition`), in float64.
 
 In: a stage, its twin and requests (arrays and settings by name, cotangents included). Out: for every output and
-gradient the largest difference in units of its scale, which for most arrays is their largest magnitude. The bounds are
-stated here; the test and the table of the book read them.
+gradient the largest difference in units of its scale, which for most arrays is their largest magnitude. The test and
+the table of the book use the bounds of this module.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -36,11 +36,11 @@ APART = {  # cases with a row of their own
     "golden render/long_needle": "render of a long needle",
     "golden composite/opaque_exact": "composite behind opaque",
 }
-ANY_VALUE = 1.0  # a float64 tolerance from here on, in units of the scale, asks for nothing: the output is rounding
+ANY_VALUE = 1.0  # a float64 tolerance of at least one scale allows any value: the output is rounding noise
 
 
 class TwinRequest(NamedTuple):
-    """Arrays and settings by name, of a made-up input or of a golden case, and what is asked; empty = everything."""
+    """Arrays and settings of a generated input or a golden case, and the requested outputs; empty = all."""
 
     label: str
     inputs: Inputs
@@ -72,7 +72,7 @@ def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[TwinRequest]
 
 
 def scaled(got: NDArray, wanted: NDArray, scale: str) -> float:
-    """The largest difference in units of the scale, as the judge compares; infinite where "exact" tells two apart."""
+    """The largest difference in units of the scale, by the judge's rule; infinite if "exact" arrays differ."""
     got, wanted = np.asarray(got), np.asarray(wanted)
     if np.array_equal(got, wanted):
         return 0.0
@@ -90,7 +90,7 @@ def golden_requests(golden: Golden) -> Iterator[tuple[str, TwinRequest]]:
 def distances(
     stage: Stage, twin: Stage, requests: Iterable[TwinRequest], judged: Mapping[str, Judged]
 ) -> list[Distance]:
-    """The worst difference of every output that the stage answers, over all requests; those of `APART` by themselves.
+    """The worst difference of every output of the stage over all requests, with separate rows for `APART`.
 
     judged   the outputs of the stage, as in `makers.registry`
     """
@@ -112,7 +112,7 @@ def distances(
 
 
 def all_distances(stored: Iterable[tuple[str, TwinRequest]] = ()) -> list[Distance]:
-    """Every stage on its made-up inputs and on further requests, given as (stage name, request)."""
+    """Every stage on its generated inputs and on further requests, given as (stage name, request)."""
     more: dict[str, list[TwinRequest]] = {}
     for name, request in stored:
         more.setdefault(name, []).append(request)

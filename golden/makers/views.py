@@ -37,7 +37,7 @@ def seen_at(points: np.ndarray, cast: dict[str, Made]) -> Made:
 
 
 def shape_inputs(seeds: Seeds, count: int) -> dict[str, Made]:
-    """Rotations, semi-axes and gradients by what `projection` gives."""
+    """Rotations, semi-axes and gradients with respect to the outputs of `projection`."""
     quaternion = seeds.uniform("quaternion", -1.0, 1.0, 4, count).array
     rotation = covariance_forward(quaternion, np.zeros((3, count)))[0].rotation
     return {
@@ -50,7 +50,7 @@ def shape_inputs(seeds: Seeds, count: int) -> dict[str, Made]:
 
 
 def spread_points(seeds: Seeds, count: int, reach: float = 0.3) -> np.ndarray:
-    """Camera-space points at well separated depths whose order is not the index order."""
+    """Camera-space points at well separated depths, not in index order."""
     z = single(3.0 + 0.35 * permutation(seeds.seed("order"), count))
     u = seeds.uniform("u", -reach, reach, count).array
     v = seeds.uniform("v", -reach, reach, count).array
@@ -63,7 +63,7 @@ def lens_settings(raster: RasterSettings, **more: Any) -> dict[str, Any]:
 
 
 def preset_of(raster: RasterSettings) -> str:
-    """The name of the preset that these settings start from: the one that shares the most of them."""
+    """The name of the preset that shares the most of these settings."""
     same = {name: sum(a == b for a, b in zip(raster, preset, strict=True)) for name, preset in PRESETS.items()}
     return max(same, key=lambda name: (PRESETS[name].support == raster.support, same[name]))
 
@@ -89,7 +89,7 @@ def scene_inputs(seeds: Seeds, count: int, degree: int, cast: dict[str, Made], s
 
 
 def cotangents(seeds: Seeds) -> dict[str, Made]:
-    """Given derivatives by the images, and a background."""
+    """Upstream gradients with respect to the images, and a background."""
     height, width = LENS["height"], LENS["width"]
     return {
         "background": seeds.uniform("background", 0.1, 0.9, 3, unit="display"),

@@ -1,8 +1,8 @@
 """Wrong ports: each is a copy of the reference with one plausible mistake in its source, forward and reverse.
 
-In: the cases of golden as inputs and settings. Out: what a port that makes the mistake answers, for the operations that
-are examined. These answers give the size and the fingerprints of the mistake. The judge must refuse every wrong port
-and name its mistake.
+In: the golden cases as inputs and settings. Out: the answers of a port with the mistake, for the examined operations.
+These answers give the size and the fingerprints of the mistake. The judge must reject every wrong port and name its
+mistake.
 """
 
 import tomllib
@@ -20,7 +20,7 @@ from makers.copies import Edit, changed_copy, without_compiler
 
 
 class WrongPort(NamedTuple):
-    """A port that makes one mistake."""
+    """A port with one mistake."""
 
     flag: str  # the name of the mistake
     title: str
@@ -31,11 +31,11 @@ class WrongPort(NamedTuple):
 
 
 SLOW = ("render", "objective", "training")  # operations that take seconds without the compiler
-ALWAYS = "render/paper"  # the one case of them that every mistake in a kernel is examined on
+ALWAYS = "render/paper"  # their only case on which every mistake in a kernel is examined
 
 
 class Question(NamedTuple):
-    """A case, as a wrong port is asked."""
+    """A case as a request to a wrong port."""
 
     name: str
     operation: str
@@ -45,11 +45,11 @@ class Question(NamedTuple):
 
 
 def wrong_ports(family: str) -> Iterator[WrongPort]:
-    """The mistakes of a family, from the file `<family>.toml` beside this one; a family may have none.
+    """The mistakes of a family, from `<family>.toml` in this folder, if any.
 
-    An entry has the keys `title`, `wrong` and `changes`, and may have `operations` and `rounding`. A change is
-    [module, old text, new text, number of places]. A change without a module is one of the module that the head of the
-    file names, and one without a number is made in one place. `operations` in the head stands for entries without it.
+    An entry has the keys `title`, `wrong` and `changes`, and may have `operations` and `rounding`. A change is [module,
+    old text, new text, number of places]. The module defaults to that of the head of the file, the number to 1.
+    `operations` in the head is the default of the entries.
     """
     file = Path(__file__).with_name(f"{family}.toml")
     table = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
@@ -66,14 +66,14 @@ def _edit(change: Sequence[Any], module: str) -> Edit:
 
 
 class Wrong(NamedTuple):
-    """What a wrong port answers to a case; `single` in float32, for mistakes that lose digits only."""
+    """The answer of a wrong port to a case; `single` in float32, for mistakes that only lose digits."""
 
     double: Outputs
     single: Outputs | None
 
 
 def answers(wrong_port: WrongPort, questions: Iterable[Question]) -> dict[str, Wrong]:
-    """What the wrong port answers, by case, to the questions on which it is examined."""
+    """The answers of the wrong port, by case, to the questions on which it is examined."""
     found, examined = {}, [question for question in questions if is_examined(wrong_port, question)]
     with changed_copy(wrong_port.edits) as operation, np.errstate(all="ignore"):
         for question in examined:
@@ -87,7 +87,7 @@ def answers(wrong_port: WrongPort, questions: Iterable[Question]) -> dict[str, W
 
 
 def is_examined(wrong_port: WrongPort, question: Question) -> bool:
-    """Whether a case is of an operation of the mistake; of the slow ones only some, if a kernel is changed."""
+    """Whether a mistake is examined on a case; changed kernels only on some of the slow operations."""
     if question.operation not in wrong_port.operations:
         return False
     slow = question.operation in SLOW and without_compiler(wrong_port.edits)
@@ -97,7 +97,7 @@ def is_examined(wrong_port: WrongPort, question: Question) -> bool:
 def answer_wrongly(golden: Golden, outputs: Path, wrong_port: WrongPort, *, spoiled_only: bool = False) -> int:
     """Write the outputs of a wrong port in float64; returns the number of cases on which its mistake is examined.
 
-    All other cases are as expected; with `spoiled_only` they are not written.
+    All other cases have the expected outputs; with `spoiled_only` they are not written.
     """
     questions = [
         Question(case.name, case.operation, golden.inputs(case), case.settings, case.flags) for case in golden.cases
