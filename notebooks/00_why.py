@@ -227,8 +227,8 @@ show("motion")
 # **Light alone.** A explains the change of light and gains on training and held-out frames. The other components have
 # no term for light. No variant moves the tissue by more than a small fraction of a pixel.
 #
-# **Motion alone.** No variant of this short run follows the motion: the trajectory error equals that of a static model.
-# S cannot help, because its learning rate is a tenth of the rate of the deformation. A nevertheless gains on the
+# **Motion alone.** No variant of this short run follows the motion: the trajectory error equals the error of a static
+# model. S cannot help, because its learning rate is 10 % of the rate of the deformation. A nevertheless gains on the
 # training frames. It cannot move a Gaussian, so training changes the colours of static Gaussians until each training
 # frame looks right. The true colour change is zero.
 
@@ -283,9 +283,9 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 
 # %% [markdown]
 # With one breath in the clip, two neighbouring frames are nearly equal, and the painted colour is right between them as
-# well: A gains on held-out frames. With four breaths, a held-out frame is a sixth of a breath away from its neighbours.
-# Nothing makes the painted colour right there, and A loses several decibels. A gain on training frames occurs in both
-# cases and does not distinguish them.
+# well: A gains on held-out frames. With four breaths, a held-out frame is 1/6 of a breath away from its neighbours. No
+# loss constrains the painted colour there, and A loses several decibels. A gain on training frames occurs in both cases
+# and does not distinguish them.
 #
 # The two rates were chosen because they differ most. A short sweep with one seed, noted by hand, gave A +0.7 dB held
 # out for one breath, +0.1 for two, -3.5 for four and -0.5 for six. The loss does not grow monotonically with the rate.
@@ -294,7 +294,7 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 #
 # - On the **simulated clip of the demonstration**, with the preset `paper`, A loses 0.28 dB on held-out frames
 #   ({doc}`/claims`) and gains almost 2 dB on training frames. That clip has a beat with five cycles in 24 frames.
-# - On the **real clip**, adding A to S gains 0.26 dB ({doc}`/claims`). Most of its held-out frames lie between two
+# - On the **real clip**, adding A to S gains 0.26 dB ({doc}`/claims`). Most of its held-out frames are between two
 #   training frames that differ little, as in the slow clip.
 # - After **721 iterations** on the real clip, a model without residuals is 2.05 dB worse ({doc}`/tradeoff`); after 6000
 #   iterations the difference is a few tenths of a decibel ({doc}`/claims`). After 721 iterations the deformation may
@@ -304,8 +304,8 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 # - With **light alone**, false motion is the same with and without A ({doc}`/effects`). A improves only the picture;
 #   the geometry was already right.
 #
-# Two rules follow. First, a gain on training frames proves nothing about A; only held-out frames do. Second, motion
-# needs a component that moves. In the preset `sharp` the Gaussians start with tracked motion {eq}`eq-b15`, and
+# Two rules follow. First, a gain on training frames proves nothing about A; only held-out frames can. Second, motion
+# needs a component that moves Gaussians. In the preset `sharp` the Gaussians start with tracked motion {eq}`eq-b15`, and
 # {doc}`/effects` shows that the colour residual is then smaller.
 #
 # ## Exercise

@@ -139,8 +139,8 @@ np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
 # ## The dead atom
 #
 # Take a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$: the atom differs from 0
-# between the frames, but not at any frame. Its RMS is 0. If rounding noise were divided by its own RMS, the result
-# would be a random signal of size 1, and the model would be trained on it. The rule is therefore: if the RMS is below
+# between the frames, but not at any frame. Its RMS is 0. Dividing its rounding noise by the RMS of this noise would
+# give a random signal of size 1, and the model would be trained on it. The rule is therefore: if the RMS is below
 # $10^{-6}$, the atom is 0 in value and in gradient.
 
 # %%
@@ -275,11 +275,11 @@ assert all(report.passed for report in reports)
 #    none held out? Estimate the rank of the normalised dictionary in both cases.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead,
-# so at most 15 remain: that is why the rank is reported, and why a clip whose frames lie on
-# the grid of the highest frequency is a special one. All other clips from 20 frames on have 16.
+# Answer. Over 21 stamps all 16 atoms are independent. Over 32 equally spaced stamps one atom is
+# dead, so at most 15 remain; a clip on the grid of the highest frequency is special, and the
+# rank is therefore reported. All other clips of 20 frames and more have rank 16.
 assert report_atoms(stamps, omega).rank == 16
-# How much worse the faintest combination is seen than the clearest.
+# The condition number: how much weaker the faintest combination is than the strongest.
 singular = np.linalg.svd(bars, compute_uv=False)
 np.testing.assert_allclose(
     report_atoms(stamps, omega).condition, singular[0] / singular[-1], rtol=1e-9

@@ -236,8 +236,8 @@ assert report.passed
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. No: tanh is not linear. A curve that is high for a short time and slightly low for
-# the rest saturates at the top only, so its mean after tanh is negative. The bound is what
-# limits this: the mean can move by less than beta.
+# the rest saturates at the top only, so its mean after tanh is negative. The bound limits
+# this: the mean changes by less than beta.
 bump = np.exp(-(((stamps - 0.5) / 0.05) ** 2))
 atoms = np.array([normalised_atoms(t, omega, statistics) for t in stamps])
 short = np.zeros((3, 2 * F, 1))

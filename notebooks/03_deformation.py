@@ -142,8 +142,8 @@ plt.show()
 # $\partial E/\partial\sigma=2u\cdot(-u/\Sigma)\cdot2\sigma=-4\Delta^4\sigma/\Sigma^3$. For `gaussian`,
 # $\partial E/\partial\sigma=-\Delta^2\sigma/\Sigma^2$.
 #
-# **(3.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. The sign cancels that of (3.2), so
-# $g_\theta=-g_E\,\partial E/\partial\Delta$ is positive for a basis whose centre lies before $t$. The signs of (3.2) and (3.4)
+# **(3.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. This sign cancels the sign of (3.2), so
+# $g_\theta=-g_E\,\partial E/\partial\Delta$ is positive for a basis with its centre before $t$. The signs of (3.2) and (3.4)
 # cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
 #
 # **(3.6) Time.** $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases

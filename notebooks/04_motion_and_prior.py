@@ -51,9 +51,8 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # \mu_i(t) = \mu_i + \psi_{0:3,i}(t) + \Delta\mu_i(t).
 # $$
 #
-# $\psi$ is the offset of the deformation model of {doc}`03_deformation`. The atoms are the **raw** ones, not the
-# normalised ones: the penalty below is invariant to the phase of a sine and cosine pair, and that holds only for raw
-# pairs.
+# $\psi$ is the offset of the deformation model of {doc}`03_deformation`. The atoms are **raw**, not normalised: only
+# for raw pairs is the penalty below invariant to the phase of a sine and cosine pair.
 
 
 # %% tags=["transcription"]

@@ -98,7 +98,7 @@ for settings, text_settings in presets:
 # \det=\varepsilon^2+\varepsilon\sum_{k=1}^{3}S_k^2\|\mathbf t_k\|^2+\sum_{k<l}\bigl(S_kS_l\,(t_{0k}t_{1l}-t_{1k}t_{0l})\bigr)^2 .
 # $$
 #
-# Here $\mathbf t_k$ are the columns of $T$. The definition has $ac-b^2$, and in float64 both agree. The kernel has the
+# Here $\mathbf t_k$ are the columns of $T$. The definition uses $ac-b^2$, and in float64 both agree. The kernel uses the
 # sum.
 
 
@@ -195,7 +195,7 @@ plt.show()
 # A loss gives $g_u,g_v$, the gradients $g_a,g_b,g_c$ of the screen covariance, and $g_z^{\mathrm{img}}$ from the depth
 # image. We differentiate from the last line of the equation upward.
 #
-# **(6.1) The three numbers as a matrix.** $b$ stands for two equal entries. Half of its gradient goes to each:
+# **(6.1) The three numbers as a matrix.** $b$ represents two equal entries, which share its gradient equally:
 # $G_2=\begin{bmatrix}g_a&g_b/2\\g_b/2&g_c\end{bmatrix}$.
 #
 # **(6.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (5.1), and
@@ -349,7 +349,7 @@ for name in ("position", "rotation", "scale"):
 # \end{aligned}
 # $$
 #
-# The gradients with respect to $W'$ and $\mathbf d'$ are those that the projection returned above.
+# The projection above has returned the gradients with respect to $W'$ and $\mathbf d'$.
 #
 # **(6.12) The two products.** $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
 # $g_{\mathbf d}=E^\top g_{\mathbf d'}$, $g_{\boldsymbol\tau}=g_{\mathbf d'}$ and
@@ -414,7 +414,7 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. A Gaussian lies on the optical axis. Which entries of $J$ are 0, and which gradients does $g_z$ then lack in (6.9)?
+# 1. A Gaussian is on the optical axis. Which entries of $J$ are 0, and which gradients does $g_z$ then lack in (6.9)?
 # 2. Write `pose_reverse` from (6.12) and (6.13) and let the golden cases judge it: `--only pose` ({doc}`index`).
 # 3. The cell below answers this one. Make everything twice as large: positions, semi-axes, the
 #    translation of the camera, the near plane. What happens to $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the
@@ -422,8 +422,8 @@ assert all(report.passed for report in reports)
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The screen does not change: x/z does not, and J halves while S doubles. z doubles.
-# The gradient of the position halves (if no loss looks at z), because a step of one scene
-# unit now means half as many pixels.
+# The gradient with respect to the position halves (if no loss depends on z), because a step of
+# one scene unit is now half as many pixels.
 doubled = projection_forward(
     2 * mu,
     shape._replace(scale=2 * shape.scale),

@@ -66,7 +66,7 @@ assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1
 
 # %% [markdown]
 # **An independent source.** The associated Legendre functions $P_l^m$ of SciPy give the same sixteen functions. Their
-# sign $(-1)^m$ (Condon and Shortley) is that of the table.
+# sign convention $(-1)^m$ (Condon and Shortley) is the same as in the table.
 
 # %%
 direction = rng.normal(size=(3, 50))

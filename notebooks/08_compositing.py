@@ -221,8 +221,8 @@ plt.show()
 # $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. More opacity adds colour of
 # Gaussian $k$ and removes colour behind it.
 #
-# **(8.4) Depth and opacity** are the same sum, with $z_k$ or $1$ in place of the colour and 0 as background. They
-# give $Z_k$ and $Q_k$.
+# **(8.4) Depth and opacity** are the same sum, with $z_k$ or $1$ instead of the colour and 0 as background. They give
+# $Z_k$ and $Q_k$.
 #
 # **(8.5) Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
 #

@@ -73,7 +73,7 @@ for matrix in (
     definition.expand_matrix(9, "co_sited"),
     definition.expand_matrix(9, "half_pixel"),
 ):
-    np.testing.assert_allclose(matrix.sum(axis=1), 1)  # a constant stays what it is
+    np.testing.assert_allclose(matrix.sum(axis=1), 1)  # a constant is unchanged
 
 
 def up(g, fine, rule):
@@ -204,7 +204,7 @@ plt.show()
 # $\mathsf D$ and $\mathsf U$.
 #
 # **(9.3) One band.** $P_j=G_{j-1}-\mathsf UG_j$. So $g_{P_j}$ is added to the gradient of $G_{j-1}$, and
-# $-\mathsf U^\top g_{P_j}$ to that of $G_j$.
+# $-\mathsf U^\top g_{P_j}$ to the gradient of $G_j$.
 #
 # **(9.4) The next level.** $G_{j+1}=\mathsf DG_j$ adds $\mathsf D^\top g_{G_{j+1}}$ to the gradient of $G_j$.
 #

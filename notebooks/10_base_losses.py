@@ -15,8 +15,8 @@
 #
 # A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
 # compare it with. The base model has a loss for each: the colour of each pixel (L1), the structure of the colours
-# (SSIM), the depth against the prior depth, and smoothness. The colour terms read no value under the instrument. There
-# the depth term reads only its two maxima, and smoothness only the render.
+# (SSIM), the depth against the prior depth, and smoothness. The colour terms use no value under the instrument. There
+# the depth term uses only its two maxima, and smoothness only the render.
 #
 # The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
 # {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
@@ -80,7 +80,7 @@ H, W = M.shape
 # $$
 #
 # The code computes the same quantity from the difference $e=x-y$ and the sum $f=x+y$. This form needs no covariance, is
-# exactly 1 for equal images, and keeps all digits of $1-s$:
+# exactly 1 for equal images, and loses no digit of $1-s$:
 #
 # $$
 # \begin{aligned}
@@ -174,7 +174,7 @@ for depth in (90.0, 0.9 * D_prior.max(), np.nan):
         moved, depth_definition.normalised_depth_forward(D_hat, text)[0], rtol=1e-12
     )
 
-step = D_hat + 80 * (np.arange(W) > 20)  # a fold, so that there is an edge
+step = D_hat + 80 * (np.arange(W) > 20)  # a fold, which is an edge
 E = canny_edges(step)
 assert E.any()
 L_smooth, saved_smooth = smoothness_forward(step, I_hat, M, E, 30.0)
@@ -258,8 +258,8 @@ plt.show()
 # $\sigma_p$ is the sign of the residual on valid pixels and 0 elsewhere.
 #
 # **(10.9) Depth: the maximum.** With the pixels held fixed, $\partial/\partial m$ of the same terms is
-# $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. It belongs to the pixels $\mathcal P^\star$ that hold the maximum, in equal parts.
-# The maximum $m_D$ of the prior is held fixed.
+# $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. The pixels $\mathcal P^\star$ of the maximum share it equally. The maximum $m_D$ of
+# the prior is held fixed.
 #
 # $$
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
@@ -360,8 +360,8 @@ assert all(report.passed for report in reports)
 #    makes it true.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The derivative along D_hat itself is zero: the sum is 0. The term of the maximum
-# makes it so: without it every pixel would be pulled, and the scale of the scene with them.
+# Answer. The derivative along D_hat itself is zero, so the sum is 0. The term of the maximum
+# ensures this: without it the loss would change every pixel, and so the scale of the scene.
 g_D = normalised_depth_reverse(1.0, saved_depth)
 whole, without_largest = (g_D * D_hat).sum(), (g_D * D_hat)[D_hat < D_hat.max()].sum()
 print(f"sum: {whole:.1e}; without the largest pixel: {without_largest:.2f}")

@@ -134,7 +134,7 @@ np.testing.assert_allclose(
 #
 # Left and middle: the absolute gradients of the two losses. The gradient of L1 has the same size everywhere and changes
 # only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel. Near the
-# instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.) Right:
+# instrument, where no band value is valid, it is 0. (Its colour scale is 25 % of the other one.) Right:
 # $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these substitutes for
 # a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. Because the
 # result depends on $w$ and on the state of the render, the preset uses the published number and does not calibrate.
@@ -210,16 +210,16 @@ for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
 #
 # 1. One of the 16 views is black and its render is exact, so both gradients are 0. What happens to the median if the
 #    view counts with the ratio 0, and if it is omitted?
-# 2. Write `calibrate` and let the golden cases judge it: `--only calibration` ({doc}`index`). The cases hold an even
+# 2. Write `calibrate` and let the golden cases judge it: `--only calibration` ({doc}`index`). The cases have an even
 #    and an odd number of valid views.
 # 3. The cell below answers this one. Make every error of the render half as large. Does the calibrated weight change
 #    for $w=0$? Consider on what the gradient of a mean of absolute values depends.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. Not at all. The gradient of a mean of absolute values depends on the signs of the
-# residuals, not on how large they are; both losses are of this kind. With SSIM in the
-# photometric term it does change. Other signs of the same sizes change it too: the gradient of
-# the Laplacian loss is a filter of the signs of the bands.
+# Answer. No. The gradient of a mean absolute value depends on the signs of the residuals, not
+# on their size; both losses are of this kind. With SSIM in the photometric term the weight does
+# change. Other signs of the same sizes change it too: the gradient of the Laplacian loss is a
+# filter of the signs of the bands.
 whole = calibrate([("", *map(rms, gradients(i, 1.5, 0.0))) for i in chosen[::4]], r).lambda_lap
 half = calibrate(
     [("", *map(rms, gradients(i, 1.5, 0.0, stretch=0.5))) for i in chosen[::4]], r
@@ -245,5 +245,5 @@ of_blur, of_plus = (
 )
 print(f"errors of one size: {of_blur:.2f} with the signs of a blur, {of_plus:.2f} all positive")
 assert of_plus > 1.5 * of_blur
-# The setting that asks for all this.
+# The setting that enables the calibration.
 assert msgspec.structs.replace(PAPER.loss, lambda_lap="auto").lambda_lap == "auto"

@@ -303,8 +303,8 @@ plt.show()
 # ## The reverse pass
 #
 # Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are results of the reverse
-# pass of compositing, before that of the projection. The pair to check is therefore that of {doc}`08_compositing`,
-# block `mean2d`.
+# pass of compositing, before the reverse pass of the projection. The pair to check is therefore the pair of
+# {doc}`08_compositing`, block `mean2d`.
 
 # %%
 with one_thread():

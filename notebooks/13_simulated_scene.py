@@ -172,7 +172,7 @@ plt.show()
 # is drawn in a training frame, with colour and depth $D$, becomes one Gaussian.
 #
 # **(13.1) The ray.** The projection of chapter 6 has $u=f_xx/z+c_x$. A pixel is sampled at its centre, $u=i+\frac12$, and
-# its depth is $z=D$, so $x=(i+\frac12-c_x)\,D/f_x$. The same holds for $y$.
+# its depth is $z=D$, so $x=(i+\frac12-c_x)\,D/f_x$, and in the same way for $y$.
 #
 # **(13.2) Into the world.** The camera has $(x,y,z)^\top=W\mu+\mathbf d$. $W$ is a rotation, so its inverse is $W^\top$:
 #
@@ -187,8 +187,8 @@ plt.show()
 # neighbours overlap and leave no holes. Two points may coincide; the floor keeps the logarithm finite:
 # $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. A sphere needs no rotation.
 #
-# **(13.5) Opacity** starts at 0.1. By (8.3) a Gaussian has a gradient only as far as light reaches it. Opaque Gaussians
-# would leave no gradient for those behind them.
+# **(13.5) Opacity** starts at 0.1. By (8.3) a Gaussian has a gradient only as far as light reaches it. Behind opaque
+# Gaussians there would be no gradient.
 #
 # **(13.6) Motion.** The weights of the time bases start at 0 and their centres are evenly spaced: the scene is at rest.
 # By (3.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
@@ -267,7 +267,7 @@ assert report.passed
 #    whether that is true of a program whose source you cannot read?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. Change the held-out frames to anything, and see whether one bit of the result moves.
+# Answer. Change the held-out frames arbitrarily; the result must stay bitwise equal.
 import dataclasses
 
 spoiled = dataclasses.replace(

@@ -318,7 +318,7 @@ for k in sequence.test_index:
 #
 # Held-out frames are not used in any part of training: neither in the losses, nor for the initial points, nor in the
 # statistics of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each
-# residual on the image. The effect of S is small here, because its rate is a tenth of the rate of the deformation and a
+# residual on the image. The effect of S is small here, because its rate is 10 % of the rate of the deformation and a
 # short run has few steps.
 
 # %% tags=["hide-input"]
@@ -390,7 +390,7 @@ SimpleNamespace(_repr_html_=lambda: picture)
 # ## At full size
 #
 # The frames of this chapter are thumbnails. {doc}`/full_size` has stored trainings of a simulated clip at 640x512: the
-# worst, the median and the best held-out frame in pictures, maps of the error, and the pixels that hold it.
+# worst, the median and the best held-out frame in pictures, maps of the error, and the pixels with the largest errors.
 #
 # ![PSNR of every held-out frame at full size](/results/full_size/curves.svg)
 #
@@ -449,7 +449,7 @@ plt.show()
 # ## From Python, in ten lines
 #
 # Users need none of these internals. `import endotsr` is enough: the same training with a callback, a picture at a time
-# between two frames, the metrics of the held-out frames, and a run folder that the command line reads as well.
+# between two frames, the metrics of the held-out frames, and a run folder for the commands.
 
 # %%
 import tempfile
@@ -514,9 +514,9 @@ assert report.passed
 #    Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The one trained without A: its other parameters have learned to do without (wrongly,
-# by moving things). The difference between "taken out" and "never there" shows how other
-# parameters compensate.
+# Answer. The model trained without A: its other parameters have learned to compensate (wrongly,
+# by motion). The difference between "taken out" and "never there" shows how other parameters
+# compensate.
 with_all = score(state, constants, sequence.train_index)
 taken_out = score(state, constants, sequence.train_index, appearance=False)
 never_there = score(*trained["without A"][:2], sequence.train_index)

@@ -408,9 +408,9 @@ assert report.passed and precision.passed
 #    small epsilon to the norm?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The identity rotation and no gradient: a defined result. With an epsilon the
-# "rotation" matrix shrinks to something that is no rotation (R = 1 - 2(y^2 + z^2) with a q
-# that is too short), for every short quaternion and not only for 0.
+# Answer. The identity rotation and no gradient: a defined result. With an epsilon, the matrix
+# is not a rotation (R = 1 - 2(y^2 + z^2) with a q that is too short), for every short
+# quaternion and not only for 0.
 identity, zero = (
     made([[0.0], [0.0], [2.0]], log_scale=[-1.0, -2.0, -1.5], quaternion=q)
     for q in ((1, 0, 0, 0), (0, 0, 0, 0))

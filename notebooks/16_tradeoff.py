@@ -172,8 +172,8 @@ plt.show()
 # ## The front of settings
 #
 # Cutoff, stop and precision vary together. A setting is **dominated** if another setting takes no more time, has no
-# larger error, and is strictly better in one. The settings that are not dominated form the front. The best setting for
-# a given budget is on the front.
+# larger error, and is strictly better in one. The undominated settings form the front. The best setting for a given
+# budget is on the front.
 
 # %%
 sweep = {

@@ -268,9 +268,9 @@ for name, inspection in found.items():
 #    the test of rates and the dictionary resolve?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both lie within the 1 to 16 cycles
-# of the dictionary, and 63 frames carry 31.5 cycles. The test of rates asks for three cycles,
-# so that it finds the beat and not the breath.
+# Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both are within the 1 to 16 cycles
+# of the dictionary, and 63 frames resolve 31.5 cycles. The test of rates requires three cycles,
+# so it finds the beat and not the breath.
 from endotsr.effects.periodic import LEAST_CYCLES
 
 seconds = 63 / 15

@@ -15,8 +15,8 @@
 #
 # Every loss so far compares a render with a training frame. No loss reads a render between two training frames. In
 # {doc}`00_why` a clip breathes four times: the colour residual is right at the training times and several decibels
-# wrong between them. The preset `sharp` therefore also renders moments between the frames and compares them with
-# targets made from both frames, moved along their optical flow.
+# wrong between them. The preset `sharp` therefore also renders times between the frames and compares them with targets
+# made from both frames, moved along their optical flow.
 #
 # The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is optional and not in the paper.
 
@@ -41,8 +41,8 @@ from endotsr.simulator.scenes import named_scene
 # ## The problem
 #
 # The clip is the one of {doc}`00_why` that breathes four times: 24 frames, three held out. It is trained twice with the
-# preset `paper`, shortened: once as it is, and once with 70 % of the iterations at moments between the frames, the
-# fraction of `sharp`. The simulator also makes the true picture at three moments between any two frames.
+# preset `paper`, shortened: once unchanged, and once with 70 % of the iterations at times between the frames, the
+# fraction of `sharp`. The simulator also renders the true picture at three times between any two frames.
 
 # %%
 FRAMES, MOMENTS, ITERATIONS = 24, 4, 500
@@ -113,7 +113,7 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 # ## The equation
 #
 # $I_0$ and $I_1$ are two successive training frames, with the flow $f$ from the first to the second and $g$ from the
-# second to the first. $a\in(0,1)$ is the moment. $G_2$ is a Gaussian window of 2 px.
+# second to the first. $a\in(0,1)$ is the intermediate time. $G_2$ is a Gaussian window of 2 px.
 #
 # $$
 # \begin{aligned}
@@ -129,11 +129,11 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 #
 # ## Step by step
 #
-# A flow gives the motion of the points of a *frame*. A target needs the point that is at a pixel at a *moment* without
-# a frame.
+# A flow gives the motion of the points of a *frame*. A target needs the point that is at a pixel at a *time* without a
+# frame.
 #
 # **(18.1) The path of a point.** Between two frames a point moves along a straight line at constant speed, by $v$ in
-# total. If it is at $x$ at the moment $a$, it was at $x-av$ in $I_0$ and will be at $x+(1-a)v$ in $I_1$.
+# total. If it is at $x$ at time $a$, it is at $x-av$ in $I_0$ and at $x+(1-a)v$ in $I_1$.
 #
 # **(18.2) The forward flow** at the place in $I_0$ is the whole displacement: $v=f(x-av)$. The unknown is on both
 # sides, because the place at which to read the flow depends on the flow.
@@ -142,16 +142,16 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 #
 # **(18.4) Three steps of a fixed-point iteration** solve both. Start from $v^{(0)}=f(x)$ and repeat
 # $v^{(k+1)}=f(x-av^{(k)})$. If $f$ changes by at most $L$ from one pixel to the next, then
-# $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: the error shrinks by the factor $aL$ in every step. $aL<1$ holds for tissue that
-# does not fold. The start has the error $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
+# $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: the error shrinks by the factor $aL$ in every step. Tissue that does not fold has
+# $aL<1$. The start has the error $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
 #
 # **(18.5) Which of the two.** $v_0$ is read $a|v|$ away from $x$, and $v_1$ is read $(1-a)|v|$ away. The nearer one has
 # the larger weight: $v=(1-a)v_0+av_1$. Exchange the frames and replace $a$ by $1-a$: $f$ and $g$ change places, $v_0$
 # becomes $-v_1$, and $v$ changes its sign only.
 #
 # **(18.6) The moved pair.** $J_0$ and $J_1$ are two pictures of the same point, so they differ by noise and by a change
-# of light. Their blend has less noise than a frame: its variance is $\bigl((1-a)^2+a^2\bigr)\sigma^2$, half of that of
-# a frame at $a=\frac12$.
+# of light. Their blend has less noise than a frame: its variance is $\bigl((1-a)^2+a^2\bigr)\sigma^2$, half the variance
+# of a frame at $a=\frac12$.
 #
 # **(18.7) Two pairs, one pixel.** Flow can be wrong at a highlight, at an occlusion, or for a fast motion. Then the
 # static pair may be better. Let the blends of the two pairs have independent errors of variance $e_{\mathrm m}$ and
@@ -163,8 +163,8 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 # difference is used as the variance. The window $G_2$ averages it over the noise. The smallest difference of 8-bit
 # pictures, $1/255$, is added, so that two equal pairs have $q=\frac12$ and not $0/0$.
 #
-# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue, the
-# target is that one. Where one of the four pictures is excluded, the static pair is not evidence, and $q=0$.
+# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue, it is
+# the target. Where one of the four pictures is excluded, the static pair is not evidence, and $q=0$.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.motion_between))
@@ -209,7 +209,7 @@ of_frame = np.var((still.sequence.images[0] - calm.images[0].astype(float)) / 25
 for a in (0.25, 0.5):
     made = frame_between(still.sequence, 0, 1, a, rest).image
     of_blend = np.var(made - calm.images[0] / 255)
-    print(f"a = {a}: variance {of_blend / of_frame:.2f} of that of a frame")
+    print(f"a = {a}: variance {of_blend / of_frame:.2f} times the variance of a frame")
     np.testing.assert_allclose(of_blend / of_frame, (1 - a) ** 2 + a**2, rtol=0.05)
 
 # %% [markdown]
@@ -293,8 +293,8 @@ assert found["the target"] > found["both frames as they are"] + 2
 # %% [markdown]
 # ## The limit of the targets
 #
-# A target is a picture. It determines the colour at a moment, but not which Gaussian should have it. The clip above
-# shows the difference: the pictures between the frames are right, but the Gaussians still do not move.
+# A target is a picture. It determines the colour at a time, but not which Gaussian should have it. The clip above shows
+# the difference: the pictures between the frames are right, but the Gaussians still do not move.
 
 # %%
 for name, run in runs.items():
@@ -303,8 +303,8 @@ for name, run in runs.items():
     assert motion.pixels > 0.9 * motion.motion_pixels
 
 # %% [markdown]
-# The colour residual now imitates the motion at the moments as well, and sixteen atoms cannot follow every moment. The
-# motion itself is the subject of {doc}`19_tracked_motion`.
+# The colour residual now imitates the motion at the intermediate times as well, and sixteen atoms cannot follow all of
+# them. The motion itself is the subject of {doc}`19_tracked_motion`.
 #
 # On the real clip the target is closer to the held-out frames than the static pair for every gap, and than the moved
 # pair for blocks of 4 frames and more. The table is on the page of {eq}`eq-b14`. {doc}`/results/README` gives the
@@ -313,9 +313,9 @@ for name, run in runs.items():
 # ## The reverse pass
 #
 # There is none. A target is made from training frames and flow, which do not depend on any parameter of the model, so
-# it is held fixed like a frame. The losses of {doc}`10_base_losses` differentiate the render at the moment. Time enters
-# the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are valid at any time. The pair to check
-# is the loss that reads the target.
+# it is held fixed like a frame. The losses of {doc}`10_base_losses` differentiate the render at the intermediate time.
+# Time enters the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are valid at any time. The
+# pair to check is the loss that uses the target.
 
 # %%
 with one_thread():
@@ -330,7 +330,7 @@ assert report.passed
 #    at $a=\frac12$, and how far apart the two pictures of the point are. Is their blend sharper or softer than a frame?
 # 2. Write `motion_between` from (18.2) to (18.5) and let the cells of this chapter judge it: assign your function to
 #    the name `motion_between` and run the cells below *The steps in numbers* again. No golden case contains a flow,
-#    because a port may use any. The loss that reads the target has cases: `--only masked_l1` ({doc}`index`).
+#    because a port may use any. The loss that uses the target has cases: `--only masked_l1` ({doc}`index`).
 # 3. The cell below answers this one. Omit the constant $255^{-2}$ of (18.8). What is $q$ for two equal frames and a
 #    flow of 0? Which pixels of a real clip would this affect?
 

@@ -110,7 +110,7 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # ## Step by step: the tracks
 #
 # **(19.1) From pixel to position.** A point at pixel $x$ of one training frame is at $x'=x+f(x)$ in the next one. The
-# prior depth at $x'$ gives its position: it lies on the ray of $x'$.
+# prior depth at $x'$ gives its position on the ray of $x'$.
 #
 # **(19.2) Do the flows agree?** Exact flows lead back to the start: $f(x)+g(x')=0$. A flow has an error that grows with
 # the motion and an error of some fraction of a pixel that does not. The point stays followed if
@@ -120,12 +120,12 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # **(19.3) Is it the same surface?** $x'$ and its four neighbours must be tissue with a prior depth, and the depth may
 # change by at most 20 %. An instrument in front of the tissue fails the first test, and a fold the second.
 #
-# **(19.4) A lost point** is carried by the tissue around it: by the mean displacement of the 8 nearest followed points,
+# **(19.4) A lost point** moves with the tissue around it: by the mean displacement of the 8 nearest followed points,
 # weighted by their inverse distance. Its $a_{pi}$ is 0.1.
 #
-# **(19.5) Found again.** A lost point is followed again at the first frame that shows tissue at its pixel with a depth
-# within 2.5 % of its own. This limit is narrower than in (19.3), because the depth is the only evidence that it is the
-# same piece.
+# **(19.5) Found again.** A lost point is followed again from the first frame in which its pixel is tissue with a depth
+# within 2.5 % of its own. This limit is narrower than in (19.3), because the depth is the only evidence for the same
+# piece of tissue.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition_of_tracks._step))

@@ -118,7 +118,7 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # ## The coarse start
 #
 # $e$ is the mean error of the renders at half size, after iteration $i$. $d$ is the mean magnitude of the finest
-# Laplacian band of the frames. $K$ holds eight training frames.
+# Laplacian band of the frames. $K$ is a set of eight training frames.
 #
 # $$
 # e(i)=\operatorname*{mean}_{k\in K}\ \operatorname*{mean}_{c,\,p:M_k'(p)}\bigl|\hat I_k'(i)-I_k'\bigr|,\qquad
@@ -130,12 +130,12 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # **(20.4) Detail missing at half size.** A frame is its finest band $P_1$ plus a frame of half size, enlarged
 # ({eq}`eq-5`). A perfect fit to the frames of half size still misses the full frame by $P_1$, in the mean by $d$.
 #
-# **(20.5) The test.** While the fit misses the frames of half size by more than that, $e>d$, the missing band is the
-# smaller of the two errors. Half size has a quarter of the pixels. Once $e<d$, the finest band is the larger error, and
-# the full frames are needed.
+# **(20.5) The test.** While the fit error at half size is above the missing detail, $e>d$, the missing band is the
+# smaller of the two errors, and half size has only 25 % of the pixels. Once $e<d$, the finest band is the larger error,
+# and the full frames are needed.
 #
-# **(20.6) The camera.** The edges of the picture stay where they are, so $u'=u/2$ for every point. With the centre of
-# the first pixel at $(0.5,0.5)$ this needs no shift.
+# **(20.6) The camera.** The edges of the picture stay aligned, so $u'=u/2$ for every point. With the centre of the first
+# pixel at $(0.5,0.5)$ this needs no shift.
 #
 # **(20.7) The smoothness.** Its loss sums squared steps of depth on tissue and absolute steps, the total variation,
 # under the instrument ({eq}`eq-b9`), each as a mean over pixels. At half size neighbouring pixels are twice as far
@@ -148,9 +148,9 @@ print(inspect.getsource(definition.fit_error))
 print(inspect.getsource(definition.lacking))
 
 # %% [markdown]
-# Step (20.6): a point, seen by the camera and by the camera of half size. Step (20.7): with half the weight, the total
-# variation of a slope stays, its squared steps leave twice the loss, and noise that differs from pixel to pixel, whose
-# steps do not grow, leaves half the loss. The factor lies between these cases and was not tuned.
+# Step (20.6): a point in the image of the camera and of the half-size camera. Step (20.7): half the weight preserves the
+# loss of the total variation of a slope and doubles the loss of its squared steps. For noise that is independent between
+# pixels, whose steps do not grow, the loss is halved. The factor is between these cases and was not tuned.
 
 # %%
 clip = simulate(SimulatorSettings(width=128, height=96, frames=24))
@@ -258,7 +258,7 @@ assert 0 < work["coarse start"] < 1 and held_out["coarse start"] > held_out["ful
 # %% [markdown]
 # The coarse start ends at the first multiple of 50 iterations with $e<d$, and with the end of the growth
 # (`density.until`) at the latest. Here the test ends it. In the preset `quick` at 640x512 pixels the run is too short
-# for the test, and the end of the growth decides; the page of {eq}`eq-b17` has the measurements.
+# for the test, and the coarse start lasts until the end of the growth; the page of {eq}`eq-b17` has the measurements.
 #
 # ## The reverse pass
 #
@@ -281,9 +281,9 @@ assert report.passed
 #    the end of the coarse start?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. d falls by far, because the blur removes the finest band. The render of half size then
-# has to come nearer before the full frames are worth their price, and the coarse start lasts
-# longer: for a blurred clip half the size is enough.
+# Answer. d becomes much smaller, because the blur removes the finest band. The fit at half size
+# must then be better before the full frames are worth their cost, and the coarse start lasts
+# longer: for a blurred clip half size is enough.
 import dataclasses
 
 from scipy.ndimage import gaussian_filter

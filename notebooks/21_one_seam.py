@@ -165,7 +165,7 @@ assert values[2] > max(values[:2])
 # **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. The subtraction of
 # $C\,\phi(u^*)$ leaves the Gaussian in its place at the join, whatever $C$ is: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
 #
-# **(21.6) The picture at the join** is therefore that of the neighbour.
+# **(21.6) The picture at the join** is therefore the neighbour's.
 
 # %%
 shift, shared = second.first - first.first, first.end - second.first
