@@ -191,7 +191,7 @@ ODD_ROWS = [
     Row("video, RGB of 16 bit", video("a.mkv", codec="ffv1", layout="gbrp16le"), "right", "", close(pictures(), 1)),
     Row("video, linear light", video("a.mp4", layout="yuv444p", transfer=8), "refused", "linear light"),
     Row("video, colours of BT.2020", video("a.mkv", codec="libx265", layout="yuv420p10le", primaries=9), "told",
-        "states the colours of BT.2020"),
+        "states BT.2020 colours"),
     Row("video, left and right in turn", video("a.mp4", IN_TURN), "told", "alternating-views"),
     Row("GIF", gif, "refused", "no known layout"),
     Row("pictures, moving PNG", folder_of(pictures(), change=converted("png", save_all=True, append_images=[blank()])),

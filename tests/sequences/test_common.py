@@ -276,4 +276,4 @@ def test_the_remedy_for_inverted_masks_works(tmp_path, stated, capsys):
     assert main(["check", str(tmp_path), *words]) == 0
     sequence = read_common(tmp_path, config, 0.2)
     np.testing.assert_array_equal(sequence.masks, right)
-    assert any("takes the place" in note for note in sequence.notes) == (stated == "white")
+    assert any("overrides the value" in note for note in sequence.notes) == (stated == "white")

@@ -119,7 +119,7 @@ def test_masks_are_united(tmp_path, capsys):
         expected = before.masks(i).copy()
         expected[-3:] = expected[15, i] = False
         assert (after.masks(i) == expected).all()
-    assert "also excluded is what border.png, logo exclude" in capsys.readouterr().out
+    assert "masks: united with border.png, logo" in capsys.readouterr().out
 
 
 def test_a_folder_is_replaced_by_an_edit_of_itself_and_nothing_else_is(tmp_path, capsys):

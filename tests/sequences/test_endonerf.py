@@ -175,7 +175,7 @@ def test_hard_E2_soft_masks_are_thresholded_and_noted_or_refused(tmp_path):
     cv2.imwrite(str(file), mask)
     sequence = read_endonerf(tmp_path, SequenceConfig())
     np.testing.assert_array_equal(sequence.masks[3, 20, 4:10], [True, True, True, False, False, True])
-    assert any("4 mask pixels lie between 0 and 255" in note for note in sequence.notes)
+    assert any("4 mask pixels are between 0 and 255" in note for note in sequence.notes)
     cv2.imwrite(str(file), np.where(written.tissue[3], 0, 1).astype(np.uint8))  # one file on another scale
     with pytest.raises(InputError, match=r"frame-000003.mask.png: .* neither 0 nor 255"):
         read_endonerf(tmp_path, SequenceConfig())

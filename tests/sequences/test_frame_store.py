@@ -39,7 +39,7 @@ def test_a_clip_in_a_file_is_the_clip_in_memory(folder, scale, masks, monkeypatc
         np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
     assert isinstance(there.images.base, np.memmap) and not isinstance(here.images.base, np.memmap)
     extra = set(there.notes) - set(here.notes)
-    assert len(extra) == 1 and "lie in a file without a name" in extra.pop()
+    assert len(extra) == 1 and "are stored in an unnamed file" in extra.pop()
     assert list(tmp_path.iterdir()) == []
 
 

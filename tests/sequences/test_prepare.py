@@ -101,7 +101,7 @@ def test_depth_is_reduced_as_a_training_reduces_it(tmp_path, scale):
     reduced = read_common(tmp_path / "b", SequenceConfig(), 0.2)
     step = read_sequence_file(tmp_path / "b").depth.scale  # pyright: ignore[reportOptionalMemberAccess]
     np.testing.assert_allclose(reduced.depth, whole.depth, rtol=0, atol=0.51 * step)
-    assert reduced.depth.max() < 61 and any("before it was reduced, and not again" in note for note in reduced.notes)
+    assert reduced.depth.max() < 61 and any("when it was resized, and not again" in note for note in reduced.notes)
     prepared(tmp_path / "b", tmp_path / "c")
     np.testing.assert_allclose(
         read_common(tmp_path / "c", SequenceConfig(), 0.2).depth, reduced.depth, atol=1.01 * step
@@ -232,7 +232,7 @@ def test_a_distorted_picture_is_straightened(tmp_path):
     (tmp_path / "clip").mkdir()
     write_png(tmp_path / "clip/0.png", scene_picture(0))
     found, notes = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA, distortion=(-0.2, 0.0, 0.0, 0.0))
-    assert found.camera.distortion == [] and any("straightened" in note for note in notes)
+    assert found.camera.distortion == [] and any("undistorted" in note for note in notes)
     matrix = np.array([[60.0, 0, 29.5], [0, 61.0, 24.5], [0, 0, 1]])
     new = np.array(
         [[found.camera.fx, 0, found.camera.cx - 0.5], [0, found.camera.fy, found.camera.cy - 0.5], [0, 0, 1]]
@@ -312,8 +312,8 @@ STEREOMIS = {
     "key": (lambda p: swap(p, "fc_x = 60\n", ""), r"\[StereoLeft\] fc_x is missing"),
     "text": (lambda p: swap(p, "fc_x = 60\n", "fc_x = a\n"), r"fc_x = 'a' is not allowed"),
     "size": (lambda p: swap(p, "res_y = 48", "res_y = 100"), "of 64x100 pixels, the pictures have 64x48"),
-    "swapped": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 4.0"), "right camera stands on the left"),
-    "above": (lambda p: swap(p, "T_1 = 0.0", "T_1 = 9.0"), "above each other"),
+    "swapped": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 4.0"), "right camera is on the left"),
+    "above": (lambda p: swap(p, "T_1 = 0.0", "T_1 = 9.0"), "4 apart horizontally and 9 vertically"),
     "one place": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 0.0"), "are in one place"),
     "no rotation": (lambda p: swap(p, "R_0 = 1.0", "R_0 = 3.0"), "not perpendicular unit vectors"),
 }  # fmt: skip
@@ -379,9 +379,11 @@ def test_a_pair_without_a_baseline_is_told_which_number_is_missing(tmp_path, cap
     words = ["--camera", *map(str, CAMERA)]
     assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 0
     assert "next: set the baseline of the two cameras, [camera] baseline" in capsys.readouterr().out
-    with pytest.raises(InputError, match="once \\[camera\\] baseline, the distance of the two cameras"):
+    with pytest.raises(InputError, match="once \\[camera\\] baseline, the distance between the two cameras"):
         read_sequence(tmp_path / "o", WHOLE, 0.2)
-    assert main(["depth", str(tmp_path / "o")]) == 2 and "allowed: the distance of the two" in capsys.readouterr().err
+    assert (
+        main(["depth", str(tmp_path / "o")]) == 2 and "allowed: the distance between the two" in capsys.readouterr().err
+    )
 
 
 def test_a_pipe_gets_no_carriage_returns(tmp_path, capsys):

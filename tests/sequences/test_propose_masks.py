@@ -46,7 +46,7 @@ def test_tissue_and_its_highlights_are_no_instrument(name):
 
 def test_without_colour_there_is_no_proposal():
     pictures = [np.repeat(picture[..., :1], 3, axis=2) for picture in scene("pulling")[0]]
-    assert "does not stand out" in propose_masks(pictures).reason
+    assert "is not distinguishable" in propose_masks(pictures).reason
     assert not propose_masks([]).found
 
 

@@ -52,7 +52,7 @@ def test_servct(tmp_path, capsys):
     found = prepared(tmp_path)
     assert found.lens[:4] == LENS and found.baseline == pytest.approx(made.BASELINE)
     np.testing.assert_allclose(found.depth(3), made.depth(3), atol=0.01)
-    assert "no training as one scene" in capsys.readouterr().out
+    assert "not for training one scene" in capsys.readouterr().out
 
 
 def test_servct_of_two_cameras_is_refused(tmp_path, capsys):
@@ -131,7 +131,7 @@ def test_nerfstudio_points_stand_for_depth(tmp_path, capsys):
     (tmp_path / "raw/sparse_pc.ply").write_text(head + rows)
     plane = prepared(tmp_path).depth(0)
     np.testing.assert_allclose(plane[plane > 0], 0.06, atol=1e-4)
-    assert "does not say which frame sees which" in capsys.readouterr().out
+    assert "does not state their visibility" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("changes", "said"), [

@@ -50,10 +50,15 @@ def scaled(values, top, kind):
 
 
 WRONG = {  # what the files hold: values, name of the folder, ending, what the message says
-    "disparity in pixels": (lambda i: 4 * disparity(i), "depth", "npy", "is brighter (rank correlation"),
-    "relative inverse depth": (lambda i: 1800 / true_depth(i) - 3, "depth", "npy", "is brighter (rank correlation"),
-    "disparity by its name": (lambda i: 4 * disparity(i), "disparity_raft", "npy", "is that of a disparity"),
-    "a network by its name": (lambda i: true_depth(i), "depth_anything_v2", "npy", "is that of a disparity or a rel"),
+    "disparity in pixels": (lambda i: 4 * disparity(i), "depth", "npy", "increases with depth (rank correlation"),
+    "relative inverse depth": (
+        lambda i: 1800 / true_depth(i) - 3,
+        "depth",
+        "npy",
+        "increases with depth (rank correlation",
+    ),
+    "disparity by its name": (lambda i: 4 * disparity(i), "disparity_raft", "npy", "indicates a disparity"),
+    "a network by its name": (lambda i: true_depth(i), "depth_anything_v2", "npy", "indicates a disparity or a rel"),
     "stretched to 8 bits": (lambda i: scaled(true_depth(i), 255, np.uint8), "depth", "png", "of every frame is 255"),
     "stretched to 16 bits": (lambda i: scaled(true_depth(i), 65535, np.uint16), "depth", "png", "frame is 65535"),
     "stretched to 0 to 1": (lambda i: scaled(disparity(i), 1.0, np.float32), "depth", "npy", "of every frame is 1"),
@@ -62,7 +67,7 @@ WRONG = {  # what the files hold: values, name of the folder, ending, what the m
         lambda i: true_depth(i) / 1000,
         "depth",
         "npy",
-        "like metres; another unit is stated with --depth-unit",
+        "like metres; state another unit with --depth-unit",
     ),
 }
 
@@ -107,7 +112,7 @@ def test_the_parallax_of_a_pair_speaks_against_a_disparity(tmp_path, capsys):
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--baseline", "4"]
     words += ["--camera", "200", "200", str(width / 2), str(height / 2), "--depth", str(tmp_path / "depth")]
     assert main(words) == 2
-    assert "depth falls where the stereo pair says far" in capsys.readouterr().err
+    assert "depth decreases where the stereo pair is farther" in capsys.readouterr().err
 
 
 def test_an_option_that_the_layout_does_not_read_is_refused(tmp_path, capsys):

@@ -37,7 +37,7 @@ def run(words: list[str]) -> int:
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.make_masks import OVERLAY, enter_masks, write_proposal
     from endotsr.sequences.source_options import SourceOptions
-    from endotsr.sequences.writing import refuse_existing
+    from endotsr.untrusted.writing import refuse_existing
 
     if options.out is None:
         proposal, place = enter_masks(options.sequence, options.replace), options.sequence

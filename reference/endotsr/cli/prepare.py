@@ -95,7 +95,7 @@ def run(words: list[str]) -> int:
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.prepare import PrepareSettings, prepare
     from endotsr.sequences.sequence_file import RIGHT
-    from endotsr.sequences.writing import refuse_existing
+    from endotsr.untrusted.writing import refuse_existing
 
     if not options.replace:
         refuse_existing(options.out)

@@ -92,7 +92,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: FlowTracks, size: 
         "none": f"No tile moves by more than noise would show ({statistic:.2f} of the threshold).",
         "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), all of it along one affine map of the picture.",
         "periodic": f"Tissue moves by up to {largest:.2g} px (RMS), with {rates} cycles per sequence.",
-        "irregular": f"Tissue moves by up to {largest:.2g} px (RMS), and no rate stands out of the spectrum.",
+        "irregular": f"Tissue moves by up to {largest:.2g} px (RMS), and no rate stands out in the spectrum.",
     }[kind]
     height, width = clip.images.shape[2:]
     return EffectVerdict(

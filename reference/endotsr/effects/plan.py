@@ -16,7 +16,7 @@ from endotsr.effects.savings import memory_fraction, time_fraction
 from endotsr.effects.views import harmonic_sizes
 from endotsr.equations.dictionary import AtomReport, frequencies, report_atoms
 
-MOST_CONDITION = 100.0  # of the dictionary at the training times; a larger one amplifies noise too much
+MOST_CONDITION = 100.0  # of the dictionary at the training stamps; a larger one amplifies noise too much
 SAMPLES_A_CYCLE = 2.0  # Nyquist limit: frames needed per cycle
 
 
@@ -34,7 +34,7 @@ class Change(NamedTuple):
 
 
 class Dictionary(NamedTuple):
-    """The dictionary of equations (1)-(3) that the training times determine."""
+    """The dictionary of equations (1)-(3) that the training stamps determine."""
 
     frequencies: int  # F
     frequency_max: float  # cycles per sequence
@@ -120,8 +120,7 @@ def _assembled(
     inspection: Inspection,
     dictionary: Dictionary,
 ) -> Plan:
-    """Sort the wanted settings into changes and kept settings. Changes are applied one at a time, which makes their
-    savings additive."""
+    """Sort the wanted settings into changes and kept settings. Changes apply in turn: their savings add up."""
     changes, kept, now = [], [], config
     for key, value, reason, effects in wanted:
         before = setting(now, key)
@@ -143,7 +142,7 @@ def _assembled(
 
 
 def carried(inspection: Inspection, config: Config) -> Dictionary:
-    """The largest part of the configured dictionary that the training times determine."""
+    """The largest part of the configured dictionary that the training stamps determine."""
     model, times = config.model, inspection.clip.times
     configured = report_atoms(times, frequencies(model.frequencies, model.frequency_min, model.frequency_max))
     nyquist = inspection.clip.frames / SAMPLES_A_CYCLE
@@ -164,8 +163,7 @@ def carried(inspection: Inspection, config: Config) -> Dictionary:
 
 
 def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Config) -> tuple[bool, str]:
-    """Whether the Fourier translation is required: by a periodic rate, or by any motion if it is initialised from
-    tracks (B15)."""
+    """Whether a rate requires the Fourier translation, or any motion if tracks initialise it (B15)."""
     motion = inspection.verdicts["motion"]
     if motion.present and config.initialisation.motion != "none":
         return True, f"{motion.reason[:-1]}: the Gaussians start with the motion that flow shows."

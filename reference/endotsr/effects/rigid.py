@@ -1,10 +1,10 @@
-"""Flow that a rigid scene shows to a moving camera, so that only the rest counts as motion of the tissue.
+"""Flow of a rigid scene seen by a moving camera. Only the residual flow counts as tissue motion.
 
-In: the poses and the flow of the tiles. Out: the flow of the rigid scene that fits best, and how wrong the flow itself
-is. The scene has one inverse depth rho for every tile, fitted to all frames at once: the place x of the tile in the
-reference is seen in frame k at the projection of R_k x + rho t_k, (R_k, t_k) from the reference camera to camera k.
-Depth of the sequence is not used: between sparse points, or at the edge of an organ, it is wrong by more than a test
-may allow. Motion that a change of depth explains in every frame cannot be told from it.
+In: the poses and the flow of the tiles. Out: the flow of the best-fitting rigid scene, and the error of the measured
+flow. The scene has one inverse depth rho per tile, fitted to all frames at once: a tile at x in the reference projects
+to R_k x + rho t_k in frame k, where (R_k, t_k) maps the reference camera to camera k. The prior depth is not used:
+between sparse points or at organ boundaries its error exceeds what the test tolerates. Motion that one depth explains
+in every frame cannot be separated from depth.
 """
 
 from typing import NamedTuple
@@ -18,21 +18,21 @@ from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import dense_flow, warp_bilinear
 from endotsr.splatting.camera import Camera
 
-MARGIN = 8  # working pixels: side of the patches of the flow, whose place is uncertain by as much beside a border
-ROUNDS = 5  # of the reweighted fit; the weights change by the ratio of two depths
-NEAREST = 0.1  # least depth in another frame over that in the reference
+MARGIN = 8  # working pixels: the patch size of the flow, whose position is uncertain by as much near a border
+ROUNDS = 5  # of the reweighted fit; weights change by a ratio of depths
+NEAREST = 0.1  # smallest ratio of the depth in another frame to the depth in the reference
 
 
 class Rigid(NamedTuple):
-    """The rigid scene that fits the flow, and the error of the flow. Pixels of the full size."""
+    """The best-fitting rigid scene and the error of the flow, in full-size pixels."""
 
     flow: FloatArray  # (m, 2, T)
-    error: FloatArray  # (T,) root mean square over the frames of the distance that flow to a frame and back misses by
+    error: FloatArray  # (T,) round-trip error of the flow, RMS over the frames
     clear: BoolArray  # (T,) tiles at least `MARGIN` from excluded pixels and from the edge of the picture
 
 
 def fit_rigid(clip: Clip, tracks: FlowTracks, noise: Noise) -> Rigid:
-    """Fit an inverse depth to every tile; the poses stay as they are. Needs no depth."""
+    """Fit an inverse depth to every tile, with the poses held fixed and without the prior depth."""
     height, width = clip.images.shape[2:]
     row, column = np.indices((height // TILE, width // TILE)).reshape(2, -1)
     place = (np.stack([column, row]) * TILE + 0.5 * TILE) * clip.shrink
@@ -41,7 +41,7 @@ def fit_rigid(clip: Clip, tracks: FlowTracks, noise: Noise) -> Rigid:
 
 
 def predicted_flow(clip: Clip, place: FloatArray, inverse: FloatArray) -> FloatArray:
-    """Flow (m, 2, T) of resting points at image positions `place` (2, T) of the reference, inverse depth (T,)."""
+    """Flow (m, 2, T) of static points at image positions `place` (2, T) of the reference with inverse depth (T,)."""
     found = []
     for camera, (far, near) in zip(clip.cameras, _rays(clip, place)):
         x, y, z = far + inverse * near
@@ -50,10 +50,11 @@ def predicted_flow(clip: Clip, place: FloatArray, inverse: FloatArray) -> FloatA
 
 
 def inverse_depth(clip: Clip, place: FloatArray, tiles: FloatArray) -> FloatArray:
-    """Inverse depth (T,) in the reference, over scene units, that fits the flow of the tiles (m, 2, T) best.
+    """Inverse depth (T,) in the reference, 1 / scene units, that fits the flow of the tiles (m, 2, T) best.
 
-    Least squares in pixels: f x - (u - c) z = 0 is linear in it, and is divided by z of the round before. It is at
-    least 0, and at most that of a point which another frame sees at a tenth of its depth.
+    Least squares in pixels: f x - (u - c) z = 0 is linear in the inverse depth and is divided by z of the previous
+    round. The result is at least 0 and at most the value at which another frame would see the point at a tenth of its
+    depth.
     """
     seen = tiles + place
     inverse, largest = np.zeros(place.shape[1]), np.full(place.shape[1], np.inf)
@@ -98,7 +99,7 @@ def _rays(clip: Clip, place: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def _from_to(start: Camera, other: Camera) -> tuple[FloatArray, FloatArray]:
-    """Rotation and translation from the axes of one camera to those of another."""
+    """Rotation and translation from one camera to another."""
     turn = other.rotation @ start.rotation.T
     return turn, other.translation - turn @ start.translation
 

@@ -1,12 +1,13 @@
-"""Time and memory of a configuration relative to the published one: what a plan can save.
+"""Time and memory of a configuration relative to the published one, from which a plan derives savings.
 
-Memory is counted: numbers of a Gaussian, each held three times (value and two moments). Time is a table of measured
-differences, scaled with the size of the part; `python docs/pages/bench.py measure effects` measures it again.
+Memory is the count of parameters per Gaussian, each stored three times (value and two moments). Time is a table of
+measured differences, scaled with the size of each component. `python docs/pages/bench.py measure effects` repeats the
+measurement.
 """
 
 from endotsr.config import PAPER, Config
 
-# Fraction of an iteration of the published settings that each part takes: `docs/pages/bench_effects.py`, file
+# Fraction of an iteration of the published settings that each component takes: `docs/pages/bench_effects.py`, file
 # docs/results/bench_effects.json (a test compares the two).
 MEASURED = {
     "deformation": 0.47,
@@ -17,12 +18,12 @@ MEASURED = {
     "depth": 0.01,
     "smoothness": 0.03,
 }
-ALWAYS = 11  # numbers of a Gaussian without any part: position, quaternion, log-scale, opacity
+ALWAYS = 11  # base parameters of a Gaussian: position, quaternion, log-scale, opacity
 CHANNELS = 3
 
 
 def numbers_of_a_gaussian(config: Config) -> int:
-    """Trained numbers of a Gaussian."""
+    """Trained parameters per Gaussian."""
     model = config.model
     colours = CHANNELS * (model.harmonics_degree + 1) ** 2
     bases = 3 * 10 * model.bases if model.deformation else 0  # weight, centre, width of ten channels
@@ -31,12 +32,12 @@ def numbers_of_a_gaussian(config: Config) -> int:
 
 
 def memory_fraction(config: Config) -> float:
-    """Memory of Gaussians and optimiser over that of the published settings, for equal numbers of Gaussians."""
+    """Memory of Gaussians and optimiser relative to the published settings, for equal numbers of Gaussians."""
     return numbers_of_a_gaussian(config) / numbers_of_a_gaussian(PAPER)
 
 
 def time_fraction(config: Config) -> float:
-    """Expected time of an iteration over that of the published settings."""
+    """Expected time of an iteration relative to the published settings."""
     model, loss = config.model, config.loss
     waves = model.frequencies / PAPER.model.frequencies
     coefficients = ((model.harmonics_degree + 1) ** 2 - 1) / ((PAPER.model.harmonics_degree + 1) ** 2 - 1)

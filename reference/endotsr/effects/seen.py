@@ -1,4 +1,4 @@
-"""What needs no estimate of motion: occluders in the masks, motion of the camera, highlights, faults of the depth."""
+"""Tests that need no motion estimate: occluders, camera motion, highlights, and the quality of the prior depth."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,14 @@ from endotsr.splatting.camera import camera_centre
 SATURATED, COLOURLESS = 0.98, 0.1  # a highlight: largest channel above, (max - min) / max below
 LEAST_HIGHLIGHT = 1e-3  # fraction of the tissue
 LEAST_POSE_CHANGE = 1e-9  # scene units, and elements of the rotation
-LEAST_PIXELS = 10  # with depth, for a frame to have any use
+LEAST_PIXELS = 10  # with depth, in a usable frame
 HOLES = 0.01  # fraction of the tissue
-RELATIVE = 1e-3  # of the median depth: smaller steps and smaller flicker do not matter
-MOST_LEVELS = 4096  # a frame with more values than this is not quantised
+RELATIVE = 1e-3  # of the median depth: threshold for steps and flicker
+MOST_LEVELS = 4096  # a frame with more distinct values is not quantised
 
 
 def occluder_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
-    """Whether any pixel of a training frame is excluded; a fact of the masks."""
+    """Whether the masks exclude any pixel of a training frame; a fact, not an estimate."""
     masks = sequence.masks[sequence.train_index]
     by_frame = 1.0 - masks.mean(axis=(1, 2))
     always, ever = (~masks).all(axis=0), (~masks).any(axis=0)
@@ -40,7 +40,7 @@ def occluder_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
 
 
 def camera_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
-    """Whether the poses of the training frames differ; a fact of the poses."""
+    """Whether the poses of the training frames differ; a fact, not an estimate."""
     centres = np.array([camera_centre(camera) for camera in clip.cameras])
     turns = np.array([camera.rotation for camera in clip.cameras])
     shift = float(np.abs(centres - centres[0]).max())
@@ -58,7 +58,7 @@ def camera_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
 
 
 def highlight_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
-    """Saturated and colourless tissue pixels at full size."""
+    """The verdict on saturated, colourless tissue pixels at full size."""
     fractions, sums = [], np.zeros((sequence.height, sequence.width))
     for i in sequence.train_index:
         bright = highlights(sequence.images[i]) & sequence.masks[i]
@@ -81,13 +81,13 @@ def highlight_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
 
 
 def highlights(image: NDArray[np.uint8]) -> BoolArray:
-    """(3, H, W) uint8 to (H, W) bool: the largest channel above 0.98, the smallest within a tenth of it."""
+    """(3, H, W) uint8 to (H, W) bool: largest channel above 0.98, smallest channel within 10 % of the largest."""
     largest, smallest = image.max(axis=0).astype(np.float32), image.min(axis=0).astype(np.float32)
     return (largest > SATURATED * 255) & (largest - smallest < COLOURLESS * largest)
 
 
 def depth_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
-    """Present = something is wrong with the depth. `details["usable"]` says whether any frame has enough of it."""
+    """The verdict on faults of the prior depth. `details["usable"]`: whether any frame has enough depth."""
     depth, known = clip.depth, (clip.depth > 0) & clip.masks
     by_frame = 1.0 - known.sum(axis=(1, 2)) / np.maximum(clip.masks.sum(axis=(1, 2)), 1)
     usable = [int(k.sum()) >= LEAST_PIXELS and float(np.ptp(d[k])) > 0 for d, k in zip(depth, known)]
@@ -115,7 +115,7 @@ def depth_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
 
 
 def quantisation(depth: np.ndarray, known: np.ndarray) -> float:
-    """The median difference of neighbouring distinct values of a frame, scene units; 0 if there are very many."""
+    """The median step between successive distinct values of a frame, scene units; 0 if it is not quantised."""
     steps = []
     for d, k in zip(depth, known):
         values = np.unique(d[k])
@@ -125,7 +125,7 @@ def quantisation(depth: np.ndarray, known: np.ndarray) -> float:
 
 
 def temporal_flicker(clip: Clip) -> float:
-    """MAD of the second difference over time, or over rows and columns, whichever is smaller; scene units."""
+    """The smaller of the MADs of the second differences over time and over the picture, scene units."""
     found = []
     for k in range(1, clip.count - 1):
         d = clip.depth[k - 1 : k + 2].astype(np.float64)

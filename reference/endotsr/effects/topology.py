@@ -1,13 +1,13 @@
-"""Change of topology, as by cutting: tissue that only one end of the clip shows.
+"""Change of topology, for example by cutting: tissue visible at only one end of the clip.
 
-Two frames are references: the first and the last one. Frames of both ends are moved onto each of them along their
-flow, and their local structure is correlated with that of the reference around every pixel. A pixel counts as lost
-when the frames of its own end agree with the reference and no frame of the other end does. A slit, its wound or blood
-leaves a connected region of such pixels; flow that fails here and there leaves single ones, which are dropped.
+The first and the last frame are references. Frames of both ends are warped onto each reference along their flow, and
+the local structure around every pixel is correlated with the reference. A pixel counts as lost if the frames of its own
+end agree with the reference and no frame of the other end does. A slit, its wound or blood leaves a connected region of
+lost pixels. Isolated lost pixels are flow failures and are dropped.
 
-A cut that closes again before the clip ends is not found. Tissue that is covered for good (blood, a clip, a swab) is
-found as well: either way the clip shows tissue that cannot be reached by moving what its other end shows. A camera
-that moves brings tissue into view, which looks the same: the answer is then left open.
+A cut that closes before the end of the clip is not found. Permanently covered tissue (blood, a clip, a swab) is also
+found: in both cases, no motion maps the tissue at one end to the tissue at the other. A moving camera also brings new
+tissue into view; the verdict is then "unknown".
 """
 
 from typing import NamedTuple, cast
@@ -22,33 +22,33 @@ from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import warp_bilinear
 
 WINDOW = 2.5  # Gaussian radius of the local structure, working pixels
-AGREES = 0.8  # least median correlation of the frames of the same end
-LOST = 0.5  # correlation that no frame of the other end reaches
-LEAST_FRAMES = 3  # of either end
-END_FRACTION = 1.0 / 8.0  # of the frames, that belong to an end
-LEAST_REGION = 0.003  # of the tissue that is seen from both ends
-LEAST_COMMON = 0.7  # of the agreeing pixels must be found again; below it the two ends do not show the same tissue
+AGREES = 0.8  # minimum median correlation with the frames of the same end
+LOST = 0.5  # every correlation with the other end is lower
+LEAST_FRAMES = 3  # per end
+END_FRACTION = 1.0 / 8.0  # of the frames belong to an end
+LEAST_REGION = 0.003  # of the tissue visible at both ends
+LEAST_COMMON = 0.7  # minimum fraction of agreeing pixels that are found again; below it, the ends show different tissue
 
 
 class End(NamedTuple):
-    """What one end of the clip shows and the other one does not, on the grid of its outermost frame."""
+    """Tissue visible at one end of the clip and not at the other, on the grid of the outermost frame of that end."""
 
     agrees: BoolArray  # (h, w) the frames of this end agree with its outermost one
-    seen: BoolArray  # (h, w) the other end shows the place
+    seen: BoolArray  # (h, w) the other end shows this position
     lost: BoolArray  # (h, w) agrees and seen, but no frame of the other end shows this structure
     region: int  # pixels of the largest connected region of `lost`
 
     @property
     def common(self) -> float:
-        """Fraction of the agreeing pixels that the other end shows again."""
+        """Fraction of the agreeing pixels that the other end also shows."""
         candidates = int((self.agrees & self.seen).sum())
         return 1.0 - int(self.lost.sum()) / candidates if candidates else 0.0
 
 
 def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> EffectVerdict:
-    """Whether tissue appears or vanishes for good.
+    """The verdict on tissue that appears or disappears permanently.
 
-    clear    (m,) False for training frames that blur or smoke spoils; they are not compared
+    clear    (m,) False for training frames with blur or smoke, which are not compared
     returns  kind "none", "suspected", or UNKNOWN: the ends have too little tissue in common, or the camera moves
     """
     frames = np.flatnonzero(clear)
@@ -81,19 +81,20 @@ def _end(clip: Clip, grey: FloatArray, near: np.ndarray, far: np.ndarray, sigma:
 
 
 def _median(rows: list[FloatArray]) -> FloatArray:
-    """The median over the frames that see a pixel; nan where none does."""
+    """The median over the frames that see a pixel; NaN if none does."""
     import warnings
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # "All-NaN slice": that is an answer here
+        warnings.simplefilter("ignore", RuntimeWarning)  # "All-NaN slice" is a valid result here
         return np.nanmedian(np.array(rows), axis=0)
 
 
 def local_correlation(clip: Clip, grey: FloatArray, reference: int, other: int, sigma: float) -> FloatArray:
-    """Correlation (h, w) of the structure around each pixel of a frame with that of another frame moved onto it.
+    """Correlation (h, w) of the local structure of a frame with another frame that is warped onto it.
 
-    grey    (m, h, w) the luminance of the clip; sigma is the deviation of the noise in it
-    In [-1, 1]; nan where either frame does not show tissue, or the flow leads out of the picture.
+    grey     (m, h, w) luminance of the clip
+    sigma    standard deviation of its noise
+    returns  in [-1, 1]; NaN where either frame shows no tissue or the flow leaves the picture
     """
     match = matched(clip, grey, reference, other, sigma)
     moved = warp_bilinear(match.end.astype(np.float32)[None], match.flow)[0]
@@ -101,7 +102,7 @@ def local_correlation(clip: Clip, grey: FloatArray, reference: int, other: int, 
 
 
 def _correlation(a: FloatArray, b: FloatArray, seen: BoolArray) -> FloatArray:
-    """Normalised correlation under a Gaussian window over the seen pixels."""
+    """Normalised correlation in a Gaussian window over the visible pixels."""
     from scipy.ndimage import gaussian_filter
 
     weight = seen.astype(np.float32)
@@ -112,7 +113,7 @@ def _correlation(a: FloatArray, b: FloatArray, seen: BoolArray) -> FloatArray:
     total = np.maximum(gaussian_filter(weight, WINDOW), 1e-3)
     mean_a, mean_b = mean(a), mean(b)
     variance_a, variance_b = mean(a * a) - mean_a**2, mean(b * b) - mean_b**2
-    # variances below one grey level squared are those of rounding
+    # variances below one squared grey level are rounding noise
     return (mean(a * b) - mean_a * mean_b) / np.sqrt(np.maximum(variance_a, 1.0) * np.maximum(variance_b, 1.0))
 
 
@@ -130,7 +131,7 @@ def _largest_region(lost: BoolArray) -> int:
 
 
 def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str = "") -> EffectVerdict:
-    """The answer; `why` says what leaves it open."""
+    """The verdict; `why` is the reason for an unknown one."""
     pixels = 0 if end is None else end.region * clip.shrink**2
     reason = {
         UNKNOWN: f"{why}; no change is assumed.",
@@ -144,5 +145,5 @@ def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str 
 
 
 def _picture(end: End) -> FloatArray:
-    """1 where tissue is lost, 0 where it is found again, nan where nothing can be said."""
+    """1 where tissue is lost, 0 where it is found again, NaN where unknown."""
     return np.where(end.agrees & end.seen, end.lost.astype(float), np.nan)

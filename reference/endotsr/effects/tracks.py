@@ -1,9 +1,9 @@
-"""Motion of the picture from the reference frame to every other training frame, and what noise alone would show.
+"""Image motion from the reference frame to every training frame, and the flow caused by noise alone.
 
-The pictures are first divided by their local brightness and contrast, so that a change of light is no motion, and
-what either mask excludes is set to the same value in both. Flow is dense inverse search (OpenCV). The simulated null
-is the flow between the reference frame and copies of it with fresh noise: its size in each tile states how small a
-motion that texture can show.
+The pictures are first normalised by local brightness and contrast, which removes changes of light. Pixels excluded by
+either mask get the same value in both. Flow is dense inverse search (OpenCV). The simulated null is the flow between
+the reference frame and copies of it with fresh noise. Its size in a tile is the smallest motion that the texture of the
+tile can reveal.
 """
 
 from typing import NamedTuple
@@ -17,21 +17,21 @@ from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import dense_flow, warp_bilinear
 
 LOCAL = 6.0  # Gaussian radius of the local brightness and contrast, working pixels
-GREY_STEPS = 40.0  # grey levels of one standard deviation of the local contrast
+GREY_STEPS = 40.0  # grey levels per standard deviation of the local contrast
 NULL_SEED = 20
 MOST_NULL = 16  # copies of the reference frame
-VISIBLE_FRAMES = 0.6  # a tile counts where it is tissue in at least this fraction of the frames
+VISIBLE_FRAMES = 0.6  # minimum fraction of frames in which a usable tile is tissue
 
 
 class FlowTracks(NamedTuple):
-    """Flow from the reference frame to the m training frames, pixels of the full size."""
+    """Flow from the reference frame to the m training frames, in full-size pixels."""
 
     flow: NDArray[np.float32]  # (m, 2, h, w) on the working grid
-    valid: BoolArray  # (m, h, w) tissue in the reference and, where the flow leads, in the frame
-    tiles: FloatArray  # (m, 2, T) mean of the flow in a tile; nan where it is not seen
-    usable: BoolArray  # (T,) tiles that enough frames see
-    null: FloatArray  # (T,) root mean square of the flow that noise alone makes
-    aligned: NDArray[np.float32]  # (m, 3, h, w) the frames moved onto the reference, display units
+    valid: BoolArray  # (m, h, w) tissue in the reference and, at the end of the flow, in the frame
+    tiles: FloatArray  # (m, 2, T) mean flow of a tile; NaN where it is not visible
+    usable: BoolArray  # (T,) tiles visible in enough frames
+    null: FloatArray  # (T,) RMS of the flow caused by noise alone
+    aligned: NDArray[np.float32]  # (m, 3, h, w) the frames warped onto the reference, display units
 
 
 class Match(NamedTuple):
@@ -40,11 +40,11 @@ class Match(NamedTuple):
     start: NDArray[np.uint8]  # (h, w) `normalised`
     end: NDArray[np.uint8]  # (h, w)
     flow: NDArray[np.float32]  # (2, h, w) working pixels; exactly 0 from a frame to itself
-    seen: BoolArray  # (h, w) tissue in the first and, where the flow leads, in the second
+    seen: BoolArray  # (h, w) tissue in the first and, at the end of the flow, in the second
 
 
 def matched(clip: Clip, grey: FloatArray, start: int, end: int, sigma: float) -> Match:
-    """The flow between two training frames by number. grey: the luminance of the clip (m, h, w)."""
+    """The flow between training frames number `start` and `end`. grey: luminance of the clip (m, h, w)."""
     common = clip.masks[start] & clip.masks[end]
     before, after = (normalised(grey[k], common, sigma) for k in (start, end))
     flow = np.zeros((2, *common.shape), np.float32) if start == end else dense_flow(before, after)
@@ -70,25 +70,25 @@ def make_tracks(clip: Clip, noise: Noise) -> FlowTracks:
 
 
 def without_frames(tracks: FlowTracks, spoiled: BoolArray) -> FlowTracks:
-    """The tracks with some frames (m,) not seen; tiles that too few of the other frames see are dropped."""
+    """The tracks without the spoiled frames (m,). Tiles that too few of the other frames see become unusable."""
     tiles = np.where(spoiled[:, None, None], np.nan, tracks.tiles)
     return tracks._replace(tiles=tiles, usable=_usable(tiles, tracks.null, max(int((~spoiled).sum()), 1)))
 
 
 def _usable(tiles: FloatArray, null: FloatArray, count: int) -> BoolArray:
-    """Tiles (T,) that enough of `count` frames see, and whose null is known."""
+    """Tiles (T,) that are visible in enough of `count` frames and have a known null."""
     return (np.isfinite(tiles[:, 0]).sum(axis=0) / count >= VISIBLE_FRAMES) & np.isfinite(null)
 
 
 def inside(flow: FloatArray) -> BoolArray:
-    """(h, w) True where the flow (2, h, w) leads to a place inside the picture."""
+    """(h, w) True where the flow (2, h, w) ends inside the picture."""
     height, width = flow.shape[1:]
     x, y = np.arange(width) + flow[0], np.arange(height)[:, None] + flow[1]
     return (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
 
 
 def normalised(grey: FloatArray, mask: BoolArray, sigma: float) -> NDArray[np.uint8]:
-    """(grey - local mean) / local deviation over tissue, 40 grey levels a deviation about 128; 128 elsewhere."""
+    """(grey - local mean) / local deviation over tissue, as 128 + 40 grey levels per deviation; 128 elsewhere."""
     from scipy.ndimage import gaussian_filter
 
     weight = mask.astype(np.float32)
@@ -100,7 +100,7 @@ def normalised(grey: FloatArray, mask: BoolArray, sigma: float) -> NDArray[np.ui
 
 
 def noise_flow(grey: FloatArray, mask: BoolArray, sigma: float, copies: int) -> FloatArray:
-    """Root mean square, by tile (T,), of the mean flow to copies with fresh noise, working pixels; nan off tissue."""
+    """RMS per tile (T,) of the mean flow to copies with fresh noise, working pixels; NaN off tissue."""
     rng = np.random.default_rng(NULL_SEED)
     start, squares = normalised(grey, mask, sigma), []
     for _ in range(copies):

@@ -1,4 +1,4 @@
-"""The answer of one test: whether an effect is present, how sure that is, and a picture or a curve that shows it."""
+"""The result of one test: presence of an effect, confidence, and a map or curve for display."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from endotsr.kernels.arrays import FloatArray
 
-UNKNOWN = "unknown"  # kind of a verdict that the clip does not allow
+UNKNOWN = "unknown"  # kind of a verdict for which the clip is insufficient
 
 
 class Curve(NamedTuple):
@@ -20,7 +20,7 @@ class Curve(NamedTuple):
 
 
 class Map(NamedTuple):
-    """A quantity over the working picture; nan where it is not known."""
+    """A quantity over the working picture; NaN where unknown."""
 
     name: str  # of the quantity, with its unit
     values: FloatArray  # (h, w)
@@ -31,12 +31,12 @@ class EffectVerdict(NamedTuple):
 
     effect: str  # key of `inspect.EFFECTS`
     present: bool
-    kind: str  # what was found, in a word or two: "none", "periodic", "white balance"
+    kind: str  # one or two words: "none", "periodic", "white balance"
     statistic: float
-    threshold: float  # of the statistic; at or above it the effect is present
+    threshold: float  # of the statistic; the effect is present at or above it
     unit: str  # of both
-    test: str  # what the statistic is, in words
-    false_positive_rate: float  # designed rate; 0 where the answer is a fact and no estimate
+    test: str  # description of the statistic
+    false_positive_rate: float  # designed rate; 0 for a fact
     reason: str  # one sentence
     details: Mapping[str, Any] = MappingProxyType({})  # JSON-able numbers, by name
     curve: Curve | None = None
@@ -44,10 +44,10 @@ class EffectVerdict(NamedTuple):
 
     @property
     def confidence(self) -> float:
-        """0.5 at the threshold, towards 1 on either side: 1 - (smaller / larger)^2 / 2 of statistic and threshold.
+        """1 - (smaller / larger)^2 / 2 of statistic and threshold: 0.5 at the threshold, towards 1 on either side.
 
-        A measure of the distance from the threshold, not a probability; 1 where the answer is a fact, and 0.5 where the
-        kind is "unknown".
+        This measures the distance from the threshold and is not a probability. It is 1 for a fact and 0.5 for
+        "unknown".
         """
         if self.kind == UNKNOWN:
             return 0.5

@@ -1,9 +1,9 @@
-"""Whether the views differ enough to tell view-dependent colour of each degree from constant colour.
+"""Whether the views differ enough to separate view-dependent colour of each degree from constant colour.
 
-For points of the reference depth, the harmonics of a degree are evaluated in the directions from which the training
-cameras see them. What the lower degrees already explain is removed. The root mean square of the rest says how much a
-coefficient of that degree changes the colour between frames; a coefficient of `TYPICAL` must change it visibly, by more
-than half a grey level. A fixed camera sees every resting point from one direction: no degree above 0 is determined.
+For points of the reference depth, the harmonics of a degree are evaluated along the view directions of the training
+cameras, and the part explained by lower degrees is removed. The root mean square of the residual is the change of
+colour between frames per unit coefficient. A coefficient of `TYPICAL` must change the colour visibly, by more than half
+a grey level. A fixed camera sees every static point along one direction and determines only degree 0.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import backproject, camera_centre
 from endotsr.splatting.harmonics_formulas import harmonic_basis
 
-TYPICAL = 0.1  # coefficient of trained scenes, display units
+TYPICAL = 0.1  # typical coefficient of trained scenes, display units
 LEAST_CHANGE = 0.5 / 255.0  # display units
 POINTS = 64
 SEED = 21
@@ -24,7 +24,7 @@ HIGHEST = 3
 
 
 def view_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
-    """The highest degree that the views determine; `kind` is "degree D"."""
+    """The verdict on the highest degree that the views determine; `kind` is "degree D"."""
     test = "change of colour by a typical coefficient of degree 1 between frames"
     if sequence.static_camera:
         return EffectVerdict("view change", False, "degree 0", 0.0, LEAST_CHANGE, "display units", test, 0.0,
@@ -58,10 +58,10 @@ def view_directions(clip: Clip) -> FloatArray:
 
 
 def degree_change(directions: FloatArray, degree: int) -> float:
-    """Root mean square over frames of TYPICAL x the strongest harmonic of this degree, lower degrees removed."""
+    """RMS over frames of TYPICAL x the strongest harmonic of this degree, without the lower degrees."""
     lower, own = harmonic_design(directions, degree - 1), harmonic_design(directions, degree)
     own = own[:, lower.shape[1] :]
-    # directions of the lower degrees that are rounding noise explain nothing
+    # singular directions at rounding level are ignored
     left, sizes, _ = np.linalg.svd(lower, full_matrices=False)
     basis = left[:, sizes > 1e-6 * sizes[0]]
     rest = own - basis @ (basis.T @ own)
@@ -69,14 +69,14 @@ def degree_change(directions: FloatArray, degree: int) -> float:
 
 
 def harmonic_design(directions: FloatArray, degree: int) -> FloatArray:
-    """Harmonics of degree 0 ... `degree` in the directions (m, 3), one row a direction, (degree + 1)^2 columns."""
-    formula = harmonic_basis.py_func  # the formula itself: a few thousand directions need no compiled code
+    """Harmonics of degree 0 ... `degree` along directions (m, 3): one row per direction, (degree + 1)^2 columns."""
+    formula = harmonic_basis.py_func  # uncompiled: there are only a few thousand directions
     rows = [(Y00, *formula(*map(float, direction))) for direction in directions]
     return np.array(rows)[:, : (degree + 1) ** 2]
 
 
 def harmonic_sizes(clip: Clip) -> FloatArray:
-    """Mean of |Y_k| over the directions of the pixels of the reference camera, in world axes, (16,)."""
+    """Mean |Y_k| over the pixel directions of the reference camera in world axes, (16,)."""
     camera = clip.cameras[clip.reference]
     u, v = (np.linspace(0, side - 1, 9).ravel() for side in (camera.width, camera.height))
     column, row = (axis.ravel() for axis in np.meshgrid(u, v))

@@ -75,8 +75,7 @@ def _maps(
 
 
 def remapped(picture: Array, maps: Maps, nearest: bool = False) -> Array:
-    """A picture (H, W) or (H, W, 3) in the new camera, by bicubic or nearest interpolation; 0 outside the old
-    picture."""
+    """A picture (H, W) or (H, W, 3) in the new camera, bicubic or nearest pixel; 0 outside the old picture."""
     cv2 = cv2_library()
     method = cv2.INTER_NEAREST if nearest else cv2.INTER_CUBIC
     return cv2.remap(np.ascontiguousarray(picture), maps.x, maps.y, method, borderMode=cv2.BORDER_CONSTANT)

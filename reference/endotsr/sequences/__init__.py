@@ -1,1 +1,1 @@
-"""Reading sequences: EndoNeRF folders, splits, validation, prior depth. Every error names file, frame and reason."""
+"""Reading, checking and preparing sequences. Every error names file, frame and reason."""

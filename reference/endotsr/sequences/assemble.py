@@ -1,8 +1,7 @@
-"""From the files of the frames to a checked `Sequence`: what is the same for every layout.
+"""From the files of the frames to a checked `Sequence`: the steps common to all layouts.
 
-Comes in: the selected files with their readers, and the cameras. Goes out: a `Sequence` whose notes state every
-assumption, or an `InputError`. The order of the steps: reading, world, tissue fraction and polarity, depth, scaling,
-split.
+In: the selected files and the cameras. Out: a `Sequence` whose notes state every assumption, or an `InputError`. The
+steps, in order: reading, world, tissue fraction and polarity, depth, scaling, split.
 """
 
 from pathlib import Path
@@ -29,11 +28,11 @@ NO_MASKS = "no masks: every pixel counts as tissue, instruments included"
 def assemble(
     files: FrameFiles, cameras: list[Camera], config: SequenceConfig, near: float, folder: Path, notes: list[str]
 ) -> Sequence:
-    """The frames read, checked, scaled and split.
+    """Read, check, scale and split the frames.
 
-    cameras  one of each frame; one and the same object where the camera is static
-    near     near plane, scene units: depth that lies wholly in front of it is refused
-    notes    sentences so far; the sequence has them first
+    cameras  one per frame; the same object for all frames of a static camera
+    near     near plane, scene units; a sequence whose depth is entirely in front of it is refused
+    notes    existing notes; new ones are appended
 
     Raises:  InputError (see the module docstring).
     """
@@ -80,14 +79,14 @@ def assemble(
 
 
 def check_percentiles(config: SequenceConfig) -> None:
-    """Raises InputError for percentiles of the depth that are not ascending values in [0, 100]."""
+    """Raises InputError unless the depth percentiles are two ascending values in [0, 100]."""
     low, high = config.depth_percentiles
     if not 0 <= low < high <= 100:
         raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: two ascending values in [0, 100]")
 
 
 def _mask_notes(frames: Frames, files: FrameFiles, config: SequenceConfig) -> list[str]:
-    """The note on the masks: polarity, tissue fraction, evidence. Raises InputError for masks that look inverted."""
+    """The note on the masks: polarity, tissue fraction, evidence. Raises InputError for masks that seem inverted."""
     if not files.masks:
         return [NO_MASKS]
     where, excluded, allow = files.masks[0].parent, files.excluded_value, config.allow_tissue_fraction
@@ -97,9 +96,9 @@ def _mask_notes(frames: Frames, files: FrameFiles, config: SequenceConfig) -> li
 
 
 def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path], unit: str) -> str:
-    """The note on the prior depth. Raises InputError for a sequence without any."""
+    """The note on the prior depth. Raises InputError for a sequence without depth."""
     where = files[0].parent
-    rows = [_extent(plane, near) for plane in depth]  # frame by frame: no array over all frames is made
+    rows = [_extent(plane, near) for plane in depth]  # frame by frame, without an array over all frames
     known, before = sum(row.known for row in rows), sum(row.before for row in rows)
     if not known:
         raise InputError(f"{where}: no pixel of the {len(depth)} frames has a depth")
@@ -112,15 +111,15 @@ def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path], unit
         f"depth in {unit}, {nearest:g} to {farthest:g} after clipping;"
         f" missing on {1 - known / depth.size:.4f} of the pixels"
         + (f"; frames without any: {', '.join(map(str, empty))}" if empty else "")
-        + (f"; {behind:.1%} of it lies in front of the near plane at {near:g}" if behind else "")
+        + (f"; {behind:.1%} of it is in front of the near plane at {near:g}" if behind else "")
     )
 
 
 class _Extent(NamedTuple):
-    """The prior depth of a frame in numbers."""
+    """Statistics of the prior depth of a frame."""
 
     known: int  # pixels with depth
-    before: int  # of them, up to the near plane
+    before: int  # pixels with depth up to the near plane
     nearest: np.floating
     farthest: np.floating
 
@@ -137,7 +136,7 @@ def _scaled(
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
     scale = config.scale
     if scale > 1:
-        raise InputError(f"{where}: scale {scale:g}: images are only reduced; allowed: values in (0, 1]")
+        raise InputError(f"{where}: scale {scale:g}: images can only be reduced; allowed: values in (0, 1]")
     old_height, old_width = images.shape[2:]
     width, height = round(old_width * scale), round(old_height * scale)
     if min(width, height) < LEAST_SIDE:

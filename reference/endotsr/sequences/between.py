@@ -1,13 +1,14 @@
-"""A picture between two training frames, made from both along dense optical flow (specification B14).
+"""A picture between two training frames, interpolated along dense optical flow (specification B14).
 
-With the flows f from the earlier frame to the later and g back, the motion field at the moment a in [0, 1] solves
+With the flows f from the earlier frame to the later and g back, the motion field at the time fraction a in [0, 1]
+solves
 
     v_0(x) = f(x - a v_0(x)),    v_1(x) = -g(x + (1 - a) v_1(x)),    v = (1 - a) v_0 + a v_1.
 
-A pixel x shows either the pair that moved, I_0(x - a v(x)) and I_1(x + (1 - a) v(x)), or the pair that stayed, I_0(x)
-and I_1(x). Each pair is blended in time, and the two blends are mixed with weights inverse to the local squared
-difference within the pair: where the flow is wrong, its two pictures disagree. A pixel counts as tissue where one of
-the frames is tissue at its moved place, and is made of the frames that are.
+A pixel x blends the warped pair I_0(x - a v(x)) and I_1(x + (1 - a) v(x)) in time, and likewise the unwarped pair
+I_0(x) and I_1(x). The two blends are mixed with weights inverse to the local squared difference within each pair: where
+the flow is wrong, the warped pictures disagree. A pixel is tissue if at least one frame is tissue at its warped
+position, and is blended from those frames only.
 
 In: a sequence and the indices of two training frames. Out: a `Frame`. No held-out picture is read.
 """
@@ -21,21 +22,21 @@ from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 
-STEPS = 3  # fixed-point steps for v_0 and v_1; smooth flow contracts, and a fourth step moves it by under 0.05 px
-WHOLE = 0.999  # bilinear weight of tissue, or of pixels with a prior depth, above which all four neighbours are
+STEPS = 3  # fixed-point steps for v_0 and v_1; for smooth flow, a fourth step changes under 0.05 px
+WHOLE = 0.999  # bilinear weight above which all four neighbours are tissue, or have a prior depth
 NEARBY = 2.0  # px, standard deviation of the Gaussian window of the differences; 1 to 4 give the same within 0.1 dB
-ONE_STEP = (1 / 255) ** 2  # squared difference that 8-bit pictures of the same thing have
+ONE_STEP = (1 / 255) ** 2  # squared difference of one grey level, the rounding of 8-bit pictures
 
 
 class Flows(NamedTuple):
-    """Dense flow between two frames, both ways."""
+    """Dense flow between two frames, in both directions."""
 
     forward: FloatArray  # (2, H, W) px, x first: earlier -> later
     backward: FloatArray  # (2, H, W) px: later -> earlier
 
 
 def flows_between(sequence: Sequence, earlier: int, later: int) -> Flows:
-    """Dense flow between two frames of a sequence, both ways."""
+    """Dense flow between two frames of a sequence, in both directions."""
     from endotsr.opencv import dense_flow
 
     a, b = sequence.images[earlier], sequence.images[later]
@@ -43,13 +44,13 @@ def flows_between(sequence: Sequence, earlier: int, later: int) -> Flows:
 
 
 def motion_between(flows: Flows, fraction: float) -> FloatArray:
-    """The motion field v at the moment `fraction` (B14).
+    """The motion field v at the time fraction `fraction` (B14).
 
     fraction  a in [0, 1]: 0 is the earlier frame, 1 the later
-    returns   (2, H, W) px from the earlier frame to the later, at the place where a point is at that moment
+    returns   (2, H, W) px from the earlier frame to the later, at the position of a point at that time
 
-    Edges:   equal flows in opposite directions give that flow at every moment. Swapping the frames and a -> 1 - a
-             changes the sign of the field and nothing else.
+    Edges:   constant opposite flows give that flow at every time. Swapping the frames and a -> 1 - a only changes the
+             sign of the field.
     """
     from endotsr.opencv import warp_bilinear
 
@@ -62,15 +63,15 @@ def motion_between(flows: Flows, fraction: float) -> FloatArray:
 
 
 def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
-    """The picture, tissue mask and prior depth at a moment between two frames, as `Frame` (B14).
+    """The picture, tissue mask and prior depth at a time between two frames, as a `Frame` (B14).
 
-    earlier, later  frame indices; the frames may be any distance apart
+    earlier, later  frame indices, any distance apart
     fraction        a in [0, 1]
-    flows           of `flows_between` for these frames
+    flows           from `flows_between` for these frames
     returns         Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior;
-                    time and camera are interpolated
+                    time and camera interpolated
 
-    Reverse: none; the result is a constant of the training.
+    Reverse: none; the result is held fixed during training.
     """
     from endotsr.opencv import warp_bilinear, warp_cubic
 
@@ -95,36 +96,36 @@ def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float,
 
 
 def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArray, weights: FloatArray) -> FloatArray:
-    """(3, H, W) the moved and the still pair of pictures, mixed by how little the two pictures of each differ nearby.
+    """(3, H, W) the warped and the unwarped pair, mixed with weights inverse to the local difference within each.
 
-    moved, still  (2, 3, H, W)
-    seen          (2, H, W) the moved pictures are tissue
-    both          (H, W) both pairs are tissue in both frames; elsewhere the moved pictures alone are used
+    moved, still  (2, 3, H, W) warped, unwarped
+    seen          (2, H, W) the warped pictures are tissue
+    both          (H, W) both pairs are tissue in both frames; elsewhere only the warped pictures are used
     weights       (2,) of the two frames
     """
     of_moved, of_still = _difference(moved), _difference(still)
-    fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the still pair: (18.7), (18.9)
+    fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the unwarped pair: (18.7), (18.9)
     return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)  # (18.6)
 
 
 def _difference(pair: FloatArray) -> FloatArray:
-    """(H, W) mean squared difference of two pictures (2, 3, H, W) around a pixel, at least `ONE_STEP`."""
+    """(H, W) local mean squared difference of two pictures (2, 3, H, W), at least `ONE_STEP`."""
     from endotsr.opencv import gaussian_blur
 
     return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)  # (18.8)
 
 
 def _blended(pair: FloatArray, usable: BoolArray, weights: FloatArray) -> FloatArray:
-    """The planes (2, ..., H, W) of two frames, blended where both are usable, else the usable one, else 0."""
+    """The planes (2, ..., H, W) of two frames, blended where both are usable; else the usable one, else 0."""
     part = weights[:, None, None] * usable
     part = part / np.maximum(part.sum(axis=0), np.finfo(np.float32).tiny)
     return (part.reshape(2, *(1,) * (pair.ndim - 3), *usable.shape[1:]) * pair).sum(axis=0)
 
 
 def camera_between(earlier: Camera, later: Camera, fraction: float) -> Camera:
-    """The camera at a moment between two: the centre on the straight line, the rotation at constant angular speed.
+    """The camera at a time between two cameras: linear centre, rotation at constant angular speed, linear intrinsics.
 
-    Edges: the same object twice is returned as it is. Intrinsics are interpolated linearly.
+    Edges:   the same object twice is returned unchanged.
     """
     if earlier is later:
         return earlier

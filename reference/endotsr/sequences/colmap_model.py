@@ -1,7 +1,7 @@
 """COLMAP models, text or binary: cameras, images with their poses, and points.
 
-In: a folder with cameras, images and points3D (.txt or .bin). Out: a `ColmapModel`. COLMAP's conventions are this
-project's: world-to-camera, OpenCV axes, the centre of the first pixel at (0.5, 0.5). Quaternions are w x y z.
+In: a folder with cameras, images and points3D (.txt or .bin). Out: a `ColmapModel`. COLMAP has the conventions of this
+project: world-to-camera, OpenCV axes, first pixel centre at (0.5, 0.5). Quaternions are w x y z.
 """
 
 import struct
@@ -18,7 +18,7 @@ from endotsr.untrusted.files import read_bytes, read_text
 
 LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations
 
-# Name -> (number in binary files, where fx fy cx cy and the distortion k1 k2 p1 p2 ... are among the parameters).
+# Name -> (number in binary files, parameter indices of fx fy cx cy and of the distortion k1 k2 p1 p2 ...).
 MODELS: dict[str, tuple[int, tuple[int, int, int, int], tuple[int | None, ...]]] = {
     "SIMPLE_PINHOLE": (0, (0, 0, 1, 2), ()),
     "PINHOLE": (1, (0, 1, 2, 3), ()),
@@ -37,7 +37,7 @@ class ModelImage(NamedTuple):
     name: str
     camera: int
     pose: CameraPose
-    points: NDArray[np.int64]  # identities of the points it sees
+    points: NDArray[np.int64]  # ids of the visible points
 
 
 class ColmapModel(NamedTuple):
@@ -45,11 +45,11 @@ class ColmapModel(NamedTuple):
 
     cameras: dict[int, Lens]
     images: list[ModelImage]  # by name
-    points: dict[int, FloatArray]  # identity -> (3,)
+    points: dict[int, FloatArray]  # id -> (3,)
 
 
 def find_model(path: Path) -> Path | None:
-    """The folder of the model: the path itself, sparse/0, sparse or colmap/sparse/0 inside it; None without one."""
+    """The folder of the model: the path or its sparse/0, sparse or colmap/sparse/0; None without a model."""
     for folder in (path, path / "sparse" / "0", path / "sparse", path / "colmap" / "sparse" / "0"):
         if any((folder / f"cameras{ending}").is_file() for ending in (".txt", ".bin")):
             return folder
@@ -57,9 +57,9 @@ def find_model(path: Path) -> Path | None:
 
 
 def read_model(folder: Path) -> ColmapModel:
-    """The model in a folder; text is preferred where both forms exist.
+    """The model in a folder. Text files take precedence over binary files.
 
-    Raises:  InputError naming the file and the line, or the byte, at which it departs from the format.
+    Raises:  InputError naming the file, and the line or entry that violates the format.
     """
     text = (folder / "cameras.txt").exists()
     ending = ".txt" if text else ".bin"
@@ -120,7 +120,7 @@ def _cameras_text(path: Path) -> dict[int, Lens]:
 def _images_text(path: Path) -> list[ModelImage]:
     lines, found = _lines(path), []
     while lines and not lines[-1][1].strip() and len(lines) % 2:
-        lines.pop()  # an empty line at the end; inside, an empty line means no points
+        lines.pop()  # trailing empty line; elsewhere, an empty line means no points
     for (number, line), (_, seen) in zip(lines[::2], [*lines[1::2], (0, "")]):
         words, where = line.split(maxsplit=9), f"{path}: line {number}"
         try:
@@ -145,13 +145,13 @@ def _points_text(path: Path) -> dict[int, FloatArray]:
 
 
 class _Bytes:
-    """A binary file, read from its beginning."""
+    """Sequential reader of a binary file."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.place, self.data = path, 0, read_bytes(path, LARGEST_FILE)
 
     def take(self, form: str) -> tuple:
-        """The next values of a form of `struct`, little-endian. Raises InputError at the end of the file."""
+        """The next values of a `struct` format, little-endian. Raises InputError at the end of the file."""
         size = struct.calcsize("<" + form)
         if self.place + size > len(self.data):
             raise InputError(f"{self.path}: ends after {len(self.data)} bytes; {self.place + size} are needed")
@@ -160,14 +160,14 @@ class _Bytes:
         return values
 
     def count(self, least: int) -> int:
-        """A number of entries of at least `least` bytes each, checked against what the file can hold."""
+        """A count of entries of at least `least` bytes each, checked against the size of the file."""
         (number,) = self.take("Q")
         if number * least > len(self.data) - self.place:
             raise InputError(f"{self.path}: states {number} entries; the file has {len(self.data)} bytes")
         return number
 
     def name(self) -> str:
-        """A text that ends with a zero byte."""
+        """A zero-terminated string."""
         end = self.data.find(b"\0", self.place)
         if end < 0:
             raise InputError(f"{self.path}: a name has no end")

@@ -1,8 +1,8 @@
-"""Reading the common format: `sequence.toml` beside `images/`, `masks/`, `depth/` and `images_right/`.
+"""Reading the common format: `sequence.toml` with `images/`, `masks/`, `depth/` and `images_right/`.
 
-In: a folder and the `SequenceConfig`. Out: a `Sequence`, or a `Recording` for `prepare` and `depth`. The fields of
-`sequence.toml` are described in `sequence_file`. The file states the units and the polarity of the masks, which
-`sequence.excluded_value = "black"` replaces.
+In: a folder and the `SequenceConfig`. Out: a `Sequence`, or a `Recording` for `prepare` and `depth`. `sequence_file`
+describes the fields of `sequence.toml`. The file states the units and the polarity of the masks; the setting
+`sequence.excluded_value = "black"` overrides the polarity.
 """
 
 from collections.abc import Iterator
@@ -58,9 +58,9 @@ def recognises(path: Path) -> bool:
 
 
 def list_contents(folder: Path, poses: bool = True) -> Contents:
-    """List and pair the files; without the poses, their faults do not matter.
+    """List and pair the files. `poses=False` ignores faults of the poses.
 
-    Raises:  InputError for a file without its partner, a number that disagrees, or a pose that is none.
+    Raises:  InputError for a file without its partner, a contradicting frame count, or an invalid pose.
     """
     folder = Path(folder)
     found = read_sequence_file(folder)
@@ -79,7 +79,7 @@ def list_contents(folder: Path, poses: bool = True) -> Contents:
 
 
 def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, range]:
-    """The contents that a training reads, and the selected frames. Raises InputError for what cannot be trained on."""
+    """The contents read by training, and the selected frames. Raises InputError for contents unusable for training."""
     contents = list_contents(folder)
     if contents.file.camera.distortion and any(contents.file.camera.distortion):
         raise InputError(
@@ -89,7 +89,7 @@ def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, ran
     if not contents.depth:
         remedy = "`endotsr depth` makes it from the stereo pair" if contents.right else ONE_CAMERA
         if contents.right and not contents.file.camera.baseline:
-            remedy += f", once [camera] baseline, the distance of the two cameras, is stated in {FILE_NAME}"
+            remedy += f", once [camera] baseline, the distance between the two cameras, is stated in {FILE_NAME}"
         raise InputError(f"{folder}: no depth: [depth] is missing in {FILE_NAME}; {remedy}")
     if config.masks == "gt_masks":
         raise InputError(
@@ -107,7 +107,7 @@ def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, ran
 
 
 def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
-    """Read the frames that `config` selects; the steps are those of `read_endonerf`.
+    """Read the frames that `config` selects, with the steps of `read_endonerf`.
 
     near     near plane, scene units
 
@@ -117,15 +117,15 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     contents, frames_read = select_contents(folder, config)
     notes = [f"source: {contents.file.source}"] if contents.file.source else []
     if contents.file.masks and contents.file.masks.proposed and contents.masks:
-        notes.append("masks: proposed by a program, checked by nobody")
+        notes.append("masks: proposed by a program, not checked by a person")
     excluded, stated_in = polarity(contents.file, contents.folder, config)
     if contents.masks and not stated_in and contents.file.masks and excluded != contents.file.masks.excluded_value:
-        notes.append(f"sequence.excluded_value = {excluded!r} takes the place of that of {FILE_NAME}")
+        notes.append(f"sequence.excluded_value = {excluded!r} overrides the value in {FILE_NAME}")
     entry, times, camera = contents.file.depth, contents.file.times, contents.file.camera
     assert entry is not None
     if entry.clipped and entry.clipped == list(config.depth_percentiles):
         config = msgspec.structs.replace(config, depth_percentiles=EVERYTHING)
-        notes.append(f"depth: clipped to its percentiles {entry.clipped} before it was reduced, and not again")
+        notes.append(f"depth: clipped to its percentiles {entry.clipped} when it was resized, and not again")
     if entry.assumed:
         notes.append(f"not metric: {entry.method}; {KINDS['assumed-depth'].why}")
     files = FrameFiles(
@@ -157,9 +157,9 @@ def _duration(file: SequenceFile, frames: range | list[int]) -> float:
 
 
 def polarity(file: SequenceFile, folder: Path, config: SequenceConfig) -> tuple[str, str]:
-    """The excluded value of the masks, and the file that states it; "" where the settings do.
+    """The excluded value of the masks, and the file that states it; "" if the settings state it.
 
-    The file states it. The setting takes its place where it is not the default, white.
+    A setting other than the default, white, overrides the file.
     """
     stated = file.masks.excluded_value if file.masks else "white"
     return (config.excluded_value, "") if stated == "white" else (stated, str(Path(folder) / FILE_NAME))
@@ -173,7 +173,7 @@ def common_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
 
 
 def cameras_of(contents: Contents) -> list[Camera]:
-    """One camera a frame; one and the same object where it does not move."""
+    """One camera per frame; the same object for all frames of a static camera."""
     entry, count = contents.file.camera, len(contents.images)
     lens = (entry.fx, entry.fy, entry.cx, entry.cy, entry.width, entry.height)
     poses = contents.poses
@@ -195,7 +195,7 @@ def _colour(contents: Contents, path: Path) -> NDArray[np.uint8]:
 
 
 def open_common(folder: Path) -> Recording:
-    """The whole folder as a recording, nothing decoded yet; a pose that is none becomes a gap. Raises InputError."""
+    """The whole folder as a recording, decoded on demand. An invalid pose becomes a gap. Raises InputError."""
     contents = list_contents(folder, poses=False)
     found = contents.file
     poses, faults = read_poses_with_gaps(found, folder / FILE_NAME)

@@ -1,4 +1,4 @@
-"""Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .pfm, and OpenEXR where OpenCV has it."""
+"""Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .pfm, and OpenEXR if OpenCV supports it."""
 
 import re
 from pathlib import Path
@@ -15,9 +15,9 @@ from endotsr.sequences.recording import grey_plane
 from endotsr.untrusted import arrays as untrusted
 from endotsr.untrusted.files import read_bytes
 
-CLIPPED = SequenceConfig().depth_percentiles  # by which depth is clipped before it is reduced
-ANOTHER_SCALE = 64.0  # times the usual median depth: 8 bits stretched to 16 make 256
-LEAST_DEPTH_FRACTION = 0.05  # of a frame: the median of fewer pixels may be that of a few outliers
+CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
+ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
+LEAST_DEPTH_FRACTION = 0.05  # of a frame; the median of fewer pixels may be an outlier
 DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
@@ -25,7 +25,7 @@ ALLOWED = "allowed: an .npy file of numbers"
 
 
 def read_plane(path: Path) -> NDArray:
-    """The numbers (H, W) of a file as stored; an axis of length 1 is dropped.
+    """The values (H, W) of a file as stored. Axes of length 1 are dropped.
 
     Raises:  InputError naming the file and the reason.
     """
@@ -40,12 +40,12 @@ def read_plane(path: Path) -> NDArray:
 
 
 def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) -> NDArray:
-    """The array of an .npy file. Pickled objects are never loaded.
+    """The array of real numbers in an .npy file. Pickled objects are never loaded.
 
-    largest  bytes that the file may have
-    allowed  what the message says of the files that can be read
+    largest  size limit, bytes
+    allowed  allowed files, for the message
 
-    Raises:  InputError if the file is missing, no .npy file, truncated, or holds anything but real numbers.
+    Raises:  InputError for a missing, invalid or truncated file, and for anything but real numbers.
     """
     try:
         array = untrusted.read_npy(Path(path), largest)
@@ -57,7 +57,7 @@ def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) ->
 
 
 def read_pfm(path: Path) -> NDArray[np.float32]:
-    """The plane (H, W) of a grey PFM file, top row first. Raises InputError for any other file."""
+    """The plane (H, W) of a greyscale PFM file, top row first. Raises InputError for any other file."""
     data = read_bytes(Path(path), LARGEST_FILE)
     header = PFM_HEADER.match(data)
     if not header or header[1] != b"Pf":
@@ -72,9 +72,9 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
 
 
 def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32]:
-    """Depth (H, W) in scene units; what is no depth (0, negative, not finite) becomes 0.
+    """Depth (H, W) in scene units, from stored values times `scale`. Invalid values (0, negative, not finite) become 0.
 
-    Raises:  InputError if no value of a floating-point file is finite, or values leave the range of float32.
+    Raises:  InputError if no value of a floating-point file is finite, or if a value exceeds the range of float32.
     """
     if raw.dtype.kind == "f" and raw.size and not np.isfinite(raw).any():
         raise InputError(f"{where}: no value is finite; allowed: lengths, and 0 where there is no depth")
@@ -87,7 +87,7 @@ def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32
 
 
 def clip_depth(depth: NDArray, percentiles: tuple[float, float]) -> NDArray[np.float32]:
-    """Depth clipped to two percentiles of its non-zero values; 0 (no depth) stays 0. (H, W) to (H, W) float32."""
+    """Depth (H, W) clipped to two percentiles of its non-zero values, as float32. 0 (no depth) stays 0."""
     result = depth.astype(np.float32)
     valid = result > 0
     if valid.any():
@@ -97,16 +97,16 @@ def clip_depth(depth: NDArray, percentiles: tuple[float, float]) -> NDArray[np.f
 
 
 def reduced_depth(depth: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
-    """Depth (H, W) at a smaller size: the mean of the depths that a new pixel covers; 0 where it covers none."""
+    """Depth (H, W) at a smaller size: the mean of the depths that a new pixel covers, or 0 if it covers none."""
     fraction = area_resize((depth > 0).astype(np.float32), width, height)
     found = np.zeros(fraction.shape, np.float32)
     return np.divide(area_resize(depth, width, height), fraction, out=found, where=fraction > 0)
 
 
 def check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list[np.dtype], unit: str) -> None:
-    """Refuse a depth picture that is scaled to 16 bits while others hold lengths in 8 bits.
+    """Refuse a depth picture that is stretched to 16 bits among pictures with lengths in 8 bits.
 
-    Mixed bit depths alone are legal and occur in published sequences: one far value makes a picture 16-bit.
+    Mixed bit depths are valid and occur in published sequences: one large value makes a picture 16-bit.
     """
     for i, ratio in far_off(depth, ANOTHER_SCALE) if len(set(types)) > 1 else []:
         if np.count_nonzero(depth[i]) >= LEAST_DEPTH_FRACTION * depth[i].size:
@@ -119,7 +119,7 @@ def check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list
 
 
 def far_off(depth: NDArray[np.float32], factor: float) -> list[tuple[int, float]]:
-    """Frames whose median depth is over `factor` times the usual one, or under 1 / `factor`; with that ratio."""
+    """Frames whose median depth differs from the usual one by more than `factor`, each with its ratio."""
     step = sparse_step(depth.shape[1])
     sparse = depth[:, ::step, ::step]
     medians = {i: float(np.median(frame[frame > 0])) for i, frame in enumerate(sparse) if (frame > 0).any()}

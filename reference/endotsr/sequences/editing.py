@@ -1,6 +1,6 @@
-"""Editing a recording before it is written: frames by number or by second, a crop, and masks united.
+"""Editing a recording before it is written: frame selection by number or time, cropping, and union of masks.
 
-In: a `Recording` and the words of a user. Out: frame numbers, or a `Recording` that hands out less.
+In: a `Recording` and option values. Out: frame numbers, or an edited `Recording`.
 """
 
 from dataclasses import replace
@@ -20,12 +20,12 @@ ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, suc
 
 
 def chosen_frames(text: str, recording: Recording) -> list[int]:
-    """The frames of a list such as `0:10,12,2.5s:8s`, ascending and each once; "" selects all.
+    """The frames of a list such as `0:10,12,2.5s:8s`, ascending and unique; "" selects all.
 
-    Frames count as in Python's slices, and negative numbers from the end. Seconds count from the first frame; the end
-    is left out as that of a slice is.
+    Numbers follow Python's slices; negative ones count from the end. Seconds count from the first frame. The end is
+    exclusive.
 
-    Raises:  InputError for a part that is neither, selects nothing, or lies outside of the recording.
+    Raises:  InputError for a part that is invalid, selects nothing, or is outside the recording.
     """
     if not text.strip():
         return list(range(recording.count))
@@ -39,7 +39,7 @@ def chosen_frames(text: str, recording: Recording) -> list[int]:
 
 
 def without(frames: list[int], text: str, recording: Recording) -> list[int]:
-    """The frames that are not among those of a list. Raises InputError."""
+    """The frames that are not in a list as in `chosen_frames`. Raises InputError."""
     dropped = set(chosen_frames(text, recording)) if text.strip() else set()
     return [i for i in frames if i not in dropped]
 
@@ -59,7 +59,7 @@ def _numbers(part: str, count: int) -> list[int]:
 
 
 def _seconds(part: str, recording: Recording) -> list[int]:
-    """The frames from one second up to another."""
+    """The frames of a time span such as `2.5s:8s`."""
     if recording.times is None and not recording.rate:
         raise InputError(f"--frames {part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
     words = part.split(":")
@@ -78,9 +78,9 @@ def _seconds(part: str, recording: Recording) -> list[int]:
 
 
 def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:
-    """The recording seen through a window x, y, width, height of its pictures; the principal point moves with it.
+    """The recording cropped to a window x, y, width, height of its pictures, with the principal point shifted.
 
-    Raises:  InputError for a window that is empty; one that leaves the pictures is refused when a picture is read.
+    Raises:  InputError for an empty window. A window beyond the pictures is refused when a picture is read.
     """
     if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
         raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
@@ -116,7 +116,10 @@ def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:
 
 
 def united(recording: Recording, folders: tuple[Path, ...], options: SourceOptions) -> Recording:
-    """The recording whose masks exclude what its own or any of these folders exclude. Raises InputError."""
+    """The recording with a union of masks: a pixel that its own or any folder's mask excludes is excluded.
+
+    Raises:  InputError as `stated_masks`, or for unknown intrinsics.
+    """
     lens = recording.lens or (recording.rig.left if recording.rig else None)
     if lens is None:
         raise InputError(f"{recording.where}: the intrinsics are unknown; allowed: --camera or --calibration")
@@ -134,5 +137,5 @@ def united(recording: Recording, folders: tuple[Path, ...], options: SourceOptio
         recording,
         masks=mask,
         proposed=recording.proposed or proposed,
-        notes=[*recording.notes, f"masks: also excluded is what {names} exclude"],
+        notes=[*recording.notes, f"masks: united with {names}"],
     )

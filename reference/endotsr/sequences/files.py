@@ -1,4 +1,4 @@
-"""The picture files of a sequence folder: listed in time order, paired across folders, hashed."""
+"""The picture files of a sequence folder: listing in time order, pairing across folders, hashing."""
 
 import hashlib
 import os
@@ -16,12 +16,12 @@ ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, 
 
 
 def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Path]:
-    """Picture files of a folder in time order: by the numbers in their names, or by name where no name has a number.
+    """Picture files of a folder in time order: by the numbers in their names, or by name if there are no numbers.
 
-    endings  of the names that count, in lower case; other files are left out
+    endings  extensions in lower case; other files are ignored
 
-    Raises:  InputError if the folder is missing or holds no such file, if a name is not UTF-8 or contains more or
-    fewer numbers than the others, or if two files carry the same number.
+    Raises:  InputError if the folder is missing or has no such file, if a name is not UTF-8 or contains more or fewer
+             numbers than the others, or if two files have the same number.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found")
@@ -34,7 +34,7 @@ def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Pa
 
 
 def time_order(files: list[Path]) -> list[int]:
-    """Places of the files in time order, by the rules and with the errors of `list_pictures`; they share a folder."""
+    """Indices of the files, which share a folder, in time order. Rules and errors as in `list_pictures`."""
     _check_names_alike(files)
     _check_decimals(files)
     numbers = frame_numbers(files)
@@ -47,9 +47,9 @@ def time_order(files: list[Path]) -> list[int]:
 
 
 def frame_numbers(files: list[Path]) -> list[tuple[int, ...]] | None:
-    """The number in every file name: all groups of digits that differ between the files (several in a time stamp).
+    """The frame number of every file: all groups of digits that differ between the names (several in a time stamp).
 
-    None if the names carry no such number. A single file has its last group of digits.
+    None without such a number. For a single file, the last group of digits.
     """
     columns = _digit_columns(files)
     varying = [column for column in columns if len(set(column)) > 1]
@@ -59,9 +59,9 @@ def frame_numbers(files: list[Path]) -> list[tuple[int, ...]] | None:
 
 
 def check_pairing(reference: list[Path], other: list[Path]) -> None:
-    """Refuse two folders whose files do not belong together: by frame number, or by name where neither has numbers.
+    """Refuse two folders whose files do not match by frame number, or by name if neither has numbers.
 
-    Raises:  InputError naming the first frame that has no partner, or the file whose name cannot be paired.
+    Raises:  InputError naming the first frame without a partner, or a file whose name cannot be paired.
     """
     here, there = frame_numbers(reference), frame_numbers(other)
     if here is None and there is None:
@@ -83,7 +83,7 @@ def check_pairing(reference: list[Path], other: list[Path]) -> None:
 
 
 def _check_same_keys(here: list, there: list, reference: list[Path], other: list[Path]) -> None:
-    """Refuse the first file whose key, a frame number or a name, the other folder lacks."""
+    """Refuse the first file whose key, a frame number or a name, is missing in the other folder."""
     for keys, files, missing_keys, missing_files in ((here, reference, there, other), (there, other, here, reference)):
         known = set(missing_keys)
         lonely = next((i for i, key in enumerate(keys) if key not in known), None)
@@ -92,12 +92,12 @@ def _check_same_keys(here: list, there: list, reference: list[Path], other: list
                 f"{missing_files[0].parent}: has no file for frame {_text(keys[lonely])}"
                 f" ({files[0].parent.name}/{files[lonely].name}); {_counts(reference, other)}"
             )
-    if here != there:  # one name in two spellings, such as a.png and a.PNG
+    if here != there:  # two spellings of one name, such as a.png and a.PNG
         raise InputError(f"{other[0].parent}: the files do not match one to one; {_counts(reference, other)}")
 
 
 def _check_names_are_text(files: list[Path]) -> None:
-    """Refuse a path that is not UTF-8, and a name that no picture of a run could bear: the record holds the names."""
+    """Refuse a path that is not UTF-8, and an unsafe file name: runs name their pictures after the frames."""
     for file in files:
         try:
             str(file).encode("utf-8")
@@ -108,7 +108,7 @@ def _check_names_are_text(files: list[Path]) -> None:
 
 
 def _check_names_alike(files: list[Path]) -> None:
-    """Refuse a file whose name holds more or fewer numbers than most: it has no place in an order by number."""
+    """Refuse a file whose name has more or fewer numbers than most names, which prevents ordering by number."""
     counts = [len(re.findall(r"\d+", file.stem)) for file in files]
     usual, frequency = Counter(counts).most_common(1)[0]
     if frequency == len(files):
@@ -121,28 +121,28 @@ def _check_names_alike(files: list[Path]) -> None:
 
 
 def _check_decimals(files: list[Path]) -> None:
-    """Refuse decimal numbers of unlike lengths: as whole numbers, the digits of 1.5 stand before those of 1.25.
+    """Refuse decimals of different lengths: ordered by integer groups, 1.5 precedes 1.25.
 
-    A point is that of a decimal where the number before it varies too, or where the name is nothing else.
+    A point counts as a decimal point if the number before it also varies, or if the name has no other part.
     """
     for column in zip(*(re.findall(r"(\d+)\.(\d+)", file.stem) for file in files)):
         other = next((i for i, (_, part) in enumerate(column) if len(part) != len(column[0][1])), 0)
         alone = all(re.fullmatch(r"\d+\.\d+", file.stem) for file in files)
         if other and (alone or len({whole for whole, _ in column}) > 1):
             raise InputError(
-                f"{files[other]}: another number of decimals than in {files[0].name}, so that the"
-                " order is not certain; allowed: decimals of one length, such as 1.50 and 1.25"
+                f"{files[other]}: another number of decimals than in {files[0].name}: the"
+                " order is ambiguous; allowed: decimals of one length, such as 1.50 and 1.25"
             )
 
 
 def _digit_columns(files: list[Path]) -> list[list[int]]:
-    """The groups of digits of every name: one list per group, with one number per file."""
+    """The groups of digits of all names: one list per group, one number per file."""
     groups = [re.findall(r"\d+", file.stem) for file in files]
     return [[int(digits) for digits in column] for column in zip(*groups)]
 
 
 def _departing(files: list[Path]) -> Path:
-    """The first file without a number that most names share, such as a version; else the first file."""
+    """The first file that lacks a number shared by most names, such as a version; else the first file."""
     for column in _digit_columns(files):
         value, frequency = Counter(column).most_common(1)[0]
         if len(files) / 2 < frequency < len(files):
@@ -157,12 +157,12 @@ def _name_keys(files: list[Path]) -> list[tuple[str]]:
 
 
 def shortened(names: list[str]) -> str:
-    """At most five of the names, and the number of the others, for a message."""
+    """At most five of the names and the count of the others, for a message."""
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
 def hash_files(root: Path, files: Iterable[Path]) -> dict[str, str]:
-    """SHA-256 in hex of every file, by its path relative to `root` (with forward slashes), in the given order."""
+    """SHA-256 (hex) of every file by its path relative to `root`, with forward slashes, in the given order."""
     found = {}
     for file in files:
         try:

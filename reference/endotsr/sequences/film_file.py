@@ -1,8 +1,8 @@
-"""Writing video files: H.264 in .mp4 where FFmpeg has an encoder, VP9 otherwise. `video_file` reads them.
+"""Writing video files: H.264 in .mp4 if FFmpeg has an encoder, otherwise VP9. `video_file` reads them.
 
-In: pictures of one size. Out: one video file. FFmpeg encodes it, in the package PyAV. H.264 plays in every browser, in
-PowerPoint and in QuickTime; VP9 plays in browsers. The colours are marked as those of BT.709 with the matrix of BT.601,
-in which players then show them whatever the size of the pictures.
+In: pictures of one size. Out: one video file, encoded by FFmpeg through PyAV. Browsers, PowerPoint and QuickTime play
+H.264; browsers play VP9. The file states BT.709 colours with the BT.601 matrix, which players apply at every picture
+size.
 """
 
 from collections.abc import Iterable
@@ -16,11 +16,11 @@ from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
 
 BT709, BT601, LIMITED = 1, 6, 1  # primaries and transfer function; matrix; range, as FFmpeg numbers them
-MOST_DENOMINATOR = 1001  # of a frame rate as a fraction: 30000/1001 is that of television
+MOST_DENOMINATOR = 1001  # of a frame rate as a fraction; television has 30000/1001
 
 
 class Encoder(NamedTuple):
-    """An encoder of FFmpeg with its options."""
+    """An FFmpeg encoder with its options."""
 
     name: str
     options: dict[str, str]
@@ -29,8 +29,8 @@ class Encoder(NamedTuple):
 
 H264 = (
     Encoder("libx264", {"crf": "17", "preset": "medium"}),
-    Encoder("h264_videotoolbox", {"q:v": "70"}),  # that of macOS
-    Encoder("h264_mf", {"quality": "90"}),  # that of Windows
+    Encoder("h264_videotoolbox", {"q:v": "70"}),  # macOS
+    Encoder("h264_mf", {"quality": "90"}),  # Windows
     Encoder("libopenh264", {"b": "12M"}),
 )
 VP9 = (Encoder("libvpx-vp9", {"crf": "24", "b": "0", "cpu-used": "3", "row-mt": "1"}),)
@@ -39,7 +39,7 @@ BY_ENDING = {".mp4": (*H264, *VP9), ".webm": VP9}
 
 
 def encoder_of(path: Path, lossless: bool = False) -> Encoder:
-    """The first encoder for a name in .mp4 or .webm that this build of FFmpeg has. Raises InputError if it has none."""
+    """The first available encoder for an .mp4 or .webm file. Raises InputError if this build of FFmpeg has none."""
     from av.codec import codecs_available
 
     wanted = LOSSLESS if lossless else BY_ENDING[Path(path).suffix.lower()]
@@ -51,18 +51,18 @@ def encoder_of(path: Path, lossless: bool = False) -> Encoder:
 
 
 def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bool = False) -> None:
-    """Write a video file; the ending of the name, .mp4 or .webm, chooses the container.
+    """Write a video file. The extension, .mp4 or .webm, selects the container.
 
     pictures  (H, W, 3) uint8 RGB, all of one size with even sides
     rate      pictures per second
-    lossless  PNG pictures: `video_pictures` returns the same pictures; few players show such a film
-    Raises:   InputError if there is no picture, or no encoder for the format.
+    lossless  PNG pictures, which `video_pictures` returns exactly; few players support them
+    Raises:   InputError without pictures or without an encoder for the format.
     """
     import av
     import av.error
 
     encoder, stream = encoder_of(path, lossless), None
-    options = {"movflags": "faststart"} if path.suffix.lower() == ".mp4" else {}  # a browser plays it while it loads
+    options = {"movflags": "faststart"} if path.suffix.lower() == ".mp4" else {}  # plays while it loads
     try:
         with av.open(str(path), mode="w", options=options) as container:
             for picture in pictures:
@@ -79,7 +79,7 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bo
 
 
 def _stream(container: Any, encoder: Encoder, picture: Array, rate: float) -> Any:
-    """The video stream of a container for pictures like this one."""
+    """The video stream of a container, for pictures of the size of this one."""
     stream = container.add_stream(
         encoder.name, rate=Fraction(rate).limit_denominator(MOST_DENOMINATOR), options=dict(encoder.options)
     )
@@ -93,7 +93,7 @@ def _stream(container: Any, encoder: Encoder, picture: Array, rate: float) -> An
 
 
 def _encodes(name: str) -> bool:
-    """Whether FFmpeg has this codec as an encoder."""
+    """Whether FFmpeg can encode with this codec."""
     from av.codec import Codec
     from av.codec.codec import UnknownCodecError
 

@@ -1,8 +1,8 @@
-"""Descriptions for other programs beside `sequence.toml`: nerfstudio and readers of COLMAP use the same pictures.
+"""Descriptions of a sequence for other programs: nerfstudio and readers of COLMAP models.
 
-In: a folder in the common format. Out: `transforms.json` with `masks_kept/` (nerfstudio leaves out black), or
-`sparse/0/` with cameras, images and points3D as text. The points are some pixels of the prior depth of some frames, for
-programs that begin with points. `layouts.nerfstudio` and `layouts.colmap` read both back.
+In: a folder in the common format, whose pictures all programs share. Out: `transforms.json` with `masks_kept/`
+(nerfstudio ignores black pixels), or `sparse/0/` with cameras, images and points3D as text. The points sample the prior
+depth of some frames, for programs that start from points. `layouts.nerfstudio` and `layouts.colmap` read both formats.
 """
 
 import json
@@ -21,12 +21,12 @@ from endotsr.untrusted.writing import replace_text
 
 Other = Literal["nerfstudio", "colmap"]
 KEPT, MODEL = "masks_kept", "sparse/0"
-POINTS, FRAMES_OF_POINTS = 2000, 16  # points of a frame; frames that give points
-THOUSANDTHS = 1e3  # nerfstudio reads depth files as thousandths of the unit of its matrices
+POINTS, FRAMES_OF_POINTS = 2000, 16  # points per frame; frames with points
+THOUSANDTHS = 1e3  # nerfstudio reads depth in thousandths of the unit of its matrices
 
 
 class SeenPoint(NamedTuple):
-    """A point of the prior depth, and where its frame sees it."""
+    """A point of the prior depth, and its position in the picture."""
 
     position: FloatArray  # (3,) in the unit of the sequence
     colour: NDArray[np.uint8]  # (3,)
@@ -35,7 +35,7 @@ class SeenPoint(NamedTuple):
 
 
 def describe_for(folder: Path, others: tuple[Other, ...]) -> list[str]:
-    """Write the descriptions; returns a note on each. Raises InputError."""
+    """Write the descriptions. Returns a note on each. Raises InputError."""
     recording, notes = open_common(folder), []
     for name in others:
         notes.append(_nerfstudio(folder, recording) if name == "nerfstudio" else _colmap(folder, recording))
@@ -73,11 +73,11 @@ def _nerfstudio(folder: Path, recording: Recording) -> str:
              "h": lens.height, "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0}  # fmt: skip
     replace_text(folder / "transforms.json", json.dumps(about | {"frames": frames}, indent=1) + "\n")
     unit = "of the unknown unit" if file.arbitrary else "mm"
-    return f"transforms.json: lengths in {step:g} {unit}, so that a step of the depth files is a thousandth of that"
+    return f"transforms.json: lengths in {step:g} {unit}; a step of the depth files is a thousandth of this"
 
 
 def _file(folder: Path, part: str, stem: str) -> str:
-    """The name of the file of a frame."""
+    """The file name of a frame."""
     return next(file.name for file in (folder / part).iterdir() if file.stem == stem)
 
 
@@ -104,11 +104,11 @@ def _colmap(folder: Path, recording: Recording) -> str:
         for k, p in enumerate(points, 1)
     ]
     replace_text(place / "points3D.txt", "\n".join(rows) + "\n")
-    return f"{MODEL}: {len(poses)} images, {len(points)} points of the prior depth, lengths of sequence.toml"
+    return f"{MODEL}: {len(poses)} images, {len(points)} points of the prior depth, in the unit of sequence.toml"
 
 
 def _points(recording: Recording, lens: Lens, poses: list[CameraPose]) -> list[SeenPoint]:
-    """Some pixels with depth, on tissue, of some frames."""
+    """Some tissue pixels with depth of some frames."""
     if recording.depth is None:
         return []
     chosen = np.unique(np.linspace(0, recording.count - 1, FRAMES_OF_POINTS).astype(int)).tolist()

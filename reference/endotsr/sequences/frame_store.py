@@ -1,10 +1,10 @@
-"""Arrays over all frames of a clip: in memory, or in a file where they do not fit.
+"""Arrays over all frames of a clip, in memory or in a file.
 
-A clip that needs more than half of `sequence.memory` is kept in one file without a name, in the folder for temporary
-files (TMPDIR, by default /tmp). Its pages come and go with the memory that is free. The system removes it when the
-process ends, however it ends. The numbers are the same in both cases.
+A clip that needs more than half of `sequence.memory` is stored in an unnamed file in the folder for temporary files
+(TMPDIR, by default /tmp). The system pages it in and out as memory allows, and removes it when the process ends, even
+after a crash. The values are identical in both cases.
 
-In: the limit and what the clip needs. Out: arrays of zeros, and a note if they lie in a file.
+In: the memory limit and the size of the clip. Out: arrays of zeros, and a note if they are in a file.
 """
 
 import os
@@ -17,18 +17,18 @@ from numpy.typing import DTypeLike, NDArray
 from endotsr.errors import InputError
 from endotsr.kernels.memory import memory_limit, unknown_memory
 
-PIXEL_BYTES = 3 + 1 + 4 + 1  # image, mask, depth, and the stored mask while it is read
+PIXEL_BYTES = 3 + 1 + 4 + 1  # image, mask, depth, and the stored mask during reading
 
 
 class FrameStore:
     """The arrays of one clip."""
 
     def __init__(self, count: int, width: int, height: int, memory: float, where: object) -> None:
-        """Decide where the arrays lie.
+        """Choose between memory and a file.
 
-        memory  `sequence.memory`, GB; 0 = half of this machine's (of 4 GB where the system does not say)
+        memory  `sequence.memory`, GB; 0 = half of this machine's (of 4 GB if the system does not report it)
 
-        Raises:  InputError if neither the memory nor the disk holds the clip; nothing was read then.
+        Raises:  InputError, before anything is read, if the clip fits neither in memory nor on disk.
         """
         self.needed = count * width * height * PIXEL_BYTES
         self.in_file = self.needed > memory_limit(memory) / 2
@@ -44,17 +44,17 @@ class FrameStore:
 
     @property
     def note(self) -> str:
-        """Where the arrays are; "" if they are in memory."""
+        """Where the arrays are stored; "" if they are in memory."""
         if not self.in_file:
             return ""
         return (
-            f"frames: {self.needed / 1e9:.2g} GB, more than half of sequence.memory, lie in a file without a name in"
-            f" {tempfile.gettempdir()}; it goes with this process{self._remedy}"
+            f"frames: {self.needed / 1e9:.2g} GB, more than half of sequence.memory, are stored in an unnamed file in"
+            f" {tempfile.gettempdir()}, which ends with this process{self._remedy}"
         )
 
     @property
     def _remedy(self) -> str:
-        """What a user can state whose system does not say how much memory there is."""
+        """The setting for a system that does not report its memory."""
         return f"; {self._unknown}; sequence.memory states it" if self._unknown else ""
 
     def array(self, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray:
@@ -64,7 +64,7 @@ class FrameStore:
         size = int(np.prod(shape)) * np.dtype(dtype).itemsize
         try:
             with tempfile.TemporaryFile(prefix="endotsr-frames-") as file:
-                if hasattr(os, "posix_fallocate"):  # a full disk is an error here and not a signal later
+                if hasattr(os, "posix_fallocate"):  # a full disk is an error here instead of a signal later
                     os.posix_fallocate(file.fileno(), 0, size)
                 return np.asarray(np.memmap(file, np.dtype(dtype), "w+", shape=shape))
         except OSError as error:

@@ -1,7 +1,7 @@
-"""`endotsr depth`: depth of every frame of a folder in the common format, from its stereo pairs or from files.
+"""`endotsr depth`: depth for every frame of a folder in the common format, from its stereo pairs or from files.
 
-In: the folder. Out: `depth/` and the section [depth] of its `sequence.toml`, and the coverage of every frame. The new
-folder takes its place when it is whole.
+In: the folder. Out: `depth/`, the section [depth] of its `sequence.toml`, and the coverage of every frame. The new
+`depth/` replaces an old one when it is complete.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ from endotsr.sequences.smaller import nearest_pixels
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.untrusted.writing import replace_text, replacing_folder
 
-EXCHANGED = 3.0  # times as many matches with left and right exchanged
+EXCHANGED = 3.0  # ratio of matches that indicates exchanged left and right pictures
 OnFrame = Callable[[int, int], None]
 Kind = Literal["depth", "disparity"]
 
@@ -34,8 +34,8 @@ class DepthReport(NamedTuple):
     """What was written."""
 
     file: SequenceFile
-    coverage: list[float]  # of every frame, fraction of its pixels
-    median: float  # of the medians of the frames
+    coverage: list[float]  # per frame, fraction of its pixels
+    median: float  # of the frame medians
 
 
 def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
@@ -43,7 +43,7 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[ND
     if recording.lens is None or not recording.baseline:
         raise InputError(
             f"{recording.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME};"
-            " allowed: the distance of the two cameras in the unit of the file"
+            " allowed: the distance between the two cameras in the unit of the file"
         )
     lens, baseline = recording.lens, recording.baseline
     disparity_range(settings, lens, baseline)
@@ -52,9 +52,9 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[ND
     for i, pair in enumerate(recording.pictures(list(range(recording.count)))):
         if pair.right is None:
             raise InputError(f"{recording.where}: no right pictures (images_right/); allowed: a stereo sequence")
-        found = stereo_depth(pair.left, pair.right, lens, baseline, settings).depth
+        found = stereo_depth(pair.left, pair.right, lens, baseline, settings)
         if i == 0 and (found > 0).mean() < LITTLE:
-            exchanged = stereo_depth(pair.right, pair.left, lens, baseline, settings).depth
+            exchanged = stereo_depth(pair.right, pair.left, lens, baseline, settings)
             _refuse_exchanged(float((found > 0).mean()), float((exchanged > 0).mean()), recording.where)
         if not settings.temporal:
             yield found
@@ -68,7 +68,7 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[ND
 
 
 def _refuse_exchanged(coverage: float, exchanged: float, where: Path) -> None:
-    """Refuse left and right pictures that match the other way round; fractions of pixels with depth, both ways."""
+    """Refuse exchanged left and right pictures, from the fractions of matched pixels as stored and exchanged."""
     if exchanged > max(LITTLE, EXCHANGED * coverage):
         raise InputError(
             f"{where}: {coverage:.1%} of the pixels of the first frame match the right picture, and {exchanged:.1%}"
@@ -81,7 +81,7 @@ def _consistent(depths: list[NDArray[np.float32]], pairs: list[PicturePair], mid
 
 
 def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
-    """Depth from the stereo pairs of a folder. Raises InputError, of a single frame when it is asked for."""
+    """Depth from the stereo pairs of a folder. Raises InputError; for a single frame, when the frame is requested."""
     smooth = " and weighted least squares" if settings.smooth else ""
     method = f"semi-global matching, left-right check{smooth}{', median along the flow' if settings.temporal else ''}"
     return MadeDepth(stereo_frames(open_common(folder), settings), method, "")
@@ -126,7 +126,7 @@ def depth_of_values(
 
 
 def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:
-    """The depth. Raises InputError for lengths among which one number seems to mark missing depth."""
+    """The depth. Raises InputError if one value among the lengths seems to mark missing depth."""
     if kind == "depth" and (marked := mark_finding([depth_facts(file.name, depth, depth, None)], str(file))):
         raise InputError(f"{file}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}")
     return depth
@@ -137,7 +137,7 @@ def from_relative(folder: Path, source: Path, align: Align, farthest: float, tru
     contents = list_contents(folder)
     if contents.depth and not replace:
         raise InputError(
-            f"{folder}: has depth already; allowed: --replace, which takes scale and shift from it and fills the rest"
+            f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
     return relative_depth(contents, source, align, farthest, trusted)
 
@@ -145,12 +145,12 @@ def from_relative(folder: Path, source: Path, align: Align, farthest: float, tru
 def write_depth(
     folder: Path, made: MadeDepth, replace: bool = False, on_frame: OnFrame = lambda i, n: None
 ) -> DepthReport:
-    """Write the depth of a sequence and enter it into its `sequence.toml`.
+    """Write the depth of a sequence and record it in its `sequence.toml`.
 
-    made      lengths of the sequence are in an arbitrary unit where anything of it is assumed
-    replace   whether depth that exists may be replaced
+    made      the depth; if any part of it is assumed, the unit of the sequence becomes arbitrary
+    replace   whether existing depth may be replaced
 
-    Raises:  InputError; the folder is as before then.
+    Raises:  InputError, leaving the folder unchanged.
     """
     contents = list_contents(folder)
     if (contents.file.depth or (folder / DEPTH).exists()) and not replace:

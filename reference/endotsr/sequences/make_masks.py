@@ -1,7 +1,7 @@
-"""`endotsr masks`: proposed masks of a clip, entered into a sequence or written into a folder of their own.
+"""`endotsr masks`: proposed masks of a clip, recorded in a sequence or written to a separate folder.
 
-In: a recording. Out: mask pictures (white = excluded), an overlay for the eye, and the mark that they are proposals:
-`proposed = true` in `sequence.toml`, or the file `proposal.json` beside the masks.
+In: a recording. Out: mask pictures (white = excluded), an overlay for inspection, and a mark of the proposal: `proposed
+= true` in `sequence.toml`, or the file `proposal.json` next to the masks.
 """
 
 import json
@@ -20,16 +20,15 @@ from endotsr.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.sequences.recording import Picture, Recording
 from endotsr.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, sequence_text
 from endotsr.sequences.sources import PROPOSAL
-from endotsr.sequences.writing import new_folder
-from endotsr.untrusted.writing import replace_text, replacing_folder
+from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
 
 OVERLAY = "proposed_masks.png"
-MOST_WITHOUT = 0.5  # of the frames: a proposal that leaves more of them without tissue is wrong
-SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, in a row, and the largest width of one
+MOST_WITHOUT = 0.5  # of the frames; a proposal that leaves more frames without tissue is wrong
+SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, per row, and their largest width
 
 
 def left_pictures(recording: Recording) -> Iterator[Picture]:
-    """The left pictures of all frames, one at a time."""
+    """The left pictures of all frames, decoded one at a time."""
     return (pair.left for pair in recording.pictures(list(range(recording.count))))
 
 
@@ -46,7 +45,7 @@ def _proposed(recording: Recording) -> Proposal:
 
 
 def _static_mask(contents: Contents, recording: Recording) -> NDArray[np.bool_] | None:
-    """The excluded pixels (H, W) of masks that no program proposed and that are the same for all frames; else None."""
+    """The excluded pixels (H, W) if the masks are not a proposal and are equal in all frames; else None."""
     if recording.masks is None or recording.proposed:
         return None
     first = recording.masks(0)
@@ -58,18 +57,18 @@ def _static_mask(contents: Contents, recording: Recording) -> NDArray[np.bool_] 
 
 
 def without_tissue(recording: Recording, proposal: Proposal) -> list[str]:
-    """Names of the frames in which a proposal leaves hardly any tissue."""
+    """Names of the frames in which a proposal leaves almost no tissue."""
     return [recording.names[i] for i in proposal.without_tissue]
 
 
 def enter_masks(folder: Path, replace: bool = False) -> Proposal:
-    """Propose masks for a folder in the common format and enter them; without a proposal nothing changes.
+    """Propose masks for a folder in the common format and record them. Without a proposal the folder is unchanged.
 
-    A mask that is the same for all frames, such as a field of view, stays and is united with the proposal.
+    A mask that is equal in all frames, such as a field of view, is united with the proposal.
 
-    replace   whether masks that exist may be replaced
+    replace   whether existing masks may be replaced
 
-    Raises:  InputError; the folder is as before then.
+    Raises:  InputError, leaving the folder unchanged.
     """
     contents = list_contents(folder)
     recording = open_common(folder)
@@ -91,9 +90,9 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
 
 
 def write_proposal(recording: Recording, out: Path) -> Proposal:
-    """Write masks, overlay and mark into the new folder `out`; without a proposal nothing is written.
+    """Write masks, overlay and mark into the new folder `out`. Without a proposal nothing is written.
 
-    Raises:  InputError; nothing is left behind then.
+    Raises:  InputError, leaving nothing behind.
     """
     proposal = _proposed(recording)
     if not proposal.found:
@@ -113,7 +112,7 @@ def _write_masks(folder: Path, names: list[str], proposal: Proposal) -> None:
 
 
 def overlays(recording: Recording, proposal: Proposal) -> Picture:
-    """A dozen frames of the clip in rows, proposed pixels in green, (H, W, 3) uint8."""
+    """Up to twelve frames of the clip in rows, with proposed pixels in green, (H, W, 3) uint8."""
     chosen = np.unique(np.linspace(0, recording.count - 1, min(SHOWN, recording.count)).astype(int)).tolist()
     shown = []
     for i, pair in zip(chosen, recording.pictures(chosen)):

@@ -1,16 +1,15 @@
-"""From mask files to tissue masks: thresholds, polarity, and checks of the polarity.
+"""From mask files to tissue masks: thresholding, polarity, and checks of the polarity.
 
-The configuration states the polarity; it is never guessed, but a wrong statement is detected. Evidence, measured on a
-public sequence (63 frames, 34 % of the pixels without depth):
+The configuration states the polarity. It is never guessed, but a wrong statement is detected. Measured on a public
+sequence (63 frames, 34 % of the pixels without depth):
 
 | masks folder | fraction without depth: tissue / excluded | redness R - B: tissue / excluded |
 |---|---|---|
 | `masks`, right polarity | 0.000 / 1.000 | 69 / 4 |
 | `gt_masks`, right polarity | 0.093 / 1.000 | 66 / -3 |
 
-With the wrong polarity each pair is swapped, while the tissue fraction (0.34 and 0.27) would still look plausible.
-Stereo depth is missing on instruments and at borders, so depth decides when enough of it is missing. Otherwise the
-colour decides.
+The wrong polarity swaps each pair, while the tissue fraction (0.34 and 0.27) still looks plausible. Stereo depth is
+missing on instruments and at borders: if enough of it is missing, depth determines the polarity, otherwise colour does.
 """
 
 from collections import Counter
@@ -23,12 +22,12 @@ from endotsr.errors import InputError
 from endotsr.sequences.files import shortened
 
 LEAST_TISSUE_FRACTION = 0.05
-MOST_SOFT_FRACTION = 0.05  # of a frame: a picture with more pixels between black and white is no mask
-LEAST_MISSING_FRACTION = 0.01  # of all pixels: with less missing depth, depth is no evidence of polarity
+MOST_SOFT_FRACTION = 0.05  # of a frame; a picture with more pixels between black and white is not a mask
+LEAST_MISSING_FRACTION = 0.01  # of all pixels; less missing depth is no evidence of polarity
 MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
-SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN, for the smaller evidence of one frame
-OPPOSITE_FRACTION = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by at most 0.36 from any other
+SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN, for a single frame
+OPPOSITE_FRACTION = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by up to 0.36 from any other
 ALLOW = "--sequence.allow-tissue-fraction (TOML: [sequence] allow_tissue_fraction = true)"
 
 
@@ -37,12 +36,12 @@ def threshold_masks(
 ) -> NDArray[np.bool_]:
     """White pixels of mask pictures.
 
-    raw      n pictures (H, W) of integers; {0, 1} when no value of any picture exceeds 1, else {0, 255} (or {0, 65535})
-    out      (n, H, W) that is filled and returned; None = a new array
+    raw      n pictures (H, W) of integers: {0, 1} if no value exceeds 1, else {0, 255} or {0, 65535}
+    out      (n, H, W) array to fill and return; None = a new array
     returns  (n, H, W) bool, True = white: at least half of full white
 
-    In-between values are counted in `notes`. Raises InputError naming a picture with more than 5 % of them, or an
-    8-bit picture among pictures whose white is 65535 (or the other way round).
+    `notes` receives the count of intermediate values. Raises InputError naming a picture with more than 5 % of them, or
+    a picture of another bit depth than most if white is 65535.
     """
     largest = max(int(picture.max()) for picture in raw)
     white = 1 if largest <= 1 else 255 if largest <= 255 else 65535
@@ -61,7 +60,7 @@ def threshold_masks(
             )
     if soft_total:
         notes.append(
-            f"{soft_total} mask pixels lie between 0 and {white}; values from {(white + 1) // 2} count as white"
+            f"{soft_total} mask pixels are between 0 and {white}; values from {(white + 1) // 2} count as white"
         )
     return result
 
@@ -73,18 +72,18 @@ def tissue_masks(
     notes: list[str] | None = None,
     out: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
-    """Tissue masks (n, H, W), True = tissue, from mask pictures as `threshold_masks` takes them.
+    """Tissue masks (n, H, W), True = tissue, from mask pictures as in `threshold_masks`.
 
-    excluded_value   `white` or `black`: the value of the pixels that are no tissue
+    excluded_value   `white` or `black`: the value of excluded pixels
     """
     white = threshold_masks(raw, names, [] if notes is None else notes, out)
     return np.logical_not(white, out=white) if excluded_value == "white" else white
 
 
 def check_tissue_fraction(masks: NDArray[np.bool_], where: str, excluded_value: str, allow: bool) -> float:
-    """The tissue fraction of all frames, refused below 5 % and at exactly 100 % unless `allow`.
+    """The tissue fraction of all frames. Below 5 % and at exactly 100 % it is refused unless `allow`.
 
-    Raises:  InputError naming the folder, the fraction, the likely cause and the setting that overrides.
+    Raises:  InputError naming the folder, the fraction, the likely cause and the overriding setting.
     """
     fraction = float(masks.mean())
     if allow or LEAST_TISSUE_FRACTION <= fraction < 1.0:
@@ -106,24 +105,24 @@ def check_polarity(
     allow: bool,
     stated_in: str = "",
 ) -> str:
-    """Refuse a polarity that the pictures contradict; otherwise return a sentence on the evidence for it.
+    """Refuse a polarity that the pictures contradict. Otherwise return a sentence on the evidence.
 
-    masks    (n, H, W) True = tissue, as understood so far
+    masks    (n, H, W) True = tissue, with the stated polarity
     depth    (n, H, W) 0 = missing
     images   (n, 3, H, W) display RGB
-    stated_in   the file that states the polarity instead of the settings; "": the settings do
+    stated_in   the file that states the polarity; "": the settings state it
 
     Wrong if (a) at least 1 % of all pixels lack depth and the fraction without depth is larger by 0.25 on "tissue" than
-    on excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,
-    in mean R - B, than "tissue" by 20 grey levels.
+    on excluded pixels; or (b) depth is inconclusive (a difference within +-0.25) and the mean R - B of excluded pixels
+    exceeds that of "tissue" by 20 grey levels.
     """
     if masks.all() or not masks.any():
-        return "polarity not checked: all pixels are on one side of the mask"
+        return "polarity not checked: the masks exclude everything or nothing"
     on_tissue, on_excluded, missing = _missing_fractions(masks, depth)
     other = "black" if excluded_value == "white" else "white"
     mend = f'--sequence.excluded-value {other} (TOML: [sequence] excluded_value = "{other}")'
     mend = f'[masks] excluded_value = "{other}" in {stated_in}' if stated_in else mend
-    advice = f"the masks seem to have the other polarity: set {mend}; to go on with these masks, set {ALLOW}"
+    advice = f"the masks seem to have the other polarity: set {mend}; to use these masks anyway, set {ALLOW}"
     if missing >= LEAST_MISSING_FRACTION and abs(on_tissue - on_excluded) > MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of the tissue and {on_excluded:.1%} of the excluded pixels"
         if on_tissue > on_excluded and not allow:
@@ -143,17 +142,17 @@ def check_single_masks(
     names: list[str],
     allow: bool,
 ) -> list[str]:
-    """Refuse a single wrong mask among right ones, which sums over all frames do not reveal.
+    """Refuse a single wrong mask among right ones, which statistics over all frames do not reveal.
 
     masks, depth, images   as for `check_polarity`
     names    n mask files
-    returns  notes on frames without tissue or without excluded pixels: both are legal and rare
+    returns  notes on frames without tissue or without excluded pixels, which are valid and rare
 
-    Wrong if (a) a frame has some tissue, but less than 5 %, while half the frames have more; (b) it differs on more
-    than 75 % of the pixels from the frame before and the frame after it (frames without tissue left out); or (c) it
-    resembles the opposite of most masks, and the pictures contradict it but not most of the others.
+    Wrong if (a) a frame has some tissue, but less than 5 %, while half the frames have more; (b) the mask differs on
+    more than 75 % of the pixels from both neighbouring masks with tissue; or (c) the mask resembles the opposite of
+    most masks, and the pictures contradict it but not most of the others.
 
-    Raises:  InputError naming the file, the reason and the setting that overrides. With `allow` it becomes a note.
+    Raises:  InputError naming the file, the reason and the overriding setting. With `allow` it becomes a note.
     """
     step = sparse_step(masks.shape[1])
     sparse = masks[:, ::step, ::step]
@@ -177,12 +176,12 @@ def check_single_masks(
 
 
 def sparse_step(height: int) -> int:
-    """The step between rows and columns that leaves about 128 rows, enough for a fraction or a median."""
+    """The step between sampled rows and columns that leaves about 128 rows, enough for a fraction or a median."""
     return max(1, height // 128)
 
 
 def _check_one_bit_depth(names: list[str], types: list[np.dtype]) -> None:
-    """Refuse 8-bit masks among 16-bit ones: white in one kind is almost black in the other."""
+    """Refuse mixed bit depths: white in 8 bits is almost black in 16 bits."""
     usual, frequency = Counter(types).most_common(1)[0]
     odd = next((i for i, kind in enumerate(types) if kind != usual), None)
     if odd is not None:
@@ -201,11 +200,13 @@ def _too_little_tissue(fractions: NDArray[np.floating]) -> dict[int, str]:
 
 
 def _against_neighbours(masks: NDArray[np.bool_], fractions: NDArray[np.floating]) -> dict[int, str]:
-    """Frames whose mask is nearly the opposite of those of the two nearest frames with tissue."""
+    """Frames whose mask is nearly the opposite of the masks of the two nearest frames with tissue."""
     found = {}
     usable = [int(i) for i in np.flatnonzero(fractions > 0)]
     for k, i in enumerate(usable):
-        start = min(max(k - 1, 0), max(len(usable) - 3, 0))  # at the first and the last frame, both are on one side
+        start = min(
+            max(k - 1, 0), max(len(usable) - 3, 0)
+        )  # the first and the last frame have both neighbours on one side
         differing = [float((masks[i] != masks[j]).mean()) for j in usable[start : start + 3] if j != i]
         if fractions[i] < 1 and len(differing) == 2 and min(differing) > OPPOSITE_FRACTION:
             found[i] = (
@@ -217,18 +218,18 @@ def _against_neighbours(masks: NDArray[np.bool_], fractions: NDArray[np.floating
 def _against_pictures(
     masks: NDArray[np.bool_], depth: NDArray[np.floating], images: NDArray[np.uint8]
 ) -> dict[int, str]:
-    """Frames that resemble the opposite of the usual mask and that depth, or else colour, contradicts."""
+    """Frames whose mask resembles the opposite of the usual mask and contradicts depth or colour."""
     verdicts = [_verdict(mask, frame == 0, image) for mask, frame, image in zip(masks, depth, images)]
     signs = np.array([sign for sign, _ in verdicts])
     if np.count_nonzero(signs < 0) >= np.count_nonzero(signs > 0):
-        return {}  # not a fault of single frames: `check_polarity` handles it
+        return {}  # not a fault of single frames: see `check_polarity`
     usual = masks.mean(axis=0) >= 0.5
     resembles_opposite = (masks != usual).mean(axis=(1, 2)) > 0.5
     return {int(i): verdicts[i][1] for i in np.flatnonzero((signs < 0) & resembles_opposite)}
 
 
 def _verdict(mask: NDArray[np.bool_], missing: NDArray[np.bool_], image: NDArray[np.uint8]) -> tuple[int, str]:
-    """Whether the picture supports one mask (1), contradicts it (-1) or neither (0), and the evidence."""
+    """Whether the picture supports a mask (1), contradicts it (-1) or neither (0), and the evidence."""
     if mask.all() or not mask.any():
         return 0, ""
     on_tissue, on_excluded = float(missing[mask].mean()), float(missing[~mask].mean())
@@ -244,8 +245,8 @@ def _verdict(mask: NDArray[np.bool_], missing: NDArray[np.bool_], image: NDArray
 
 
 def _missing_fractions(masks: NDArray[np.bool_], depth: NDArray[np.floating]) -> tuple[float, float, float]:
-    """Fraction without depth of the tissue, of the excluded pixels and of all; both kinds of pixels exist."""
-    tissue = missing_tissue = missing = 0  # frame by frame: no array over all frames is made
+    """Fractions without depth of tissue, excluded pixels and all pixels; no group may be empty."""
+    tissue = missing_tissue = missing = 0  # frame by frame, without an array over all frames
     for mask, plane in zip(masks, depth):
         without = plane == 0
         tissue += np.count_nonzero(mask)
@@ -255,7 +256,7 @@ def _missing_fractions(masks: NDArray[np.bool_], depth: NDArray[np.floating]) ->
 
 
 def _redness(images: NDArray[np.uint8], masks: NDArray[np.bool_]) -> tuple[float, float]:
-    """Mean of R - B over tissue and over excluded pixels, on every fourth row and column, grey levels."""
+    """Mean R - B over tissue and over excluded pixels, grey levels, on every fourth row and column."""
     total, tissue_total, count, tissue = 0, 0, 0, 0
     for image, whole in zip(images, masks):
         mask = whole[::4, ::4]

@@ -1,6 +1,6 @@
-"""Prior depth from the points of a reconstruction (structure from motion): sparse, or interpolated between them.
+"""Prior depth from structure-from-motion points, sparse or interpolated.
 
-In: world points and which of them a frame sees. Out: depth (H, W), 0 = none.
+In: the world points that a frame sees. Out: depth (H, W), 0 = none.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ LEAST_POINTS = 4  # for a triangulation
 
 
 def depth_from_points(points: FloatArray, pose: CameraPose, lens: Lens, method: str) -> NDArray[np.float32]:
-    """View-space z at the pixels of the points, or inside their hull.
+    """View-space z at the pixels of the points, or inside their convex hull.
 
-    points   (n, 3) world positions that this frame sees
+    points   (n, 3) world positions visible in this frame
     lens     without distortion
     method   `sparse`: at the nearest pixel of each point; `interpolated`: 1 / z linear in the picture over a Delaunay
-             triangulation, as on a plane through three points; nothing outside of the hull
+             triangulation, which is exact for planes; 0 outside the hull
 
-    Edges:   fewer than four points, or points in one line, give the sparse depth.
+    Edges:   fewer than four points, or collinear points, give the sparse depth.
     """
     view = points @ pose.rotation.T + pose.translation
     z = view[:, 2]
@@ -34,7 +34,7 @@ def depth_from_points(points: FloatArray, pose: CameraPose, lens: Lens, method: 
     depth = np.zeros((lens.height, lens.width), np.float32)
     column, row = np.floor(u).astype(np.intp), np.floor(v).astype(np.intp)
     inside = (column >= 0) & (column < lens.width) & (row >= 0) & (row < lens.height)
-    order = np.argsort(-z[inside], kind="stable")  # of two points in one pixel the nearer one stays
+    order = np.argsort(-z[inside], kind="stable")  # the nearer of two points in one pixel is kept
     depth[row[inside][order], column[inside][order]] = z[inside][order]
     return depth
 

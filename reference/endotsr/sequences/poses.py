@@ -1,9 +1,9 @@
-"""Cameras from an LLFF pose file, and pose rows from cameras.
+"""Conversion between LLFF pose files and cameras.
 
-A row holds a 3x5 matrix, row-major, and two bounds: [R | t | (H, W, f)], near, far. Columns 0-2 of R are the
-camera-to-world axes with x right, y up, z backward; they become OpenCV axes as [c0, -c1, -c2] (the conversion
-of the published loaders of this format; for identical static poses any rotation is only a choice of world axes).
-One focal length serves both axes and the principal point is the image centre, (W/2, H/2) with pixel edges at integers.
+A row is a row-major 3x5 matrix and two bounds: [R | t | (H, W, f)], near, far. The columns of R are camera-to-world
+axes with x right, y up, z backward. They become OpenCV axes as [c0, -c1, -c2], as in published loaders of this format;
+for identical static poses, any rotation is only a choice of world axes. Both axes have one focal length, and the
+principal point is the image centre, (W/2, H/2) with pixel edges at integers.
 """
 
 from pathlib import Path
@@ -32,7 +32,7 @@ def find_pose_file(folder: Path) -> Path:
 
 
 def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
-    """The rows of a pose file, (count, 17), checked to be finite numbers.
+    """The rows of a pose file, (count, 17) finite numbers.
 
     Raises:  InputError naming the file, the frame (row) and the reason. Pickled objects are never loaded.
     """
@@ -50,14 +50,13 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
 
 
 def cameras_from_rows(rows: NDArray[np.float64], width: int, height: int, path: Path, frames: range) -> list[Camera]:
-    """Cameras of the chosen rows; one and the same object for all of them where the camera is static.
+    """Cameras of the chosen rows; the same object for all frames of a static camera.
 
     rows    (n, 17) rows of the pose file
     width, height  size of the image files, pixels
-    path, frames   for messages; `frames` also chooses the rows
+    path, frames   for messages; `frames` also selects the rows
 
-    Raises:  InputError if a row states another image size, a focal length that is not positive, or a matrix
-             that is no rotation.
+    Raises:  InputError if a row has another image size, a focal length that is not positive, or an invalid rotation.
     """
     cameras = [_camera(rows[i], width, height, f"{path}: frame {i}") for i in frames]
     chosen = rows[list(frames)][:, :15]
@@ -84,9 +83,9 @@ def _camera(row: NDArray[np.float64], width: int, height: int, where: str) -> Ca
 
 
 def rows_from_cameras(cameras: list[Camera], far: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Pose rows (n, 17) of cameras, bounds 0 and `far` (n,). The inverse of `cameras_from_rows`.
+    """Pose rows (n, 17) of cameras, with bounds 0 and `far` (n,). The inverse of `cameras_from_rows`.
 
-    Raises:  InputError for a camera the format cannot hold (two focal lengths, principal point off centre).
+    Raises:  InputError for a camera outside the format (two focal lengths, principal point off centre).
     """
     rows = np.zeros((len(cameras), 17))
     for i, camera in enumerate(cameras):

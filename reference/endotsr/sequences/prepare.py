@@ -1,8 +1,8 @@
-"""From any recording to a folder in the common format.
+"""Conversion of a recording into a folder in the common format.
 
-In: a `Recording` and `PrepareSettings`. Out: a new folder with pictures, masks, depth, `sequence.toml`, and notes on
-everything that was assumed. Frames are read, straightened, resized and written one at a time. The folder appears when
-it is whole.
+In: a `Recording` and `PrepareSettings`. Out: a new folder with pictures, masks, depth and `sequence.toml`, and notes on
+every assumption. Frames are read, undistorted, resized and written one at a time. The folder appears when it is
+complete.
 """
 
 from collections.abc import Callable
@@ -42,19 +42,19 @@ from endotsr.sequences.splits import evenly_spaced
 from endotsr.sequences.stated_depth import refuse_no_lengths
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
-from endotsr.sequences.writing import new_folder
+from endotsr.untrusted.writing import new_folder
 
-DEPTH_LEVELS = 65535 // 8  # of the 16 bits for the usual largest depth of a frame; eight times more still fits
-LARGEST = 99.8  # percentile of a frame that counts as its largest depth; single values may be outliers
+DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
+LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers
 OnFrame = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class PrepareSettings:
-    """What is made of a recording."""
+    """Settings of the conversion."""
 
     frames: str = ""  # of the source; see `editing.chosen_frames`
-    drop: str = ""  # frames that are left out, in the same words
+    drop: str = ""  # frames to omit, in the same syntax
     rate: float | None = None  # frames per second to keep
     scale: float = 1.0
     gaps: Literal["refuse", "drop", "fill"] = "refuse"  # frames without mask or pose where others have one
@@ -69,12 +69,12 @@ def prepare(
     on_frame: OnFrame = lambda i, n: None,
     replace: bool = False,
 ) -> tuple[SequenceFile, list[str]]:
-    """Write the frames to the new folder `out`. Returns `sequence.toml` and the notes.
+    """Write the frames to the new folder `out`. Returns the contents of `sequence.toml`, and the notes.
 
     on_frame  called with (frames written, frames in all)
-    replace   whether a folder that `prepare` wrote may be replaced, once the new one is whole
+    replace   whether a folder written by `prepare` may be replaced once the new one is complete
 
-    Raises:  InputError; nothing is left behind then.
+    Raises:  InputError, leaving nothing behind.
     """
     notes = list(recording.notes)
     chosen = select_frames(recording, settings, notes)
@@ -106,7 +106,7 @@ def select_frames(recording: Recording, settings: PrepareSettings, notes: list[s
 
 
 def _seconds(recording: Recording, frames: list[int]) -> NDArray[np.float64]:
-    """Seconds of these frames; their numbers where neither times nor a rate are known."""
+    """Times of these frames, seconds; their numbers if neither times nor a rate are known."""
     numbers = np.array(frames, np.float64)
     return numbers / (recording.rate or 1.0) if recording.times is None else recording.times[frames]
 
@@ -114,9 +114,9 @@ def _seconds(recording: Recording, frames: list[int]) -> NDArray[np.float64]:
 def written_times(
     recording: Recording, frames: list[int], rate: float | None, notes: list[str]
 ) -> tuple[list[float] | None, float]:
-    """The times that `sequence.toml` states, None where the frames are evenly spaced, and the mean frame rate.
+    """The times for `sequence.toml`, None for evenly spaced frames, and the mean frame rate.
 
-    rate     that was asked for
+    rate     the requested frame rate, or None
     """
     seconds = _seconds(recording, frames)
     if len(frames) < 2:
@@ -139,7 +139,7 @@ def written_times(
 def _poses_and_masks(
     recording: Recording, chosen: list[int], gaps: str, notes: list[str]
 ) -> tuple[list[int], list[CameraPose] | None]:
-    """The frames that are written and their poses; gaps are refused, left out or filled, and named."""
+    """The frames to write and their poses. Gaps are refused, dropped or filled, and noted."""
     lacking: dict[str, list[int]] = {}
     if recording.poses is not None:
         lacking["pose"] = [i for i in chosen if recording.poses[i] is None]
@@ -151,7 +151,7 @@ def _poses_and_masks(
         named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
         if gaps == "refuse" or len(frames) == len(chosen):
             raise InputError(f"{recording.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
-        filling = "the pose is between its neighbours" if what == "pose" else "the mask is that of the nearest frame"
+        filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
     if gaps == "drop":
         without = set().union(*lacking.values())
@@ -201,15 +201,13 @@ def _write_frames(
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
-        notes.append(
-            f"{saturated} pixels lie beyond {65535 * depth_scale:g}, eight times the usual depth: cut off there"
-        )
+        notes.append(f"{saturated} pixels are clipped at {65535 * depth_scale:g}, eight times the usual depth")
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(recording, straight, turned, chosen, depth_scale, settings, notes)
 
 
 def _checked(recording: Recording, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
-    """The pictures in the new camera. Raises InputError for a frame of another size than the first."""
+    """The pictures in the new camera. Raises InputError for a frame with another size than the first."""
     size = pair.left.shape[:2]
     expected = straight.left.x.shape if straight.left else None
     source = recording.rig.left if recording.rig else recording.lens
@@ -225,7 +223,7 @@ def _checked(recording: Recording, i: int, pair: PicturePair, straight: Straight
 
 
 def _mask_or_nearest(recording: Recording, i: int, chosen: list[int]) -> NDArray[np.bool_]:
-    """The mask of a frame, or that of the nearest frame that has one."""
+    """The mask of a frame, or of the nearest frame with a mask."""
     assert recording.masks is not None
     for other in sorted(chosen, key=lambda k: (abs(k - i), k)):
         found = recording.masks(other)
@@ -251,7 +249,7 @@ def _depth(
 
 
 def step_of_depth(largest: float) -> float:
-    """The length of one step of 16-bit depth: 1, 2 or 5 times a power of ten, so that eight times `largest` fits."""
+    """The step of 16-bit depth: the smallest 1, 2 or 5 times a power of ten for which eight times `largest` fits."""
     least = largest / DEPTH_LEVELS
     power = 10.0 ** np.floor(np.log10(least))
     return float(f"{next(factor for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)) * power:.1g}")
@@ -276,7 +274,7 @@ def _depth_file(folder: Path, k: int) -> Path:
 
 
 def write_levels(path: Path, depth: NDArray[np.float32], step: float) -> int:
-    """16-bit steps; where there is depth, at least 1. Returns the number of pixels that do not fit and are cut off."""
+    """Write depth in 16-bit steps, at least 1 where there is depth. Returns the number of pixels clipped at 65535."""
     levels = np.rint(depth / step)
     write_png(path, np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16))
     return int(np.count_nonzero(levels > 65535))
@@ -314,7 +312,7 @@ def _file_of(
 
 
 def camera_entry(lens: Lens, baseline: float | None) -> CameraEntry:
-    """The [camera] of a lens without distortion."""
+    """The section [camera] of a lens without distortion."""
     fx, fy, cx, cy = (float(value) for value in (lens.fx, lens.fy, lens.cx, lens.cy))
     return CameraEntry(
         width=lens.width, height=lens.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
@@ -322,5 +320,5 @@ def camera_entry(lens: Lens, baseline: float | None) -> CameraEntry:
 
 
 def pose_row(pose: CameraPose) -> list[float]:
-    """The twelve numbers of [poses] matrices."""
+    """The twelve numbers of a pose in [poses] matrices."""
     return [float(value) for value in np.column_stack([pose.rotation, pose.translation]).ravel()]

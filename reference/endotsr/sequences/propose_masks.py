@@ -1,19 +1,19 @@
-"""Proposals of instrument masks without a network: grey metal on red tissue, and motion unlike the tissue's.
+"""Proposed instrument masks without a network: grey metal on red tissue, and motion relative to the tissue.
 
 Tissue is red, orange or mauve, and metal is grey. With the redness of a pixel,
 
     s = (R - min(G, (G + B) / 2)) / (R + G + B + FLOOR),
 
 and the usual redness m of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m join them.
-Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. A
-region of that kind is an instrument if it is large and enters from the border of the picture, if it moves unlike the
-tissue around it, or if it lies where the frame before or after has an instrument. Other regions, such as highlights,
-are left to the tissue. Instruments of the colour of tissue and blood-covered ones are not found.
+Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. Such a
+region is an instrument if it is large and enters from the border of the picture, if it moves relative to the
+surrounding tissue, or if it overlaps an instrument of the previous or next frame. Other regions, such as highlights,
+remain tissue. Tissue-coloured and blood-covered instruments are not found.
 
-A scope shows tissue in a round or cut-off field of view, and what lies outside of it is dark in all frames. That border
-is found first, from all frames together, and excluded in each; it takes no part in the search.
+A scope shows tissue in a round or truncated field of view, and the border outside it is dark in all frames. That border
+is found first, from all frames together. It is excluded in every frame and from the search.
 
-In: the pictures of a clip. Out: a `Proposal`, or the reason why there is none. A person has to look at it.
+In: the pictures of a clip. Out: a `Proposal`, or the reason why there is none. A person has to inspect it.
 """
 
 from collections.abc import Iterable
@@ -27,33 +27,33 @@ from endotsr.opencv import area_resize, dense_flow
 from endotsr.sequences.recording import Picture
 from endotsr.sequences.smaller import nearest_pixels
 
-WORKING = 320  # px, the longer side of the pictures that are searched
+WORKING = 320  # px, longer side of the working pictures
 FLOOR = 12.0  # grey levels: the redness of a black pixel is noise
 SEED, GROW = 0.12, 0.4  # of the usual redness
-LEAST_REDNESS = 0.05  # usual redness of a clip, below which metal does not stand out
+LEAST_REDNESS = 0.05  # usual redness of a clip; below it, metal is not distinguishable
 LEAST_AREA = 0.003  # of the picture
-ENTERING_AREA = 0.008  # of the picture, for a region that is known by the border alone
-CLOSING, MARGIN = 0.012, 0.02  # of the longer side: gaps that are closed, and the border added around a region
-RING = 0.05  # of the longer side: tissue around a region, whose motion is that of the tissue there
+ENTERING_AREA = 0.008  # of the picture, for a region accepted only because it touches the border
+CLOSING, MARGIN = 0.012, 0.02  # of the longer side: closed gaps, and margin added to a region
+RING = 0.05  # of the longer side: ring around a region whose motion counts as tissue motion
 UNLIKE = 1.5  # px at the working size: motion relative to the tissue
-OVERLAP = 0.5  # of a region, with the instruments of a neighbouring frame
-DARK = 20.0  # grey levels: pixels that no frame shows brighter are outside of the field of view
-LEAST_OUTSIDE, LEAST_INSIDE = 0.01, 0.05  # of the picture: a smaller border is none, a smaller field of view no view
-SOFT_EDGE = 2  # px at the working size, excluded inside the field of view: its edge is blurred
-LITTLE_TISSUE = 0.05  # of the field of view: a frame that keeps less shows hardly any tissue
+OVERLAP = 0.5  # fraction of a region that overlaps the instruments of a neighbouring frame
+DARK = 20.0  # grey levels: pixels that are never brighter are outside the field of view
+LEAST_OUTSIDE, LEAST_INSIDE = 0.01, 0.05  # of the picture: smallest border and smallest field of view
+SOFT_EDGE = 2  # px at the working size: the blurred edge of the field of view, which is excluded
+LITTLE_TISSUE = 0.05  # of the field of view; a frame with less has almost no tissue
 
 
 class Proposal(NamedTuple):
     """Proposed masks."""
 
-    excluded: list[BoolArray]  # (H, W) a frame, True = instrument; empty if nothing was found
-    reason: str  # how many frames have an instrument, or why there is no proposal
-    outside: float = 0.0  # fraction of the picture outside of the field of view, excluded in every frame
-    without_tissue: tuple[int, ...] = ()  # frames in which hardly anything else is left
+    excluded: list[BoolArray]  # (H, W) per frame, True = instrument; empty if nothing was found
+    reason: str  # number of frames with an instrument, or why there is no proposal
+    outside: float = 0.0  # fraction of the picture outside the field of view, excluded in every frame
+    without_tissue: tuple[int, ...] = ()  # frames with almost no remaining tissue
 
     @property
     def found(self) -> bool:
-        """Whether there is anything to look at."""
+        """Whether there are proposed masks."""
         return bool(self.excluded)
 
 
@@ -61,13 +61,13 @@ class _Region(NamedTuple):
     """A connected grey region of one frame."""
 
     pixels: BoolArray  # (h, w)
-    enters: bool  # large, and at the border of the picture
+    enters: bool  # large, and touches the border of the picture
 
 
 def propose_masks(pictures: Iterable[Picture]) -> Proposal:
-    """Masks of the instruments in the pictures (H, W, 3) of a clip, in time order.
+    """Instrument masks for the pictures (H, W, 3) of a clip, in time order.
 
-    Edges:  one picture alone: motion says nothing. A clip without colour: no proposal.
+    Edges:  a single picture: motion is not used. A clip without colour: no proposal.
     """
     small, sizes = [], []
     for picture in pictures:
@@ -89,16 +89,16 @@ def propose_masks(pictures: Iterable[Picture]) -> Proposal:
 
 
 def _without_tissue(excluded: list[BoolArray], view: float) -> tuple[int, ...]:
-    """Frames that keep less than `LITTLE_TISSUE` of the field of view, which is the fraction `view` of the picture."""
+    """Frames with less than `LITTLE_TISSUE` of the field of view left; `view` is its fraction of the picture."""
     return tuple(i for i, plane in enumerate(excluded) if 1 - plane.mean() < LITTLE_TISSUE * view)
 
 
 def outside_of_view(pictures: list[Picture]) -> BoolArray:
-    """(h, w) True outside of the field of view: dark in all pictures, and joined to the border of the picture.
+    """(h, w) True outside the field of view: dark in all pictures and connected to the border.
 
-    What is bright out there, such as a text, is outside too: the field of view is one region without holes.
+    Bright areas out there, such as text, are also outside: the field of view is one region without holes.
 
-    Edges:  pictures of several sizes, hardly any border, or hardly any view: False everywhere.
+    Edges:  pictures of several sizes, almost no border or almost no field of view: False everywhere.
     """
     from scipy import ndimage
 
@@ -125,20 +125,20 @@ def outside_of_view(pictures: list[Picture]) -> BoolArray:
 
 
 def _instruments(small: list[Picture], outside: BoolArray) -> tuple[list[BoolArray], str]:
-    """The instruments of every picture, empty without any, and the reason. Outside of the view nothing is searched."""
+    """The instruments of every picture, empty if there are none, and the reason. Only the field of view is searched."""
     redness = [_redness(picture) for picture in small]
     bounded = bool(outside.any())
     inside = [plane[~outside][::16] if bounded else plane[::4, ::4].ravel() for plane in redness]
     usual = float(np.median(np.concatenate(inside)))
     if usual < LEAST_REDNESS:
-        return [], f"the usual redness is {usual:.3f}: grey metal does not stand out from such pictures"
-    if bounded:  # towards the edge of the view the pictures are too dark to have a colour
+        return [], f"the usual redness is {usual:.3f}: grey metal is not distinguishable in such pictures"
+    if bounded:  # near the edge of the view, pixels are too dark for a colour
         redness = [np.where(outside | (p.max(axis=2) < DARK), usual, r) for r, p in zip(redness, small)]
     regions = [_regions(plane, usual, outside) for plane in redness]
     chosen = _chosen(small, regions)
     frames = sum(plane.any() for plane in chosen)
     if not frames:
-        return [], "no grey region enters from the border or moves unlike the tissue"
+        return [], "no grey region enters from the border or moves relative to the tissue"
     return chosen, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}"
 
 
@@ -149,7 +149,7 @@ def _reduced(picture: Picture) -> Picture:
 
 
 def _redness(picture: Picture) -> FloatArray:
-    """(h, w) in [-0.5, 1], smoothed over a pixel or two."""
+    """(h, w) in [-0.5, 1], smoothed with a standard deviation of 1 px."""
     from scipy.ndimage import gaussian_filter
 
     red, green, blue = (gaussian_filter(picture[..., k].astype(np.float32), 1.0) for k in range(3))
@@ -157,12 +157,12 @@ def _redness(picture: Picture) -> FloatArray:
 
 
 def _regions(redness: FloatArray, usual: float, outside: BoolArray) -> list[_Region]:
-    """Connected grey regions, without the smallest. One enters at the border of the picture or of the field of view."""
+    """Connected grey regions above the least area. They enter at the border of the picture or of the field of view."""
     from scipy import ndimage
 
     reach = max(1, round(CLOSING * max(redness.shape)))
     grown = ndimage.binary_propagation(redness < SEED * usual, mask=redness < GROW * usual)
-    padded = np.pad(ndimage.binary_opening(grown), reach, "edge")  # closing must not retreat from the border
+    padded = np.pad(ndimage.binary_opening(grown), reach, "edge")  # closing must not erode at the border
     closed = ndimage.binary_closing(padded, iterations=reach)[reach:-reach, reach:-reach]
     labels: Any
     labels, count = ndimage.label(ndimage.binary_fill_holes(closed))  # pyright: ignore[reportGeneralTypeIssues]
@@ -178,7 +178,7 @@ def _regions(redness: FloatArray, usual: float, outside: BoolArray) -> list[_Reg
 
 
 def _chosen(pictures: list[Picture], regions: list[list[_Region]]) -> list[BoolArray]:
-    """The union of the instruments of every frame."""
+    """The union of the instruments, per frame."""
     chosen, left = [], []
     for i, found in enumerate(regions):
         flow = _flow(pictures, i) if any(not region.enters for region in found) else None
@@ -200,7 +200,7 @@ def _chosen(pictures: list[Picture], regions: list[list[_Region]]) -> list[BoolA
 
 
 def _flow(pictures: list[Picture], i: int) -> NDArray[np.float32] | None:
-    """(2, h, w) px to the next picture, of the last one to the picture before; None without another of its size."""
+    """(2, h, w) px to the next picture, for the last one to the previous; None without a neighbour of equal size."""
     other = i + 1 if i + 1 < len(pictures) else i - 1
     if other < 0 or pictures[other].shape != pictures[i].shape:
         return None
@@ -209,7 +209,7 @@ def _flow(pictures: list[Picture], i: int) -> NDArray[np.float32] | None:
 
 
 def _moves_alone(pixels: BoolArray, flow: NDArray[np.float32]) -> bool:
-    """Whether the median motion of a region differs from that of the tissue around it."""
+    """Whether the median motion of a region differs from the surrounding tissue."""
     from scipy.ndimage import binary_dilation
 
     reach = max(2, round(RING * max(pixels.shape)))
@@ -230,7 +230,7 @@ def _widened(plane: BoolArray) -> BoolArray:
 
 
 def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:
-    """The mask at the size of its picture."""
+    """The mask at picture size."""
     return nearest_pixels(plane, size[1], size[0], "mask")
 
 

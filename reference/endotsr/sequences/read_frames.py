@@ -1,7 +1,6 @@
-"""All frames of a clip read into arrays, in several threads, with the facts that the checks need.
+"""Reading all frames of a clip into arrays, in several threads, with the facts for the checks.
 
-In: the files, what a layout knows of their size and units, and the settings. Out: the arrays, in memory or in a file
-(see `frame_store`).
+In: the files with their size and units, and the settings. Out: the arrays, in memory or in a file (see `frame_store`).
 """
 
 from functools import partial
@@ -24,21 +23,21 @@ from endotsr.untrusted.files import in_threads
 
 
 class FrameFiles(NamedTuple):
-    """The files of the selected frames, and what the layout knows of them."""
+    """The files of the selected frames, with their size, units and conventions."""
 
     images: list[Path]
     masks: list[Path]  # empty: every pixel is tissue
     depth: list[Path]
     size: tuple[int, int]  # width and height of every file
-    size_said: str  # what has or states this size, for messages
+    size_said: str  # source of this size, for messages
     excluded_value: str  # of the masks, white or black
     unit: str  # of the sequence, in words
     depth_unit: str  # of the numbers of a depth file
-    depth_scale: float = 1.0  # from it to the unit of the sequence
-    stated_in: str = ""  # the file that states the excluded value; "": the settings do
+    depth_scale: float = 1.0  # unit of the sequence per unit of a depth file
+    stated_in: str = ""  # the file that states the excluded value; "": the settings state it
     arbitrary: bool = False  # the unit is unknown: the scale of the world is free
     seconds: NDArray[np.float64] | None = None  # (n,) of the frames, ascending; None: evenly spaced
-    assumed: str = ""  # what is not measured of the depth
+    assumed: str = ""  # properties of the depth that are not measured
     duration: float = 0.0  # seconds from time 0 to time 1; 0 = unknown
 
 
@@ -48,14 +47,14 @@ class Frames(NamedTuple):
     images: NDArray[np.uint8]  # (n, 3, H, W)
     masks: NDArray[np.bool_]  # (n, H, W) True = tissue; everywhere without masks
     depth: NDArray[np.float32]  # (n, H, W) clipped; 0 = none
-    facts: tuple[list[FrameFacts], list[DepthFacts]]  # n of each: what the checks need of pictures and stored depth
+    facts: tuple[list[FrameFacts], list[DepthFacts]]  # n of each: facts on pictures and stored depth, for the checks
     store: FrameStore
 
 
 def read_frames(files: FrameFiles, config: SequenceConfig, where: object, notes: list[str]) -> Frames:
-    """Read everything; notes on the masks are appended.
+    """Read all files; notes on the masks are appended.
 
-    Raises:  InputError naming the file of the first frame that cannot be used, or for a clip that fits nowhere.
+    Raises:  InputError naming the file of the first unusable frame, or for a clip that fits neither memory nor disk.
     """
     (width, height), n = files.size, len(files.images)
     store = FrameStore(n, width, height, config.memory, where)
@@ -90,14 +89,14 @@ def read_frames(files: FrameFiles, config: SequenceConfig, where: object, notes:
 
 
 def of_size(pixels: NDArray, path: Path, size: tuple[int, int], said: str) -> NDArray:
-    """The pixels of a file. Raises InputError unless they have the width and height that `said` has or states."""
+    """The pixels of a file. Raises InputError for another width and height than `size`, whose source is `said`."""
     if pixels.shape[1::-1] != size:
         raise InputError(f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, {said} {size[0]}x{size[1]}")
     return pixels
 
 
 def _kept(plane: NDArray, stored: NDArray[np.uint8] | None, i: int) -> NDArray:
-    """The mask, or its copy in the array of the store where there is one and it fits."""
+    """The mask, or its copy in the array of the store if there is one and the mask has 8 bits."""
     if stored is None or plane.dtype != np.uint8:
         return plane
     stored[i] = plane

@@ -1,7 +1,7 @@
-"""The record of a sequence: what rendering and measuring need of it once the pictures are elsewhere.
+"""The record of a sequence: the data that rendering and evaluation need without the pictures.
 
-It is `sequence.json` of a run folder, and a part of the header of a slim model. In: a sequence, or such a file, which
-is user input. Out: `SequenceRecord`, checked, or an `InputError` that names the file, the key and what is allowed.
+It is stored as `sequence.json` in a run folder and in the header of a slim model. In: a sequence, or such a file, which
+is user input. Out: a checked `SequenceRecord`, or an `InputError` that names the file, the key and what is allowed.
 """
 
 from pathlib import Path
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
     from endotsr.splatting.camera import Camera
 
-UNKNOWN_RATE = 15.0  # frames per second at which a film or an animation shows a recording of unknown rate
+UNKNOWN_RATE = 15.0  # frames per second of films and animations of a recording of unknown rate
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1
 Row = tuple[Length, Length, Length]
 
@@ -40,7 +40,7 @@ class RecordedCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     @property
     def camera(self) -> "Camera":
-        """The same with arrays."""
+        """The camera with arrays."""
         import numpy as np
 
         from endotsr.splatting.camera import Camera
@@ -50,16 +50,16 @@ class RecordedCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 class SequenceRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """Names, times, split and cameras of a sequence. Keys of a file that are not listed are left alone."""
+    """Names, times, split and cameras of a sequence. Unknown keys of a file are ignored."""
 
     unit: Text  # the scene unit, in words
     largest_depth: Annotated[float, msgspec.Meta(ge=0, le=1e30)]  # scene units
     static_camera: bool
-    names: list[Text]  # of the n frames; they can be the names of files
+    names: list[Text]  # of the n frames, safe as file names
     times: list[Fraction]  # n times, normalised
     train_index: list[Count]
     test_index: list[Count]
-    cameras: list[RecordedCamera]  # n of them, or one that does not move
+    cameras: list[RecordedCamera]  # n of them, or one static camera
     duration: Annotated[float, msgspec.Meta(ge=0, le=1e12)] = 0.0  # seconds from time 0 to time 1; 0 = unknown
 
     @property
@@ -76,7 +76,7 @@ class SequenceRecord(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def frame_cameras(self) -> "list[Camera]":
-        """The camera of every frame; one and the same object where it does not move."""
+        """The camera of every frame; the same object for all frames of a static camera."""
         found = [entry.camera for entry in self.cameras]
         return found * self.count if self.static_camera else found
 
@@ -98,7 +98,7 @@ def record_of(sequence: "Sequence") -> SequenceRecord:
 
 
 def recorded(cameras: "list[Camera]") -> list[RecordedCamera]:
-    """Cameras as a record holds them."""
+    """Cameras in the form of a record."""
     found = []
     for camera in cameras:
         pose = {"rotation": camera.rotation.tolist(), "translation": camera.translation.tolist()}
@@ -109,7 +109,7 @@ def recorded(cameras: "list[Camera]") -> list[RecordedCamera]:
 
 
 def nearest_frame(times: "list[float] | NDArray[np.float64]", time: float) -> int:
-    """The frame whose time is nearest; of two at the same distance the earlier one."""
+    """The frame with the nearest time; the earlier of two equally near ones."""
     return min(range(len(times)), key=lambda i: (abs(times[i] - time), i))
 
 
@@ -119,13 +119,13 @@ def read_sequence_record(path: Path) -> SequenceRecord:
 
 
 def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
-    """The record that plain data holds.
+    """The record in plain data.
 
-    prefix   of the keys in messages
+    prefix   prefix of the keys in messages
 
-    Raises:  InputError for a key that is missing or has another type or range, or contradicts another key: names are
-             distinct, frame numbers exist, no frame is both training and held out, and cameras have a rotation and at
-             most 2^26 pixels.
+    Raises:  InputError for a key that is missing, has another type or range, or contradicts another key: names are
+             distinct, frame numbers exist, no frame is both training and held out, and cameras have a valid rotation
+             and at most 2^26 pixels.
     """
     for field in msgspec.structs.fields(SequenceRecord):
         if field.required and (not isinstance(data, dict) or field.name not in data):

@@ -1,9 +1,8 @@
-"""A recording: what a layout finds at a path, before anything is read whole.
+"""A recording: the contents of a path in some layout, decoded on demand.
 
-Every layout hands out the same `Recording`: frames that are decoded when they are asked for, and beside them whatever
-exists of masks, depth, calibration and poses. `prepare` turns it into the common format. Conventions: pixel edges lie
-at integers (the centre of the first pixel is at 0.5), poses are world-to-camera in OpenCV axes, masks are True on
-tissue, a depth of 0 means no depth.
+Every layout returns a `Recording`: frames that are decoded on demand, with masks, depth, calibration and poses if they
+exist. `prepare` converts it into the common format. Conventions: pixel edges are at integers (the first pixel centre is
+at 0.5), poses are world-to-camera in OpenCV axes, masks are True on tissue, and a depth of 0 means no depth.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,7 +38,7 @@ class Lens(NamedTuple):
     distortion: tuple[float, ...] = ()  # OpenCV's order k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
 
     def scaled(self, width: int, height: int) -> "Lens":
-        """The lens of the picture resized to width x height; pixel edges stay aligned."""
+        """The lens of the picture resized to width x height, with aligned picture edges."""
         x, y = width / self.width, height / self.height
         return self._replace(fx=self.fx * x, cx=self.cx * x, fy=self.fy * y, cy=self.cy * y, width=width, height=height)
 
@@ -61,36 +60,36 @@ class CameraPose(NamedTuple):
 
 
 class PicturePair(NamedTuple):
-    """The pictures of one moment."""
+    """The pictures at one time."""
 
     left: Picture
     right: Picture | None = None
 
 
 class StatedDepth(NamedTuple):
-    """Depth files that a user names."""
+    """Depth files stated by a user."""
 
     path: Path
-    step: float  # length of one step of the stored numbers, in the unit of the recording
-    trusted: bool  # the user says that they hold lengths
+    step: float  # length per stored unit, in the unit of the recording
+    trusted: bool  # the user confirms that they contain lengths
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames of a source and all that is known about them. What the source lacks is None."""
+    """Frames of a source and everything known about them. None for anything that the source lacks."""
 
     layout: str
     where: Path
     names: list[str]
     pictures: Callable[[list[int]], Iterator[PicturePair]]  # of ascending frame numbers
     masks: Callable[[int], NDArray[np.bool_] | None] | None = None  # None: this frame has no mask
-    proposed: bool = False  # a program made the masks, and nobody has checked them
+    proposed: bool = False  # a program made the masks, and no person has checked them
     depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
-    stated_depth: StatedDepth | None = None  # where `depth` comes from, if the user named it
-    depth_clipped: bool = False  # to the percentiles of a training, before it was reduced
+    stated_depth: StatedDepth | None = None  # source of `depth`, if the user stated it
+    depth_clipped: bool = False  # to the percentiles of training, before resizing
     depth_method: str = "given"  # in words
-    depth_assumed: Literal["", "scale and shift", "shape"] = ""  # what is not measured of the depth
-    points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions that a frame sees, in `unit`
+    depth_assumed: Literal["", "scale and shift", "shape"] = ""  # properties of the depth that are not measured
+    points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions visible in a frame, in `unit`
     unit: str = "mm"
     lens: Lens | None = None
     rig: Rig | None = None
@@ -109,9 +108,9 @@ class Recording:
 def lens_of_matrix(
     matrix: FloatArray, width: int, height: int, distortion: tuple[float, ...] = (), *, where: object
 ) -> Lens:
-    """A lens from a 3x3 matrix in OpenCV's convention, whose pixel centres lie at integers: half a pixel is added.
+    """A lens from a 3x3 matrix in OpenCV's convention, with pixel centres at integers: half a pixel is added.
 
-    Raises:  InputError for entries that are not finite, a focal length that is not positive, or a skew.
+    Raises:  InputError for a matrix that is not finite or has skew, and as `checked_lens`.
     """
     numbers = np.asarray(matrix, np.float64)
     if numbers.shape != (3, 3) or not np.isfinite(numbers).all():
@@ -125,7 +124,11 @@ def lens_of_matrix(
 
 
 def checked_lens(lens: Lens, where: object) -> Lens:
-    """The lens. Raises InputError for a focal length that is not positive or a principal point far off the picture."""
+    """The lens, checked.
+
+    Raises:  InputError for values that are not finite, a focal length that is not positive, a principal point far
+             outside the picture, or another number of distortion coefficients than 0, 4, 5 or 8.
+    """
     if not np.isfinite([*lens[:4], *lens.distortion]).all():
         raise InputError(f"{where}: camera: allowed: finite numbers, got {lens[:4]} and distortion {lens.distortion}")
     if lens.fx <= 0 or lens.fy <= 0:
@@ -146,7 +149,7 @@ def opencv_matrix(lens: Lens) -> FloatArray:
 
 
 def grey_plane(pixels: NDArray[Any], where: object) -> NDArray[Any]:
-    """One channel of a picture that is grey in one or three equal channels. Raises InputError for a coloured one."""
+    """One channel of a grey picture with one or three equal channels. Raises InputError for a coloured picture."""
     if pixels.ndim == 3:
         if (pixels != pixels[:, :, :1]).any():
             raise InputError(f"{where}: coloured picture; one grey channel expected")

@@ -1,13 +1,13 @@
-"""Depth of a clip from one camera: the relative inverse depth of a network, or a plane where there is nothing.
+"""Depth of a monocular clip: relative inverse depth of a network, or a plane.
 
-A monocular network gives numbers r that grow towards the camera: 1 / z = scale r + shift, scale > 0, both unknown. They
-are found by comparison with the depth that the clip has already, such as the points of a reconstruction or stereo
-matches, in each frame or once for the sequence. Without any, they are assumed: `farthest` times as far as the nearest
-tissue, one line for the sequence. The scale is then free, because the depth loss compares depth divided by its maximum
-(B8), and the shift is an assumption about the shape.
+A monocular network outputs values r that increase towards the camera: 1 / z = scale r + shift with unknown scale > 0
+and shift. They are fitted to existing depth of the clip, such as the points of a reconstruction or stereo matches, per
+frame or once for the sequence. Without existing depth they are assumed: the farthest tissue is `farthest` times as far
+as the nearest, with one line for the sequence. The scale is then free, because the depth loss normalises depth by its
+maximum (B8). The shift is an assumption about the shape.
 
-In: a folder in the common format and files of r, one per frame. Out: depth frame by frame, and a sentence on what is
-assumed.
+In: a folder in the common format and files of r, one per frame. Out: depth frame by frame, and a sentence on the
+assumptions.
 """
 
 from collections.abc import Callable, Iterator
@@ -27,10 +27,10 @@ from endotsr.sequences.sequence_file import Assumed
 from endotsr.sequences.smaller import nearest_pixels
 
 Align = Literal["auto", "frame", "sequence"]
-FEWEST, MOST = 20, 400  # pixels that both know: needed for a line, and used for its robust estimate
-SPREAD = 3 * 1.4826  # median absolute residuals: a pixel beyond takes no part in the last fit
-EXTREMES = (1.0, 99.0)  # percentiles of r that count as the farthest and the nearest
-LOOKED_AT = 8  # frames whose light is compared
+FEWEST, MOST = 20, 400  # pixels with both values: needed for a line, and used for its robust estimate
+SPREAD = 3 * 1.4826  # median absolute residuals; pixels beyond are excluded from the last fit
+EXTREMES = (1.0, 99.0)  # percentiles of r for the farthest and the nearest tissue
+LOOKED_AT = 8  # frames whose light is checked
 
 
 class StraightLine(NamedTuple):
@@ -40,9 +40,9 @@ class StraightLine(NamedTuple):
     shift: float
 
     def depth(self, relative: FloatArray, farthest: float = np.inf) -> NDArray[np.float32]:
-        """z (H, W) of r (H, W); 0 = none where r is not finite or the line gives no positive inverse depth.
+        """z (H, W) of r (H, W); 0 = none, where r is not finite or the inverse depth is not positive.
 
-        farthest   if finite, z is held between 1 and this
+        farthest   if finite, z is clipped to [1, farthest]
         """
         inverse = self.scale * relative + self.shift
         if np.isfinite(farthest):
@@ -53,7 +53,7 @@ class StraightLine(NamedTuple):
 
 
 class MadeDepth(NamedTuple):
-    """Depth that is ready to be written."""
+    """Depth ready to be written."""
 
     frames: Iterator[NDArray[np.float32]]  # (H, W) each, 0 = none
     method: str  # for sequence.toml
@@ -61,10 +61,11 @@ class MadeDepth(NamedTuple):
 
 
 def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
-    """The line of 1 / z over r, robust against pixels of either that are wrong.
+    """The line of 1 / z over r, robust against outliers in both.
 
-    relative, depth   (H, W) or (n,); r not finite or z = 0 takes no part
-    Repeated medians (half of the pixels may be wrong), then least squares over the pixels near that line.
+    relative, depth   (H, W) or (n,); pixels with r not finite or z = 0 are ignored
+
+    The fit uses repeated medians (half of the pixels may be wrong), then least squares over the pixels near that line.
 
     Edges:  fewer than `FEWEST` pixels, or one r everywhere, give None.
     """
@@ -88,12 +89,12 @@ def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
 def relative_depth(contents: Contents, source: Path, align: Align, farthest: float, trusted: bool) -> MadeDepth:
     """Depth of every frame from the files of r.
 
-    align      one line per frame or for the sequence; auto: a frame where the clip has depth, else the sequence
-    farthest   over the nearest depth; read only where the clip has no depth
-    trusted    whether the light may contradict the numbers
+    align      one line per frame or for the sequence; auto: per frame if the clip has depth, else for the sequence
+    farthest   ratio of the farthest to the nearest depth; used only if the clip has no depth
+    trusted    skip the comparison with the light
 
-    Raises:  InputError for numbers that fall towards the camera, poses that fix a scale which r does not have, and a
-             stereo pair, whose matches have one.
+    Raises:  InputError for values that decrease towards the camera, and, without existing depth, for moving poses or a
+             stereo pair, which fix a scale that r lacks.
     """
     files = list_pictures(source, DEPTH_ENDINGS)
     check_pairing(contents.images, files)
@@ -118,7 +119,7 @@ def relative_depth(contents: Contents, source: Path, align: Align, farthest: flo
 
 
 def flat_depth(contents: Contents) -> MadeDepth:
-    """A plane that faces the camera, in every frame. Raises InputError where poses or a stereo pair know more."""
+    """A fronto-parallel plane in every frame. Raises InputError if moving poses or a stereo pair determine depth."""
     _refuse_known_scale(contents)
     camera = contents.file.camera
     plane = np.ones((camera.height, camera.width), np.float32)
@@ -126,7 +127,7 @@ def flat_depth(contents: Contents) -> MadeDepth:
 
 
 def _aligned(contents: Contents, relative: Callable[[int], FloatArray], source: Path, align: Align) -> MadeDepth:
-    """Depth by lines that fit the depth of the clip."""
+    """Depth by lines fitted to the depth of the clip."""
     known = open_common(contents.folder).depth
     assert known is not None and contents.file.depth is not None
     count, apart = len(contents.images), []
@@ -157,7 +158,7 @@ def _aligned(contents: Contents, relative: Callable[[int], FloatArray], source: 
 
 
 def _sampled(relative: FloatArray, depth: NDArray[np.float32] | None, most: int) -> FloatArray:
-    """Some of the pixels that both know: r and z, (2, k)."""
+    """A sample of the pixels with both r and z, (2, k)."""
     if depth is None:
         return np.zeros((2, 0))
     both = np.flatnonzero(np.isfinite(relative) & (depth > 0))
@@ -166,7 +167,7 @@ def _sampled(relative: FloatArray, depth: NDArray[np.float32] | None, most: int)
 
 
 def _refuse_known_scale(contents: Contents) -> None:
-    """Raises InputError where the clip has lengths that an assumed scale would contradict."""
+    """Raises InputError if a stereo pair or moving poses fix the scale."""
     poses, file = contents.poses, contents.file
     if contents.right and file.camera.baseline:
         raise InputError(
@@ -183,7 +184,7 @@ def _refuse_known_scale(contents: Contents) -> None:
 def _assumed_line(
     relative: Callable[[int], FloatArray], group: list[int], farthest: float, source: Path
 ) -> StraightLine:
-    """The line that puts the nearest tissue of these frames at 1 and the farthest at `farthest`."""
+    """The line that maps the nearest tissue of these frames to 1 and the farthest to `farthest`."""
     samples = [values[np.isfinite(values)][::37] for values in map(relative, group)]
     low, high = np.percentile(np.concatenate(samples) if any(map(len, samples)) else [0.0], EXTREMES)
     if not high > low:
@@ -202,6 +203,6 @@ def _refuse_against_light(
         light.append(light_correlation(pair.left, lines[i].depth(relative(i)), tissue))
     if light_finding(light, str(source)):
         raise InputError(
-            f"{source}: the numbers are large where the pictures are dark, and near tissue is bright; allowed: a"
-            " relative inverse depth, larger = nearer, or --trust-depth for a light that is not on the scope"
+            f"{source}: the values are large where the pictures are dark, but near tissue is bright; allowed: a"
+            " relative inverse depth, larger = nearer, or --trust-depth for a light source off the scope"
         )

@@ -1,7 +1,7 @@
-"""A sequence in memory: the output of every reader and of the simulator, the input of training and evaluation.
+"""A sequence in memory: output of all readers and the simulator, input of training and evaluation.
 
-Pictures stay 8-bit (one byte per channel); `Sequence.frame` converts one of them on demand. File formats and
-mask polarities do not occur here: a mask is True on tissue, and a depth of 0 means no depth.
+Pictures remain 8-bit (one byte per channel); `Sequence.frame` converts one frame on demand. File formats and mask
+polarities are resolved: a mask is True on tissue, and a depth of 0 means no depth.
 """
 
 from dataclasses import dataclass, field
@@ -28,14 +28,14 @@ class Frame(NamedTuple):
 class Sequence:
     """n frames of H x W pixels with masks, depth prior, cameras and a split.
 
-    The notes are full sentences on what the reader assumed and found: polarity, fractions, thresholds, repairs.
+    The notes are sentences on the assumptions and findings of the reader: polarity, fractions, thresholds, repairs.
     """
 
     images: NDArray[np.uint8]  # (n, 3, H, W) display RGB
     masks: NDArray[np.bool_]  # (n, H, W)    True = tissue
     depth: NDArray[np.float32]  # (n, H, W)    view-space z, scene units; 0 = no depth
     times: NDArray[np.float64]  # (n,)         normalised, in [0, 1)
-    cameras: list[Camera]  # n entries; one and the same object when the camera is static
+    cameras: list[Camera]  # n entries; the same object for a static camera
     names: list[str]  # n names, for messages and written pictures
     unit: str  # the scene unit, in words
     static_camera: bool
@@ -69,7 +69,7 @@ class Sequence:
 
     @property
     def frame_rate(self) -> float | None:
-        """Frames a second, on average; None where it is unknown."""
+        """Mean frame rate, frames per second; None: unknown."""
         return self.count / self.duration if self.duration else None
 
     @property
@@ -84,11 +84,11 @@ class Sequence:
 
     @property
     def tissue_fraction(self) -> float:
-        """Fraction of all pixels of all frames that is tissue."""
+        """Fraction of tissue among all pixels of all frames."""
         return float(self.masks.mean())
 
     def tissue_depth(self, index: int) -> float | None:
-        """Median depth of the tissue of a frame, scene units; None where no depth is known."""
+        """Median depth of the tissue of a frame, scene units; None without depth."""
         depth = self.depth[index][self.masks[index]]
         known = depth[depth > 0]
         return float(np.median(known)) if known.size else None

@@ -1,11 +1,11 @@
-"""The file `sequence.toml` of the common format: what the pictures of a folder mean.
+"""The file `sequence.toml` of the common format, which describes the pictures of a folder.
 
     format = "endotsr-sequence-1"
     source = "P2_8 (stereomis)"        # where the frames come from, in words
     frames = 120
     unit = "mm"                        # of poses and baseline; um, mm, cm, m or arbitrary
     frame_rate = 25.0                  # frames per second, on average; 0 = unknown
-    times = [0.0, 0.04, 0.12, ...]     # seconds of the frames, ascending; absent: the frames are evenly spaced
+    times = [0.0, 0.04, 0.12, ...]     # seconds of the frames, ascending; absent: evenly spaced
 
     [camera]                           # pixels; the centre of the first pixel is at (0.5, 0.5)
     width = 640 ... height, fx, fy, cx, cy
@@ -21,17 +21,17 @@
     folder = "depth"
     unit = "mm"
     scale = 0.01                       # length = stored value x scale, in `unit`; 0 = no depth here
-    clipped = []                       # percentiles to which depth was clipped before it was reduced: not done again
+    clipped = []                       # percentiles to which depth was clipped when it was resized: not repeated
     method = "given"
-    assumed = ""                       # what is not measured: "", "scale and shift" or "shape"
+    assumed = ""                       # properties not measured: "", "scale and shift" or "shape"
 
-    [poses]                            # absent: the camera rests at the origin
+    [poses]                            # absent: static camera at the origin
     direction = "world_to_camera"      # or "camera_to_world"
     axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
     matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers per frame
 
-In: the file. Out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder `images/` holds
-one picture per frame, `images_right/` the right pictures of a stereo pair.
+In: the file. Out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder `images/`
+contains one picture per frame, `images_right/` the right pictures of a stereo pair.
 """
 
 from pathlib import Path
@@ -52,7 +52,7 @@ IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 OPENGL = np.diag([1.0, -1.0, -1.0])  # OpenGL axes to OpenCV axes, and back
 Unit = Literal["um", "mm", "cm", "m", "arbitrary"]
-Assumed = Literal["", "scale and shift", "shape"]  # of the depth: what is not measured
+Assumed = Literal["", "scale and shift", "shape"]  # properties of the depth that are not measured
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
@@ -96,7 +96,7 @@ class DepthEntry(Section, frozen=True, kw_only=True):
 
 
 class PoseEntry(Section, frozen=True, kw_only=True):
-    """One pose a frame."""
+    """One pose per frame."""
 
     direction: Literal["world_to_camera", "camera_to_world"] = "world_to_camera"
     axes: Literal["opencv", "opengl"] = "opencv"
@@ -124,7 +124,7 @@ class SequenceFile(Section, frozen=True, kw_only=True):
 
     @property
     def unit_in_words(self) -> str:
-        """The unit of all lengths, with what is assumed of them; it stands beside every length that is written."""
+        """The unit of all lengths, with their assumptions; it accompanies every reported length."""
         assumed = f", {self.depth.assumed} of the depth assumed" if self.depth and self.depth.assumed else ""
         return f"arbitrary unit{assumed}" if self.arbitrary else "mm"
 
@@ -174,7 +174,7 @@ def read_sequence_file(folder: Path) -> SequenceFile:
 
 
 def _check_times(found: SequenceFile, path: Path) -> None:
-    """Raises InputError unless there is one time per frame, and each lies after the one before."""
+    """Raises InputError unless there is one finite time per frame, in ascending order."""
     if found.times is None:
         return
     if len(found.times) != found.frames:
@@ -186,7 +186,7 @@ def _check_times(found: SequenceFile, path: Path) -> None:
 
 
 def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> None:
-    """A missing key of a section, and a list of numbers with something else in it, named by their full path."""
+    """Raises InputError for a missing key or an invalid list of numbers in a section, naming the full key."""
     refuse_unknown_keys(data, kind, str(path), f"{key}.")
     for field in msgspec.structs.fields(kind):
         if field.required and field.name not in data:
@@ -205,7 +205,7 @@ def _plain_name(folder: str) -> bool:
 
 
 def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
-    """World-to-camera poses in OpenCV axes, translation in scene units; None if the camera rests.
+    """World-to-camera poses in OpenCV axes, translation in scene units; None for a static camera.
 
     Raises:  InputError naming the frame.
     """
@@ -219,9 +219,9 @@ def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
 
 
 def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
-    """As `read_poses`, with None instead of a pose that is none, and the reasons.
+    """As `read_poses`, with None for an invalid pose, and the reasons.
 
-    Raises:  InputError for their number.
+    Raises:  InputError for a wrong number of poses.
     """
     try:
         every = read_poses(found, path)
@@ -256,13 +256,13 @@ def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> Camer
 
 
 def inverse_pose(rotation: FloatArray, translation: FloatArray) -> CameraPose:
-    """World-to-camera from camera-to-world, and back."""
+    """World-to-camera from camera-to-world, or the reverse."""
     turned = np.ascontiguousarray(rotation.T)
     return CameraPose(turned, -turned @ translation + 0.0)
 
 
 def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
-    """A rotation. Raises InputError for anything else."""
+    """The matrix. Raises InputError unless it is a finite rotation."""
     if not np.isfinite(matrix).all():
         raise InputError(f"{where}: the rotation is not finite")
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROTATION_TOLERANCE:
@@ -278,5 +278,5 @@ def write_sequence_file(found: SequenceFile, folder: Path) -> None:
 
 
 def sequence_text(found: SequenceFile) -> str:
-    """The TOML text."""
+    """The contents as TOML text."""
     return toml_text(msgspec.to_builtins(found))

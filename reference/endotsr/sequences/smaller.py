@@ -1,7 +1,7 @@
 """Frames at a smaller size: for `sequence.scale`, and for the coarse start (specification B17).
 
-A picture is averaged over areas, a pixel is tissue where every pixel under it is, and a depth is the mean of the known
-ones under it. In: the arrays of all frames, or a `Sequence`. Out: the same, smaller.
+A picture is averaged over areas. A pixel is tissue if all pixels it covers are. A depth is the mean of the known depths
+it covers. In: the arrays of all frames, or a `Sequence`. Out: the same at a smaller size.
 """
 
 from dataclasses import replace
@@ -40,7 +40,7 @@ def smaller_frames(
 
 
 def smaller_cameras(cameras: list[Camera], width: int, height: int) -> list[Camera]:
-    """The cameras for smaller pictures, whose edges they keep; one object stays one object."""
+    """The cameras for smaller pictures, with aligned picture edges. A shared object remains shared."""
     scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
     return [scaled[id(camera)] for camera in cameras]
 
@@ -56,15 +56,15 @@ def halved(sequence: Sequence, memory: float) -> Sequence:
 
 
 def nearest_pixels(plane: NDArray, width: int, height: int, where: object) -> NDArray:
-    """A plane (H, W) at another size: of every pixel the nearest one, so that no value between two is made up.
+    """A plane (H, W) at another size by nearest-neighbour sampling, which invents no intermediate values.
 
-    Raises:  InputError for other proportions.
+    Raises:  InputError for another aspect ratio.
     """
     rows, columns = plane.shape
     if (rows, columns) == (height, width):
         return plane
-    if abs(columns * height - rows * width) > max(columns, width, rows, height):  # more than rounding makes
-        raise InputError(f"{where}: {columns}x{rows} pixels, the pictures have {width}x{height}: other proportions")
+    if abs(columns * height - rows * width) > max(columns, width, rows, height):  # more than rounding
+        raise InputError(f"{where}: {columns}x{rows} pixels, the pictures have {width}x{height}: another aspect ratio")
     row = ((np.arange(height) + 0.5) * rows / height).astype(np.intp)
     column = ((np.arange(width) + 0.5) * columns / width).astype(np.intp)
     return plane[row][:, column]

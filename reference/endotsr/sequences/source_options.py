@@ -1,4 +1,4 @@
-"""What a person may state about a source that its files do not say. Used by `endotsr prepare`."""
+"""Statements of a user about a source, for missing metadata. Used by `endotsr prepare`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,18 +13,18 @@ class SourceOptions:
     stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
     camera: tuple[float, ...] | None = None  # fx fy cx cy, pixel edges at integers
     distortion: tuple[float, ...] = ()
-    calibration: Path | None = None  # an ini file with StereoLeft and StereoRight
+    calibration: Path | None = None  # a file in one of `calibration_formats.FORMATS`
     baseline: float | None = None  # of a rectified pair, in `unit`
     trajectory: Path | None = None  # TUM: time or frame, position, quaternion x y z w
     direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
     axes: Literal["opencv", "opengl"] = "opencv"
-    trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None  # None: as the layout says
+    trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None  # None: the unit of the layout
     masks: Path | None = None
     excluded_value: Literal["white", "black"] = "white"
     depth: Path | None = None
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     depth_scale: float = 1.0
-    trust_depth: bool = False  # the files of `depth` hold lengths, whatever speaks against it
-    rate: float | None = None  # frames per second of the source; its pictures then count as evenly spaced
-    orientation: Literal["turned", "stored"] | None = None  # of a video that states a rotation
+    trust_depth: bool = False  # the files of `depth` contain lengths, despite any evidence to the contrary
+    rate: float | None = None  # frames per second; the pictures then count as evenly spaced
+    orientation: Literal["turned", "stored"] | None = None  # for a video that states a rotation
     points: Literal["interpolated", "sparse", "none"] = "interpolated"  # depth from points of a reconstruction

@@ -1,6 +1,6 @@
-"""Parts that several layouts use: picture files and videos as frames, masks and depth beside them, stated cameras.
+"""Parts shared by several layouts: picture files as frames, masks and depth, stated cameras.
 
-In: paths and the statements of `SourceOptions`. Out: functions of a `Recording`.
+In: paths and the statements of `SourceOptions`. Out: the fields of a `Recording`.
 """
 
 from collections.abc import Callable, Iterator
@@ -34,7 +34,7 @@ from endotsr.sequences.smaller import nearest_pixels
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
 
-PROPOSAL = "proposal.json"  # beside a folder of masks: a program proposed them
+PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
 
 
 def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
@@ -55,7 +55,7 @@ def size_of(files: list[Path]) -> tuple[int, int]:
 def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
     """Left and right of one stored picture: side by side (left half first), stacked (left on top), or none.
 
-    Raises:  InputError for a picture that has no two equal halves.
+    Raises:  InputError for a picture without two equal halves.
     """
     height, width = picture.shape[:2]
     if stereo == "none":
@@ -76,7 +76,7 @@ def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
 def pictures_from_files(
     left: list[Path], right: list[Path], stereo: str = "none"
 ) -> Callable[[list[int]], Iterator[PicturePair]]:
-    """Frames from picture files: two lists, or one whose pictures hold both."""
+    """Frames from picture files: two lists, or one list of pictures that contain both views."""
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i in wanted:
@@ -94,11 +94,11 @@ def mask_reader(
 ) -> Callable[[int], NDArray[np.bool_] | None]:
     """Tissue masks from files, one per frame; None where a frame has none.
 
-    A mask of another size is resized to the nearest pixel if its proportions are those of the picture. Values above
-    half of the largest are white, so that 0 and 1 are a mask, and the grey seams of a JPEG belong to their nearer side.
-    The polarity says which of the two is excluded.
+    A mask of another size but equal aspect ratio is resized by nearest-neighbour sampling. Values above half of the
+    largest are white: masks of 0 and 1 are valid, and intermediate JPEG values are rounded. The polarity states which
+    side is excluded.
 
-    Raises:  InputError for a picture of other proportions, or one that is no mask.
+    Raises:  InputError for another aspect ratio, or a picture that is not a mask.
     """
 
     def mask(i: int) -> NDArray[np.bool_] | None:
@@ -116,37 +116,32 @@ def mask_reader(
     return mask
 
 
-def beside(frames: list[Path], files: list[Path]) -> list[Path | None]:
-    """For every frame the file with its number, or None; without numbers, files and frames pair in order.
+def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | None]:
+    """The file with the number of each frame, or None. A single file, such as a field of view, matches all frames.
 
-    Raises:  InputError if nothing pairs.
+    frames   files, or the count of a video, whose frames have the numbers 0 .. count - 1
+
+    Edges:   without numbers, files are paired with frame files by name.
+    Raises:  InputError if nothing matches.
     """
     if len(files) == 1:
-        return [files[0]] * len(frames)  # one mask for all, such as a round field of view
-    here, there = frame_numbers(frames), frame_numbers(files)
-    if here is None or there is None or len(here[0]) != len(there[0]):
-        check_pairing(frames, files)
-        return list(files)
-    by_number = dict(zip(there, files))
-    found = [by_number.get(number) for number in here]
+        return [files[0]] * (frames if isinstance(frames, int) else len(frames))
+    numbers, where = frame_numbers(files), files[0].parent
+    if isinstance(frames, int):
+        if numbers is None or len(numbers[0]) != 1:
+            raise InputError(f"{where}: names without one frame number, such as {files[0].name}")
+        wanted = [(i,) for i in range(frames)]
+        missing = f"{where}: no file has a number from 0 to {frames - 1}, such as {files[0].name}"
+    else:
+        wanted = frame_numbers(frames)
+        if wanted is None or numbers is None or len(wanted[0]) != len(numbers[0]):
+            check_pairing(frames, files)
+            return list(files)
+        missing = f"{where}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}"
+    by_number = dict(zip(numbers, files))
+    found = [by_number.get(number) for number in wanted]
     if not any(found):
-        raise InputError(
-            f"{files[0].parent}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}"
-        )
-    return found
-
-
-def numbered(files: list[Path], count: int) -> list[Path | None]:
-    """For frames 0 .. count - 1 of a video the file with that number, or None. Raises InputError if none has one."""
-    numbers = frame_numbers(files)
-    if len(files) == 1:
-        return [files[0]] * count
-    if numbers is None or len(numbers[0]) != 1:
-        raise InputError(f"{files[0].parent}: names without one frame number, such as {files[0].name}")
-    by_number = {number[0]: file for number, file in zip(numbers, files)}
-    found = [by_number.get(i) for i in range(count)]
-    if not any(found):
-        raise InputError(f"{files[0].parent}: no file has a number from 0 to {count - 1}, such as {files[0].name}")
+        raise InputError(missing)
     return found
 
 
@@ -163,16 +158,15 @@ def depth_reader(files: list[Path | None], scale: float) -> Callable[[int], NDAr
 def stated_masks(
     options: SourceOptions, frames: list[Path] | int, width: int, height: int
 ) -> Callable[[int], NDArray[np.bool_] | None] | None:
-    """The masks of `--masks`, paired with frame files or with the numbers of a video; None without them."""
+    """The masks of `--masks`, paired with frame files or with the frame numbers of a video; None if not stated."""
     if options.masks is None:
         return None
     files = files_of(options.masks, PICTURE_ENDINGS)
-    paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
-    return mask_reader(paired, options.excluded_value, width, height)
+    return mask_reader(matching_files(frames, files), options.excluded_value, width, height)
 
 
 def masks_are_proposed(options: SourceOptions) -> bool:
-    """Whether the masks of `--masks` are those of `endotsr masks`, which nobody has checked."""
+    """Whether the masks of `--masks` are an unchecked proposal of `endotsr masks`."""
     return options.masks is not None and (options.masks.parent / PROPOSAL).is_file()
 
 
@@ -183,8 +177,7 @@ def stated_depth(
     if options.depth is None:
         return None
     files = files_of(options.depth, DEPTH_ENDINGS)
-    paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
-    return depth_reader(paired, depth_step(options))
+    return depth_reader(matching_files(frames, files), depth_step(options))
 
 
 def depth_step(options: SourceOptions) -> float:
@@ -193,9 +186,9 @@ def depth_step(options: SourceOptions) -> float:
 
 
 def with_stated(recording: Recording, options: SourceOptions) -> Recording:
-    """The recording with the masks of `--masks` and the depth of `--depth` instead of its own, if they are stated.
+    """The recording with its masks and depth replaced by those of `--masks` and `--depth`, if stated.
 
-    Raises:  InputError for files that do not belong to its frames, or depth in millimetres beside an arbitrary unit.
+    Raises:  InputError for files that do not match its frames, or if only one of depth and recording is in millimetres.
     """
     lens = recording.lens
     assert lens is not None
@@ -215,9 +208,9 @@ def with_stated(recording: Recording, options: SourceOptions) -> Recording:
 
 
 def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> tuple[Lens | None, Rig | None]:
-    """The lens of `--camera`, or the rig of `--calibration`, for pictures of this size; both None without them.
+    """The lens of `--camera` or the lens or rig of `--calibration`, for pictures of this size; both None if not stated.
 
-    Raises:  InputError for a calibration of another size (proportional sizes are scaled).
+    Raises:  InputError for a calibration of another aspect ratio; proportional sizes are scaled.
     """
     if options.calibration is not None:
         return lens_or_rig(options.calibration, width, height)
@@ -240,7 +233,7 @@ def stated_poses(
 
 
 def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:
-    """`mm` or `arbitrary`, from what is stated of trajectory and depth. Raises InputError if only one is arbitrary."""
+    """`mm` or `arbitrary`, by the stated units of trajectory and depth. Raises InputError if they contradict."""
     stated = []
     if options.trajectory is not None:
         stated.append(options.trajectory_unit or otherwise)

@@ -15,7 +15,7 @@ from endotsr.kernels.arrays import IndexArray
 LEAST_FRAMES = 3
 LEAST_TRAINING_FRAMES = 2
 LEAST_BLOCK_PERIOD = 24
-UNEVEN, ROUNDING = 0.1, 1.1e-3  # of the mean step, and seconds by which containers round: more is not evenly spaced
+UNEVEN, ROUNDING = 0.1, 1.1e-3  # tolerance of even spacing: of the mean step; rounding of containers, seconds
 
 
 def time_stamps(count: int) -> NDArray[np.float64]:
@@ -24,7 +24,7 @@ def time_stamps(count: int) -> NDArray[np.float64]:
 
 
 def frame_times(seconds: NDArray[np.float64] | None, count: int) -> NDArray[np.float64]:
-    """Normalised times of frames that may be unevenly spaced: t_i = (s_i - s_0) / (s_{n-1} - s_0) (n - 1) / n.
+    """Normalised times of possibly uneven frames: t_i = (s_i - s_0) / (s_{n-1} - s_0) (n - 1) / n.
 
     seconds  (n,) strictly ascending, in any unit; None: evenly spaced
     returns  (n,) from 0 to (n - 1) / n
@@ -37,7 +37,7 @@ def frame_times(seconds: NDArray[np.float64] | None, count: int) -> NDArray[np.f
 
 
 def evenly_spaced(seconds: NDArray[np.float64]) -> bool:
-    """Whether no frame lies off an even grid by a tenth of its step, or by what a container rounds to."""
+    """Whether all frames are within a tenth of a step, or the rounding of containers, of an even grid."""
     if len(seconds) < 3:
         return True
     step = (seconds[-1] - seconds[0]) / (len(seconds) - 1)
@@ -53,11 +53,11 @@ def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:
 
 
 def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
-    """Contiguous held-out blocks, for which the mean of the two neighbouring frames no longer suffices.
+    """Contiguous held-out blocks, which the mean of the two neighbouring frames cannot predict.
 
-    The sequence is cut into periods of max(24, 2 length) frames and a block of `length` frames is held out in the
-    middle of each. A block without a training frame after it is dropped: held-out frames always have a
-    training frame on both sides.
+    The sequence is divided into periods of max(24, 2 length) frames, and a block of `length` frames is held out in the
+    middle of each. A block without a training frame after it is dropped: held-out frames always have training frames on
+    both sides.
 
     Raises:  InputError if no block fits.
     """
@@ -82,7 +82,7 @@ def every_second(count: int) -> tuple[IndexArray, IndexArray]:
 
 
 def end_of_clip(count: int, length: int) -> tuple[IndexArray, IndexArray]:
-    """The last `length` frames are held out: the model has to extrapolate, with no training frame after them.
+    """The last `length` frames are held out: the model has to extrapolate.
 
     Raises:  InputError if fewer than 2 training frames remain.
     """
@@ -128,8 +128,9 @@ def selected_frames(config: SequenceConfig, count: int, where: object) -> range:
 def parse_frame_range(text: str, count: int, least: int = LEAST_FRAMES) -> range:
     """At least `least` of `count` frames, selected by "start:stop[:step]" in Python's slice notation; "" selects all.
 
-    Negative numbers count from the end. Unlike a Python slice, an end beyond the sequence is refused rather than
-    cut off, and the step is at least 1.
+    Negative numbers count from the end. Unlike in a Python slice, an end beyond the sequence is refused, and the step
+    is at least 1.
+
     Raises:  InputError naming the text and what is allowed.
     """
     if not text.strip():

@@ -1,10 +1,10 @@
-"""Depth files of another program, before they are read as lengths: is it depth at all?
+"""Checks that the depth files of another program contain lengths.
 
-A disparity in pixels and a relative inverse depth look like millimetres by their numbers, and grow where depth falls.
-Five things speak against lengths: a name, numbers stretched to the full range of the file, a median outside of what an
-endoscope sees, the parallax of a stereo pair, and the light. Light comes from the scope, so that near tissue is
-brighter: in measured clips the rank correlation of brightness with depth is -0.55 to -0.84, and +0.55 to +0.84 with an
-inverse depth in its place. Simulated scenes with even light give -0.3 to 0.2.
+Disparities in pixels and relative inverse depths have values similar to millimetres, but decrease with depth. Five
+kinds of evidence contradict lengths: file names, values stretched to the full range, a median outside the range of an
+endoscope, the parallax of a stereo pair, and the light. Light comes from the scope, which makes near tissue brighter:
+in measured clips the rank correlation of brightness with depth is -0.55 to -0.84, and +0.55 to +0.84 with inverse
+depth. Simulated scenes with even light give -0.3 to 0.2.
 
 In: a recording with stated depth. Out: nothing, or an `InputError` with the evidence and the remedy.
 """
@@ -38,9 +38,9 @@ REMEDY = (
 
 
 def refuse_no_lengths(recording: Recording, chosen: list[int]) -> None:
-    """Raises InputError if the stated depth of a recording is most likely none.
+    """Raises InputError if the stated depth of a recording most likely contains no lengths.
 
-    chosen   the frames that are read; the first `LOOKED_AT` are looked at
+    chosen   the frames to read; the first `LOOKED_AT` are checked
     """
     stated = recording.stated_depth
     if stated is None or stated.trusted or recording.depth is None:
@@ -53,13 +53,13 @@ def refuse_no_lengths(recording: Recording, chosen: list[int]) -> None:
 def _of_names(path: Path) -> str:
     names = [path.name, *(file.name for file in sorted(path.iterdir())[:1])] if path.is_dir() else [path.name]
     named = next((name for name in names if NAMES.search(name.lower())), None)
-    return f"the name {named} is that of a disparity or a relative depth" if named else ""
+    return f"the name {named} indicates a disparity or a relative depth" if named else ""
 
 
 def _of_values(recording: Recording, frames: list[int]) -> str:
-    """What speaks against lengths in the numbers and beside the pictures; "" if nothing does.
+    """Evidence against lengths in the values and in comparison with the pictures; "" without any.
 
-    Raises: InputError where the depth lies upside down or mirrored.
+    Raises:  InputError for depth that is upside down or mirrored, or whose largest value marks missing depth.
     """
     stated, where = recording.stated_depth, str(recording.where)
     read, masks = recording.depth, recording.masks
@@ -93,7 +93,7 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
         return full
     unit = [] if recording.unit == ARBITRARY else unit_finding(usual_depth(facts), where)
     if unit:
-        return f"{unit[0].what}; another unit is stated with --depth-unit and --depth-scale"
+        return f"{unit[0].what}; state another unit with --depth-unit and --depth-scale"
     found = light_finding(light, where)
     return found[0].what if found else ""
 
@@ -104,7 +104,7 @@ def _refuse_flipped(found: list[Finding], path: Path) -> None:
 
 
 def _full_scale(stored: list[NDArray[np.float32]]) -> str:
-    """Numbers that are stretched to the full range in every frame: of whole numbers, or of 0 to 1."""
+    """Evidence that every frame is stretched to the full range of integers or to [0, 1]; "" without any."""
     highest = [float(plane.max()) for plane in stored]
     if len({round(value) for value in highest}) == 1 and round(highest[0]) in FULL_SCALE:
         return f"the largest number of every frame is {highest[0]:.0f}: the frames are stretched to the full range"

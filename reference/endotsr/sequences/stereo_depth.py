@@ -2,11 +2,11 @@
 
     z = f B / d          f, B: focal length (px) and baseline; d: disparity (px)
 
-In: left and right pictures, the lens and the baseline. Out: depth (H, W) with holes left as holes (0), and a
-confidence. A pixel has depth where left and right agree, the match is confident and the depth is within range.
+In: left and right pictures, the lens and the baseline. Out: depth (H, W) with unfilled holes (0), and a confidence. A
+pixel has depth if left and right agree, the match is confident and the depth is within range.
 """
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,40 +16,33 @@ from endotsr.errors import InputError
 from endotsr.opencv.stereo import match_pair
 from endotsr.sequences.recording import Lens, Picture
 
-MULTIPLE = 16  # OpenCV searches multiples of this many disparities
-MOST = 512  # searched disparities; more would be a wrong calibration
+MULTIPLE = 16  # of the number of searched disparities, required by OpenCV
+MOST = 512  # searched disparities; more indicate a wrong calibration
 
 
 class StereoSettings(Section, frozen=True, kw_only=True):
-    """How depth is made from stereo pairs."""
+    """Settings of depth from stereo pairs."""
 
     nearest: Positive = 20.0
-    """nearest depth that is searched, in the unit of the sequence"""
+    """nearest searched depth, in the unit of the sequence"""
     farthest: Positive = 300.0
-    """farthest depth that is searched"""
+    """farthest searched depth"""
     block: Literal[3, 5, 7, 9, 11] = 5
     """side of the matched blocks, px"""
     smooth: bool = True
     """edge-preserving smoothing by weighted least squares"""
     agreement: Positive = 1.0
-    """largest difference between the disparities of left and right, px"""
+    """largest difference between left and right disparity, px"""
     confidence: Fraction = 0.5
-    """least confidence of the smoothing, 0 to 1"""
+    """smallest confidence of the smoothing, 0 to 1"""
     temporal: bool = False
     """median over three frames along the optical flow"""
 
 
-class StereoDepth(NamedTuple):
-    """Depth of one frame."""
-
-    depth: NDArray[np.float32]  # (H, W) 0 = none
-    confidence: NDArray[np.float32]  # (H, W) in [0, 1]; 0 where there is no depth
-
-
 def disparity_range(settings: StereoSettings, lens: Lens, baseline: float) -> tuple[int, int]:
-    """Lowest disparity and number of disparities, a multiple of 16, for the depths that are searched.
+    """Lowest disparity and number of disparities, a multiple of 16, for the searched depths.
 
-    Raises:  InputError for depths that are not ascending, or a range that no picture holds.
+    Raises:  InputError for depths that are not ascending, or a range beyond the width of the pictures.
     """
     if not 0 < settings.nearest < settings.farthest < np.inf:
         raise InputError(
@@ -67,16 +60,18 @@ def disparity_range(settings: StereoSettings, lens: Lens, baseline: float) -> tu
     return lowest, count
 
 
-def stereo_depth(left: Picture, right: Picture, lens: Lens, baseline: float, settings: StereoSettings) -> StereoDepth:
-    """Depth of the left picture.
+def stereo_depth(
+    left: Picture, right: Picture, lens: Lens, baseline: float, settings: StereoSettings
+) -> NDArray[np.float32]:
+    """Depth (H, W) of the left picture, 0 = none.
 
     lens       of both rectified pictures
-    baseline   in the unit in which the depth is wanted
+    baseline   in the unit of the resulting depth
 
-    Edges:   pixels whose match would lie outside of the right picture have no depth.
+    Edges:   pixels whose match is outside the right picture have no depth.
     """
     lowest, count = disparity_range(settings, lens, baseline)
-    # OpenCV leaves a strip as wide as the search at the left of the left picture, and at the right of the right one.
+    # OpenCV does not match a strip as wide as the search, at the left of the left and the right of the right picture.
     padding = lowest + count
     pad = ((0, 0), (padding, padding), (0, 0))
     match = match_pair(
@@ -90,17 +85,17 @@ def stereo_depth(left: Picture, right: Picture, lens: Lens, baseline: float, set
         depth = lens.fx * baseline / disparity
         good = (apart <= settings.agreement) & (confidence >= settings.confidence) & (disparity > 0)
         good &= (depth >= settings.nearest) & (depth <= settings.farthest) & (column - disparity >= 0)
-    return StereoDepth(np.where(good, depth, 0).astype(np.float32), np.where(good, confidence, 0).astype(np.float32))
+    return np.where(good, depth, 0).astype(np.float32)
 
 
 def temporal_median(depths: list[NDArray[np.float32]], pictures: list[Picture], middle: int) -> NDArray[np.float32]:
-    """The median of the depths of neighbouring frames, each moved along the optical flow to frame `middle`.
+    """The median depth of neighbouring frames, each warped along the optical flow to frame `middle`.
 
     depths    (H, W) each, 0 = none
     pictures  the left pictures of the same frames
-    returns   (H, W): where the frame itself has depth; 0 elsewhere, holes are not filled
+    returns   (H, W) where the frame itself has depth; 0 elsewhere: holes are not filled
 
-    A neighbour counts at a pixel whose four bilinear neighbours all have depth there.
+    A neighbouring frame counts where all four bilinear samples have depth.
     """
     from endotsr.opencv import dense_flow, warp_bilinear
 

@@ -1,7 +1,7 @@
-"""From the pictures of a recording to those of one pinhole camera: straightened or rectified, then resized.
+"""Undistortion, rectification and resizing of a recording to the pictures of one pinhole camera.
 
-In: a `Recording` and a scale. Out: a `Straightener`, which maps pictures, masks, depth and poses, and the lens that
-belongs to its pictures. Left and right each have the distortion of their own camera.
+In: a `Recording` and a scale. Out: a `Straightener`, which maps pictures, masks, depth and poses, and the lens of the
+new pictures. Left and right each have their own distortion.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from endotsr.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.sequences.recording import CameraPose, Lens, Picture, PicturePair, Recording, lens_of_matrix, opencv_matrix
 from endotsr.splatting.camera import degrees_between
 
-SKEWED = 0.5  # of the baseline: a pair whose cameras stand higher than wide apart by more is not side by side
+SKEWED = 0.5  # largest vertical over horizontal offset of two cameras that count as side by side
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Straightener:
     turn: FloatArray  # (3, 3) x_new = turn @ x_old, camera axes of the left picture
     baseline: float | None
     notes: list[str]
-    clipped: bool = False  # the depth of the recording is already
+    clipped: bool = False  # the depth of the recording is already clipped
 
     def pictures(self, pair: PicturePair) -> PicturePair:
         """Both pictures in the new camera."""
@@ -41,16 +41,16 @@ class Straightener:
         return area_resize(remapped(picture, maps) if maps else picture, self.lens.width, self.lens.height)
 
     def mask(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Tissue where all covered pixels of the old mask are."""
+        """Tissue where all covered pixels of the old mask are tissue."""
         if self.left:
             mask = remapped(mask.astype(np.uint8), self.left, nearest=True) > 0
         return area_resize((~mask).astype(np.float32), self.lens.width, self.lens.height) == 0
 
     def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Mean of the depths that a new pixel covers; 0 where it covers none.
+        """Mean of the depths that a new pixel covers, or 0 if it covers none.
 
-        Depth that is reduced is clipped to `CLIPPED` before, as a training at a scale does: an outlier must not be
-        averaged into its neighbours. Depth of unchanged size is left to the training.
+        Before resizing, depth is clipped to `CLIPPED`, as in training at a scale: an outlier must not be averaged into
+        its neighbours. Depth of unchanged size is clipped by training.
         """
         if self.left:
             depth = remapped(depth, self.left, nearest=True)
@@ -67,12 +67,12 @@ class Straightener:
 
 
 def straightener(recording: Recording, width: int, height: int, scale: float) -> Straightener:
-    """The maps of a recording whose pictures have this size.
+    """The maps of a recording with pictures of this size.
 
-    Raises:  InputError without intrinsics, for a scale outside (0, 1], and for cameras that do not stand side by side.
+    Raises:  InputError without intrinsics, for a scale outside (0, 1], and for cameras that are not side by side.
     """
     if not 0 < scale <= 1:
-        raise InputError(f"scale {scale:g}: pictures are only reduced; allowed: values in (0, 1]")
+        raise InputError(f"scale {scale:g}: pictures can only be reduced; allowed: values in (0, 1]")
     new_size = round(width * scale), round(height * scale)
     if min(new_size) < 1:
         raise InputError(f"scale {scale:g} makes {new_size[0]}x{new_size[1]} pixels of {width}x{height}")
@@ -96,7 +96,7 @@ def straightener(recording: Recording, width: int, height: int, scale: float) ->
         )
     maps = undistortion_maps(opencv_matrix(lens), np.array(lens.distortion), width, height)
     new = lens_of_matrix(maps.matrix, width, height, where=recording.where)
-    note = f"straightened: distortion {', '.join(f'{k:g}' for k in lens.distortion)}"
+    note = f"undistorted: distortion {', '.join(f'{k:g}' for k in lens.distortion)}"
     return Straightener(
         new.scaled(*new_size), maps, maps, np.eye(3), recording.baseline, [note], recording.depth_clipped
     )
@@ -108,7 +108,7 @@ def _rectified(recording: Recording, new_size: tuple[int, int]) -> Straightener:
     across, down = abs(rig.translation[0]), abs(rig.translation[1])
     if down > SKEWED * across:
         raise InputError(
-            f"{recording.where}: the cameras stand {across:g} beside and {down:g} above each other;"
+            f"{recording.where}: the cameras are {across:g} apart horizontally and {down:g} vertically;"
             " allowed: side by side"
         )
     if recording.depth is not None:
@@ -119,7 +119,7 @@ def _rectified(recording: Recording, new_size: tuple[int, int]) -> Straightener:
     maps = rectification_maps(matrices, distortions, rig.rotation, rig.translation, width, height)
     if maps.baseline <= 0:
         raise InputError(
-            f"{recording.where}: by the calibration the right camera stands on the left; are the pictures, or the"
+            f"{recording.where}: the calibration states that the right camera is on the left; are the pictures, or the"
             " sections of the calibration, swapped?"
         )
     lens = lens_of_matrix(maps.left.matrix, width, height, where=recording.where).scaled(*new_size)

@@ -1,12 +1,12 @@
-"""Trajectories of tissue points over the training frames, followed along dense optical flow (specification B15).
+"""Trajectories of tissue points over the training frames, tracked along dense optical flow (specification B15).
 
-A point starts at a pixel of a training frame and is followed to the later and to the earlier training frames, one
-after another. While it is *followed*, its pixel moves by the flow between the two frames, and its position is that
-pixel lifted by the prior depth. It is lost where it leaves the picture or the tissue, where the flows there and back
-disagree, or where the depth jumps. A lost point moves with the followed points around it, weighted by distance, and is
-followed again where that leads to a tissue pixel at the depth it is expected at.
+A point starts at a pixel of a training frame and is tracked to the later and to the earlier training frames, one frame
+at a time. While it is *followed*, its pixel moves by the flow between the two frames, and its position is that pixel
+back-projected with the prior depth. It is lost if it leaves the picture or the tissue, if forward and backward flow
+disagree, or if the depth jumps. A lost point moves with the nearest followed points, weighted by inverse distance. It
+is followed again where it reaches a tissue pixel at its expected depth.
 
-Comes in: a sequence and the points' pixels. Goes out: a position at every training frame. No held-out picture is read.
+In: a sequence and the points' start positions. Out: a position at every training frame. No held-out picture is read.
 """
 
 from functools import lru_cache
@@ -21,19 +21,19 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, backproject, project
 
 OUTSIDE = -1e6  # column and row of a point behind the camera
-CONSISTENT = 0.01  # of the squared lengths of the flows there and back
+CONSISTENT = 0.01  # of the squared lengths of forward and backward flow
 TOLERANCE = 0.5  # px^2
-DEPTH_JUMP = 0.1  # of the depth; a larger change between two frames, or from the expected depth, is another surface
-NEIGHBOURS = 8  # followed points that a lost point moves with
-KEPT_PAIRS = 64  # flows of so many pairs of frames are kept for the way back; those of a longer clip are made again
-FEWEST = 16  # followed points; with fewer, a lost point stays where it is
+DEPTH_JUMP = 0.1  # of the depth; a larger change between frames or from the expected depth is another surface
+NEIGHBOURS = 8  # followed points that move a lost point
+KEPT_PAIRS = 64  # frame pairs whose flows are cached for the way back; further ones are recomputed
+FEWEST = 16  # followed points; with fewer, lost points stay in place
 
 
 class Tracks(NamedTuple):
     """Positions of P points at the n training frames."""
 
     position: FloatArray  # (n, 3, P) float32, scene units, world axes
-    followed: BoolArray  # (n, P) False: the position is that of the points around it
+    followed: BoolArray  # (n, P) False: moved with neighbouring points
 
 
 class _Points(NamedTuple):
@@ -46,11 +46,11 @@ class _Points(NamedTuple):
 def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) -> Tracks:
     """The points at every training frame.
 
-    start     (P,) place of each point's training frame in `train_index`
-    position  (3, P) scene units: where the point is at that frame, which shows it
+    start     (P,) index of each point's training frame in `train_index`
+    position  (3, P) scene units, at that frame, in which the point is visible
 
-    Edges:   one training frame: the positions are those given. A sequence that does not move: likewise, to rounding
-             and to the noise of the prior depth.
+    Edges:   with one training frame, the given positions. In a static sequence likewise, up to rounding and the noise
+             of the prior depth.
     """
     train = [int(i) for i in sequence.train_index]
     count, last = position.shape[1], len(train) - 1
@@ -89,7 +89,7 @@ def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flo
 
 
 def _motion_around(before: FloatArray, after: FloatArray, followed: BoolArray, lost: BoolArray) -> FloatArray:
-    """(3, lost) mean displacement of the nearest followed points, weighted by their inverse distance."""
+    """(3, lost) mean displacement of the nearest followed points, weighted by inverse distance."""
     from scipy.spatial import KDTree
 
     distance, nearest = KDTree(before[:, followed].T).query(before[:, lost].T, k=NEIGHBOURS)
@@ -99,7 +99,7 @@ def _motion_around(before: FloatArray, after: FloatArray, followed: BoolArray, l
 
 
 def _refind(sequence: Sequence, frame: int, position: FloatArray, followed: BoolArray, lost: BoolArray) -> None:
-    """Follow lost points again, in place, that are where the frame shows tissue at their depth."""
+    """Follow lost points again, in place, where the frame shows tissue at their depth."""
     pixel, depth = _project(sequence.cameras[frame], position[:, lost])
     found, at = _lifted(sequence, frame, pixel)
     again = _near(at, depth, DEPTH_JUMP / 4)  # (19.5)
@@ -118,14 +118,15 @@ def _project(camera: Camera, position: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _sampled(planes: FloatArray, pixel: FloatArray) -> FloatArray:
-    """(C, H, W) bilinearly at (2, P) columns and rows, in float64; outside, the nearest border value. (C, P)."""
+    """(C, P) float64 bilinear samples of (C, H, W) at (2, P) columns and rows; outside, the border value."""
     from endotsr.opencv import sample_bilinear
 
     return sample_bilinear(planes.astype(np.float64), *pixel)
 
 
 def _lifted(sequence: Sequence, frame: int, pixel: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """World positions (3, P) of pixels at the prior depth of a frame, and that depth (P,); 0 = not tissue, or none."""
+    """World positions (3, P) of pixels at the prior depth of a frame, and that depth (P,); 0 = no tissue or no
+    depth."""
     camera, prior = sequence.cameras[frame], sequence.depth[frame].astype(np.float64)
     usable = (sequence.masks[frame] & (prior > 0)).astype(np.float64)
     whole, depth = _sampled(np.stack([usable, prior]), pixel)

@@ -1,7 +1,8 @@
-"""Trajectories in the TUM form: one line a pose, `stamp tx ty tz qx qy qz qw`; lines that begin with # are comments.
+"""Trajectories in the TUM format: one line per pose, `stamp tx ty tz qx qy qz qw`; lines that begin with # are
+comments.
 
-The stamp is a time in seconds or the number of a frame. In: the file, and what the numbers mean. Out: one
-world-to-camera pose a frame in millimetres (or the arbitrary unit), None where the trajectory says nothing.
+The stamp is a time in seconds or a frame number. In: the file, its unit, direction and axes. Out: one world-to-camera
+pose per frame in millimetres or the arbitrary unit; None for frames without a pose.
 """
 
 from pathlib import Path
@@ -28,7 +29,7 @@ class Trajectory(NamedTuple):
 
     @property
     def counts_frames(self) -> bool:
-        """Whether every stamp is a whole number from 0 on, as frame numbers are."""
+        """Whether every stamp is a non-negative integer, like a frame number."""
         return bool((self.stamps == np.rint(self.stamps)).all() and self.stamps[0] >= 0)
 
 
@@ -36,7 +37,7 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
     """The poses of a file.
 
     unit        of the positions: um, mm, cm, m or arbitrary
-    direction   camera_to_world (the position is the camera's) or world_to_camera
+    direction   camera_to_world (positions of the camera) or world_to_camera
     axes        of the camera: opencv (x right, y down, z forward) or opengl (x right, y up, z backward)
 
     Raises:  InputError naming the line and the reason.
@@ -90,12 +91,12 @@ def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> CameraPos
 def poses_of_frames(
     trajectory: Trajectory, count: int, rate: float | None, times: FloatArray | None = None
 ) -> tuple[list[CameraPose | None], str]:
-    """One pose a frame, None where there is none, and a sentence on how stamps became frames.
+    """One pose per frame, None without one, and a sentence on the assignment of stamps to frames.
 
     times   seconds of the frames from the first one; None: evenly spaced at `rate`
 
-    Whole stamps below the number of frames are frame numbers. As many poses as frames belong to them in order. Other
-    stamps are seconds from the first one, and a frame without a pose of its own lies between two.
+    Integer stamps below the number of frames are frame numbers. If there are as many poses as frames, they match in
+    order. Other stamps are seconds from the first one, and poses between stamps are interpolated.
 
     Raises:  InputError if the stamps are times and the frame rate is unknown.
     """
@@ -117,7 +118,7 @@ def poses_of_frames(
 
 
 def poses_at(trajectory: Trajectory, times: FloatArray, longest: float) -> list[CameraPose | None]:
-    """Poses at times, between the two nearest of the trajectory; None outside, and in gaps longer than `longest`."""
+    """Poses at times, interpolated; None outside the trajectory and in gaps longer than 2 `longest`, seconds."""
     stamps, found = trajectory.stamps, []
     for t in times:
         after = int(np.searchsorted(stamps, t))
@@ -133,7 +134,7 @@ def poses_at(trajectory: Trajectory, times: FloatArray, longest: float) -> list[
 
 
 def pose_between(a: CameraPose, b: CameraPose, fraction: float) -> CameraPose:
-    """The pose at a fraction of the way: the centre on the straight line, the rotation on the shortest arc."""
+    """The interpolated pose: the centre on the straight line, the rotation on the shortest arc."""
     from scipy.spatial.transform import Rotation, Slerp
 
     centres = [-pose.rotation.T @ pose.translation for pose in (a, b)]
@@ -142,7 +143,7 @@ def pose_between(a: CameraPose, b: CameraPose, fraction: float) -> CameraPose:
 
 
 def filled(poses: list[CameraPose | None]) -> list[CameraPose]:
-    """Gaps filled from the neighbours on both sides; before the first and after the last, the nearest pose."""
+    """The poses with gaps interpolated; before the first and after the last pose, the nearest one."""
     known = [i for i, pose in enumerate(poses) if pose is not None]
     found = []
     for i, pose in enumerate(poses):

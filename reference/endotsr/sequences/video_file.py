@@ -1,9 +1,9 @@
-"""Reading video files: what a file holds, the time of every picture, and the pictures in order.
+"""Reading video files: properties, the time of every picture, and the pictures in order.
 
-In: a path and the numbers of the wanted pictures, ascending. Out: RGB pictures one by one. FFmpeg decodes them, in the
-package PyAV, which this module and `film_file` alone import. A video is decoded from its start: seeking by number is
-inexact for most codecs. Interlaced pictures, two moments woven into one, are deinterlaced (bwdif): the rows of the
-first field are kept and those of the second are interpolated. The rotation that a file states is reported, not applied.
+In: a path and the numbers of the wanted pictures, ascending. Out: RGB pictures, one at a time. FFmpeg decodes them
+through PyAV, which only this module and `film_file` import. A video is decoded from its start, because seeking by
+number is inexact for most codecs. Interlaced pictures are deinterlaced (bwdif): the rows of the first field are kept,
+and the rows of the second are interpolated. A stated rotation is reported, not applied.
 """
 
 import itertools
@@ -19,40 +19,40 @@ from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS, open_regular
 from endotsr.untrusted.names import plain_line
 
-LARGEST_FILE = 1 << 40  # bytes: a video is decoded picture by picture
-# First bytes of the containers: the ending of a name says nothing of what a decoder would do with a play list.
+LARGEST_FILE = 1 << 40  # bytes; a video is decoded picture by picture
+# First bytes of the containers. The extension is not sufficient: a decoder would follow a play list.
 STARTS = {
     0: (b"RIFF", b"\x1aE\xdf\xa3", b"\0\0\1", b"G", b"0&\xb2u"),  # avi, mkv and webm, mpeg, ts, wmv
     4: (b"G", b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot"),  # m2ts; mp4 and mov
 }
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".wmv")
-HIDDEN = ("vp8",)  # codecs with packets that hold no picture of their own: their pictures are counted by decoding
-# Transfer functions that are not those of a display.
+HIDDEN = ("vp8",)  # codecs with packets without a visible picture; pictures are counted by decoding
+# Transfer functions that are not display-referred.
 WIDE_RANGE = {8: "linear light", 9: "logarithm", 10: "logarithm", 16: "PQ", 18: "HLG"}
 BT2020 = 9  # of the primaries
-UNSTATED, HIGH_DEFINITION = 2, 576  # matrix of colour that a file does not state; rows, above which players take BT.709
-PROBED = 3  # pictures that are decoded to learn what the header does not say
+UNSTATED, HIGH_DEFINITION = 2, 576  # colour matrix not stated; rows above which players assume BT.709
+PROBED = 3  # pictures decoded to find properties that are missing in the header
 
 
 class VideoFacts(NamedTuple):
-    """What a video holds. Lengths and times are those of the pictures, not of the sound."""
+    """Properties of a video, for the pictures and not the sound."""
 
     width: int  # as stored
     height: int
     count: int
     rate: float | None  # pictures per second on average
-    times: NDArray[np.float64] | None  # (count,) seconds from the first picture, ascending; None: not stated
-    turn: int  # degrees counter-clockwise by which a player turns the pictures: 0, 90, 180 or 270
+    times: NDArray[np.float64] | None  # (count,) seconds from the first picture, ascending; None: unknown
+    turn: int  # counter-clockwise rotation by a player, degrees: 0, 90, 180 or 270
     interlaced: bool
     codec: str
     pixel_shape: float  # width / height of a pixel
-    remarks: tuple[str, ...] = ()  # what a reader of the file has to know beside this, in words
+    remarks: tuple[str, ...] = ()  # further remarks, in words
 
 
 def video_facts(path: Path) -> VideoFacts:
     """Size, number, times and kind of the pictures.
 
-    Raises:  InputError if the file is no video that can be decoded, or one of high dynamic range.
+    Raises:  InputError for a file that is not a decodable video, and for high dynamic range.
     """
     with _opened(path) as (container, stream):
         codec, context = stream.codec_context.name, stream.codec_context
@@ -74,7 +74,7 @@ def video_facts(path: Path) -> VideoFacts:
             f" whole file (`ffmpeg -i {path.name} -c copy whole{path.suffix}` keeps what is left)"
         )
     if turn % 90:
-        raise InputError(f"{path}: the file states a turn of {turn} degrees; allowed: 0, 90, 180 and 270")
+        raise InputError(f"{path}: the file states a rotation of {turn} degrees; allowed: 0, 90, 180 and 270")
     known = len(times) > 1 and bool(np.isfinite(times).all()) and bool((np.diff(times) > 0).all())
     if known:
         rate = (len(times) - 1) / float(times[-1] - times[0])
@@ -84,21 +84,21 @@ def video_facts(path: Path) -> VideoFacts:
 
 
 def _remarks(frame: Any, streams: int) -> tuple[str, ...]:
-    """Choices that the file leaves open."""
+    """Remarks on properties that the file leaves open or that are ignored."""
     found = []
     if streams > 1:
-        found.append(f"{streams} streams of pictures: one is read; for a stereo pair, export each as a file of its own")
+        found.append(f"{streams} video streams: one is read; for a stereo pair, export each stream as a separate file")
     if any(part.is_alpha for part in frame.format.components):
         found.append("its transparency is ignored")
     if int(frame.colorspace) == UNSTATED and not frame.format.is_rgb and frame.height > HIGH_DEFINITION:
-        found.append("states no matrix of colour: that of BT.601 is taken, players take BT.709 at this size")
+        found.append("states no colour matrix: BT.601 is assumed, but players assume BT.709 at this size")
     if int(frame.color_primaries or 0) == BT2020:
-        found.append("states the colours of BT.2020: its numbers are read as sRGB")
+        found.append("states BT.2020 colours: its values are read as sRGB")
     return tuple(found)
 
 
 def _refuse_wide_range(frame: Any, path: Path) -> None:
-    """Raises InputError for pictures whose numbers are not display RGB."""
+    """Raises InputError for pictures that are not display RGB."""
     kind = WIDE_RANGE.get(int(frame.color_trc or 0))
     if kind:
         raise InputError(
@@ -108,7 +108,7 @@ def _refuse_wide_range(frame: Any, path: Path) -> None:
 
 
 def _times(path: Path, by_decoding: bool) -> NDArray[np.float64]:
-    """Seconds of every picture in the order of display, from the packets; NaN where the file does not say."""
+    """Seconds of every picture in display order, from the packets or by decoding; NaN where unknown."""
     with _opened(path) as (container, stream):
         if by_decoding:
             found = [frame.pts for frame in _decoded(container.decode(stream), path)]
@@ -122,9 +122,9 @@ def _times(path: Path, by_decoding: bool) -> NDArray[np.float64]:
 
 
 def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]:
-    """The pictures with these numbers, ascending, from 0: (H, W, 3) RGB each, as stored (not turned), deinterlaced.
+    """The pictures with these numbers, ascending from 0: (H, W, 3) RGB, as stored (not rotated), deinterlaced.
 
-    Raises:  InputError naming the picture that is damaged, of another size, or at which the video ends too early.
+    Raises:  InputError naming a picture that is damaged, has another size, or is missing at the end.
     """
     with _opened(path) as (container, stream):
         stream.thread_type = "AUTO"
@@ -149,7 +149,7 @@ def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]
 
 
 def _progressive(frames: Iterable[Any]) -> Iterator[Any]:
-    """The frames, deinterlaced from the first one on that is interlaced; progressive ones among them pass unchanged."""
+    """The frames, deinterlaced from the first interlaced one on. Progressive frames pass unchanged."""
     graph = None
     for frame in frames:
         if graph is None and frame.interlaced_frame:
@@ -165,7 +165,7 @@ def _progressive(frames: Iterable[Any]) -> Iterator[Any]:
 
 
 def _deinterlacer(frame: Any) -> Any:
-    """A filter graph that takes interlaced frames like this one and gives as many progressive ones."""
+    """A filter graph that converts interlaced frames like this one into as many progressive frames."""
     import av.filter
 
     graph = av.filter.Graph()
@@ -181,7 +181,7 @@ def _deinterlacer(frame: Any) -> Any:
 
 
 def _pulled(graph: Any) -> Iterator[Any]:
-    """All frames that a filter graph has ready."""
+    """All available output frames of a filter graph."""
     import av.error
 
     while True:
@@ -192,7 +192,7 @@ def _pulled(graph: Any) -> Iterator[Any]:
 
 
 def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
-    """The items of a decoder; its errors become an InputError that names the picture."""
+    """The items of a decoder. Its errors become an InputError that names the picture."""
     import av.error
 
     position = 0
@@ -207,13 +207,13 @@ def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
 
 
 def _metadata_ignored(version: str) -> dict[str, str]:
-    """The option by which PyAV below 19 reads a file whose metadata are not UTF-8; from 19 on it does so by itself."""
+    """The option for files whose metadata are not UTF-8. PyAV from version 19 on needs none."""
     return {} if int(version.split(".")[0]) >= 19 else {"metadata_errors": "ignore"}
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
-    """The container and its best video stream; the decoder opens no other file. Raises InputError."""
+    """The container and its best video stream. The decoder opens no other file. Raises InputError."""
     import av
     import av.error
 
@@ -231,7 +231,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         with container:
             stream: Any = container.streams.best("video")
             if stream is None or stream.codec_context is None:
-                raise InputError(f"{path}: holds no pictures, or those of a codec that is not known")
+                raise InputError(f"{path}: holds no pictures of a known codec")
             if stream.codec_context.width * stream.codec_context.height > MOST_PIXELS:
                 size = f"{stream.codec_context.width}x{stream.codec_context.height}"
                 raise InputError(f"{path}: pictures of {size} pixels; allowed: at most {MOST_PIXELS}")

@@ -1,10 +1,10 @@
-"""The world frame of a sequence, moved and scaled where float32 or the settings would not suffice.
+"""The world frame of a sequence, translated or scaled if float32 or the settings require it.
 
-Positions are trained in float32. Its steps at the distance D from the origin are about 6e-8 D, and a pixel at the depth
-z is z / f wide, so that D / z of 100 leaves a hundredth of a pixel for a focal length of 2000. Beyond that, the origin
-moves to the middle of the camera centres. Lengths among the settings (learning rates, thresholds, the extent) are
-millimetres and were chosen for tissue at about 60 mm; a sequence whose unit is arbitrary is scaled so that its median
-depth is that. A sequence in millimetres near the origin is returned as it is, bit by bit.
+Positions are trained in float32. Its resolution at distance D from the origin is about 6e-8 D, and a pixel at depth z
+is z / f wide: for D / z = 100 and a focal length of 2000, the resolution is a hundredth of a pixel. For larger D / z,
+the origin moves to the middle of the camera centres. Lengths among the settings (learning rates, thresholds, the
+extent) are in millimetres and were chosen for tissue at about 60 mm. A sequence of arbitrary unit is scaled to this
+median depth. A sequence in millimetres near the origin is unchanged, bit by bit.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.splatting.camera import Camera, camera_centre
 
 FAR_FROM_ORIGIN = 100.0  # times the median depth
-USUAL_DEPTH = 60.0  # scene units: median depth of the sequence that the published settings were chosen on
+USUAL_DEPTH = 60.0  # scene units: median depth of the sequence for which the published settings were chosen
 
 
 class World(NamedTuple):
@@ -27,12 +27,12 @@ class World(NamedTuple):
 
     @property
     def unchanged(self) -> bool:
-        """Whether the scene is the world of the source."""
+        """Whether the world of the source is used unchanged."""
         return self.scale == 1.0 and not self.origin.any()
 
 
 def fitting_world(centres: FloatArray, depth: NDArray[np.float32], arbitrary: bool) -> World:
-    """The world in which a sequence is trained.
+    """The world for the training of a sequence.
 
     centres    (n, 3) camera centres in the world of the source
     depth      (n, H, W) view-space z, 0 = none
@@ -49,7 +49,7 @@ def fitting_world(centres: FloatArray, depth: NDArray[np.float32], arbitrary: bo
 
 
 def usual_depth(depth: NDArray[np.float32]) -> float | None:
-    """The median depth of about 100,000 pixels over all frames that have depth; None if none has."""
+    """The median depth of about 100,000 pixels over all frames; None without depth."""
     sparse = depth.reshape(-1)[:: max(1, depth.size // 100_000)]
     values = sparse[sparse > 0]
     if not values.size:
@@ -58,23 +58,23 @@ def usual_depth(depth: NDArray[np.float32]) -> float | None:
 
 
 def moved_camera(camera: Camera, world: World) -> Camera:
-    """The camera in the coordinates of the scene, computed in float64."""
+    """The camera in scene coordinates, computed in float64."""
     centre = (camera_centre(camera) - world.origin) * world.scale
     return camera._replace(translation=-camera.rotation @ centre + 0.0)  # + 0 turns -0 into 0
 
 
 def moved_cameras(cameras: list[Camera], world: World) -> list[Camera]:
-    """All cameras in the coordinates of the scene; what was one and the same object stays one."""
+    """All cameras in scene coordinates. A shared object remains shared."""
     moved = {id(camera): moved_camera(camera, world) for camera in cameras}
     return [moved[id(camera)] for camera in cameras]
 
 
 def world_note(world: World, unit: str) -> str:
-    """A sentence on the change; "" if there is none."""
+    """A sentence on the change; "" for an unchanged world."""
     if world.unchanged:
         return ""
     place = ", ".join(f"{value:.9g}" for value in world.origin)
     return (
-        f"world: scene = (source - ({place})) x {world.scale:.9g}, lengths of the source in {unit};"
+        f"world: scene = (source - ({place})) x {world.scale:.9g}, source lengths in {unit};"
         " positions are trained in float32 near the origin"
     )

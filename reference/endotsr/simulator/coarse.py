@@ -68,8 +68,7 @@ def views_during(
 
 
 def nodes(count: int) -> FloatArray:
-    """Image coordinates of the nodes along a side of `count` pixels, with two nodes on each side of every pixel
-    centre."""
+    """Image coordinates of the nodes along a side of `count` pixels: two on each side of every pixel centre."""
     return 0.5 + STEP * (np.arange((count - 1) // STEP + 4) - 1)
 
 

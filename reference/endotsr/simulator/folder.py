@@ -70,8 +70,7 @@ def write_sequence(
 
 
 def frames_with_truth(folder: Path, scene: SimulatedScene, name: str) -> Iterator[SimulatedFrame]:
-    """The frames in order. The truth of a frame is written into `folder` before the frame is yielded, the rest at the
-    end.
+    """The frames in order. Their truth is written into `folder` one frame at a time, the rest at the end.
 
     Raises:  InputError where the settings fold the tissue over itself.
     """

@@ -73,8 +73,7 @@ def _diffuse(view: SurfaceView, towards: FloatArray, received: FloatArray) -> Fl
 
 
 def bent_normal(normal: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Unit normals n' (3, H, W) of the wet surface: normals of the sheet, tilted by the slopes (2, H, W) of its
-    relief."""
+    """Unit normals n' (3, H, W) of the wet surface: those of the sheet, tilted by slopes (2, H, W) of its relief."""
     bent = normal.copy()
     bent[0] += slopes[0]
     bent[1] += slopes[1]

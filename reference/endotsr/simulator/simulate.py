@@ -42,8 +42,7 @@ class SimulatedSequence:
         return surface_point(self.truth.surface, material, t)
 
     def true_positions(self, source: int, target: int) -> NDArray[np.floating]:
-        """World positions (3, H, W), mm, at the time of frame `target`, of the tissue in the pixels of frame
-        `source`."""
+        """World positions (3, H, W), mm, at frame `target` of the tissue in the pixels of frame `source`."""
         return self.surface_point(self.truth.material_coordinates[source], float(self.sequence.times[target]))
 
     def true_flow(self, source: int, target: int) -> NDArray[np.floating]:

@@ -39,8 +39,7 @@ class Slit(NamedTuple):
 
 
 def make_slit(settings: SimulatorSettings) -> Slit:
-    """The slit of the settings. Raises InputError if the tissue next to it would fold, or if it stops before it
-    starts."""
+    """The slit of the settings. Raises InputError if the tissue next to it would fold, or for stop <= start."""
     part = settings.cutting
     widest = 2 * LARGEST_STRETCH * part.reach / STEEPEST
     if part.opening > widest:

@@ -124,8 +124,7 @@ def _lattice(rng: np.random.Generator, over_a: FloatArray, over_b: FloatArray) -
 
 
 def spline_basis(x: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
-    """Cubic B-splines on knots of spacing `spacing` that cover x, and their derivatives: two (len(x), knots)
-    matrices."""
+    """Cubic B-splines on knots that cover x, and their derivatives: two (len(x), knots) matrices."""
     position = (x - x[0]) / spacing
     distance = position[:, None] - np.arange(-1, int(position[-1]) + 3)
     r = np.abs(distance)

@@ -68,8 +68,7 @@ def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_
 def see_side(
     surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray, side: FloatArray | None = None
 ) -> SurfaceView:
-    """The view of the sheet alone. `side` fixes the side of an open slit for every ray; the side continues beyond its
-    edge."""
+    """The view of the sheet alone, with the side of an open slit given per ray and continued beyond its edge."""
     start = _start(surface, camera, ray_x, ray_y)
     return _meet(lambda a, b: evaluate(surface, a, b, t, side), camera, t, ray_x, ray_y, start)
 
@@ -107,8 +106,7 @@ def see_wound(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray
 
 
 def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
-    """The view along rays with an open slit: on the initial side of each ray, else on the other side, else in the
-    wound.
+    """The view along rays with an open slit: on the initial side of a ray, else the other side, else the wound.
 
     The two sides cover different parts of the picture. A solution on the assumed side is therefore unique.
     """
@@ -153,8 +151,7 @@ def _meet(
     ray_y: FloatArray,
     start: tuple[FloatArray, FloatArray],
 ) -> SurfaceView:
-    """The points where rays meet a surface that is a formula of two coordinates; `material` contains these
-    coordinates."""
+    """The points where rays meet a surface given by a formula; `material` contains its two coordinates."""
     a, b = start
     for _ in range(MOST_STEPS):
         point, along_a, along_b = formula(a, b)
@@ -185,7 +182,7 @@ def to_camera(camera: Camera, point: FloatArray) -> FloatArray:
 
 
 def pixel_of(camera: Camera, point: FloatArray) -> FloatArray:
-    """Image position u, v in pixels and view-space z of world positions, (3, ...) each; u and v are NaN if z <= 0."""
+    """u, v in pixels and view-space z of world positions, stacked: (3, ...) to (3, ...); u, v are NaN for z <= 0."""
     x, y, z = to_camera(camera, point)
     in_front = np.where(z > 0, z, np.nan)
     return np.stack([camera.fx * x / in_front + camera.cx, camera.fy * y / in_front + camera.cy, z])

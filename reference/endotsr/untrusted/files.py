@@ -110,8 +110,8 @@ def _refusal(path: Path, error: OSError | ValueError) -> InputError:
 def in_threads(work: Callable[[int], object], count: int) -> None:
     """Call work(0) ... work(count - 1) in several threads and wait for all calls.
 
-    The threads are daemons: KeyboardInterrupt does not wait for them. Raises: the error with the smallest index, after
-    all calls have ended.
+    The threads are daemons: KeyboardInterrupt does not wait for them.
+    Raises: the error with the smallest index, after all calls have ended.
     """
     todo: Iterator[int] = iter(range(count))  # of a range: `next` is atomic
     done: SimpleQueue[tuple[int, BaseException | None]] = SimpleQueue()

@@ -63,5 +63,33 @@ def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
     shutil.rmtree(old, ignore_errors=True)
 
 
+@contextlib.contextmanager
+def new_folder(path: Path, mark: str = "") -> Iterator[Path]:
+    """A temporary folder next to `path`. It becomes `path` after the block, or is removed if the block fails.
+
+    mark     an existing folder that contains this file is replaced; "": no folder is replaced
+
+    Raises:  InputError if `path` is anything else, or cannot be written.
+    """
+    if not mark or not path.exists():
+        refuse_existing(path)
+    elif not (path / mark).is_file() or path.is_symlink():
+        raise InputError(f"{path}: is not replaced: it holds no {mark}; choose another --out")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing_folder(path, replace=bool(mark)) as folder:
+            yield folder
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def refuse_existing(path: Path) -> None:
+    """Raises InputError if the path exists, unless it is an empty folder, which is removed."""
+    if path.is_dir() and not any(path.iterdir()):
+        path.rmdir()
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already; choose another --out")
+
+
 def _beside(path: Path) -> Path:
     return path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")

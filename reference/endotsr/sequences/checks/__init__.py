@@ -1,1 +1,1 @@
-"""Checks of a sequence before a training: everything wrong in one pass, each finding with its remedy."""
+"""Checks of a sequence before training: all faults in one pass, each finding with its remedy."""

@@ -10,8 +10,8 @@ from endotsr.splatting.camera import Camera, camera_centre, degrees_between
 
 JUMP = 20.0  # times the median step
 TURN = 20.0  # degrees between neighbouring frames
-STILL = 1e-4  # of the depth: a whole way shorter than this is most likely in metres beside millimetres
-FARTHEST_STEP = 2.0  # of the depth: neighbouring frames would not overlap
+STILL = 1e-4  # of the depth; a shorter camera path is most likely in metres, with depth in millimetres
+FARTHEST_STEP = 2.0  # of the depth; with a larger step, neighbouring frames would not overlap
 WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
 OFF_CENTRE = 0.25  # of the picture
 

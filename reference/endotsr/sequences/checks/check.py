@@ -1,7 +1,7 @@
 """`endotsr check`: one pass over a sequence that collects every finding.
 
 In: a folder in the common format or in the EndoNeRF layout, and the settings. Out: `Checked`. Frames are read one at a
-time. What stops a single file from being read is a finding of that file, and the pass goes on.
+time. An unreadable file becomes a finding, and the pass continues.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ from endotsr.sequences.files import check_pairing
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
 from endotsr.sequences.recording import colour_picture, grey_plane
-from endotsr.sequences.sources import beside
+from endotsr.sequences.sources import matching_files
 from endotsr.sequences.splits import parse_frame_range, split_frames
 
 T = TypeVar("T")
@@ -65,7 +65,7 @@ class Checked(NamedTuple):
 
 
 class _Pass:
-    """Findings, and what is kept of the frames while they are read."""
+    """Findings, and facts kept from the frames."""
 
     def __init__(self) -> None:
         self.findings: list[Finding] = []
@@ -73,11 +73,11 @@ class _Pass:
         self.depth: list[DepthFacts] = []
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
-        self.light: list[float] = []  # rank correlation of brightness with depth, of the sampled frames
-        self.shading: list[Fit] = []  # of the sampled frames, where it can be told
+        self.light: list[float] = []  # rank correlation of brightness with depth, for the sampled frames
+        self.shading: list[Fit] = []  # for the sampled frames where it can be determined
 
     def tried(self, make: Callable[[], T], code: str, where: object, frame: int | None = None) -> T | None:
-        """The value, or None and a refusal."""
+        """The value, or None with a refusal among the findings."""
         try:
             return make()
         except InputError as error:
@@ -88,7 +88,7 @@ class _Pass:
 def check_sequence(path: Path, config: Config) -> Checked:
     """Every finding on the sequence at `path`.
 
-    Raises:  InputError only if there is nothing to check: no folder, or a layout that `endotsr prepare` converts.
+    Raises:  InputError only if there is nothing to check: no folder, or a layout that needs `endotsr prepare`.
     """
     run = _Pass()
     parts = parts_of(Path(path), config.sequence, run.findings)
@@ -125,7 +125,7 @@ def _pairing(parts: Parts, run: _Pass) -> None:
 
 
 def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
-    """Read every frame once; the size (height, width) of the first picture that can be read."""
+    """Read every frame once. Returns the size (height, width) of the first readable picture."""
     masks, depth = (_paired(parts.images, files) for files in (parts.masks, parts.depth))
     sampled = set(np.linspace(0, len(parts.images) - 1, min(SAMPLED, len(parts.images))).astype(int).tolist())
     size = None
@@ -152,9 +152,9 @@ def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
 
 def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
     try:
-        return beside(images, files) if files else [None] * len(images)
+        return matching_files(images, files) if files else [None] * len(images)
     except InputError:
-        return [None] * len(images)  # named by the check of the pairing
+        return [None] * len(images)  # reported by the check of the pairing
 
 
 def _other_size(file: Path, i: int, shape: tuple[int, ...], size: tuple[int, ...]) -> Finding:
@@ -214,7 +214,7 @@ def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, 
 
 
 def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
-    """Polarity and tissue fraction on sampled frames, by the rules of the training."""
+    """Polarity and tissue fraction on sampled frames, with the rules of training."""
     names = [name for name, *_ in run.samples]
     images = np.stack([small.transpose(2, 0, 1) for _, small, _, _ in run.samples])
     masks, depth = (np.stack([sample[k] for sample in run.samples]) for k in (2, 3))
@@ -233,12 +233,12 @@ def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
 
 
 def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Cost:
-    """Memory, disk and time of a training, and a finding where they are short."""
+    """Memory, disk and time of a training, with findings if they are insufficient."""
     height, width, count, where = *size[:2], len(parts.images), str(parts.folder)
     cost = estimated_cost(count, width, height, config)
     run.tried(lambda: FrameStore(count, width, height, config.sequence.memory, where), "disk", where)
     if cost.file_bytes:
-        what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and lie in a file while a training runs"
+        what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and are stored in a file during training"
         run.findings.append(finding("frames-in-file", where, what))
     memory = memory_of_machine() or ASSUMED
     if cost.total_bytes > memory:
@@ -249,7 +249,7 @@ def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Co
 
 
 def _of_length(parts: Parts, config: Config, run: _Pass) -> Config:
-    """The settings with the length of a training on these frames; frames that cannot be split are a finding."""
+    """The settings with the length of a training on these frames. An impossible split becomes a finding."""
 
     def training_frames() -> int:
         frames = parse_frame_range(config.sequence.frames, len(parts.images))

@@ -1,6 +1,6 @@
-"""Checks of the prior depth: unit, scale, constancy, quantisation, coverage, and pictures of depth instead of depth.
+"""Checks of the prior depth: unit, scale, constancy, quantisation, coverage, and renderings of depth instead of depth.
 
-In: one `DepthFacts` per frame. Out: findings. Lengths are judged as in endoscopy: tissue is between 5 and 500 mm.
+In: one `DepthFacts` per frame. Out: findings. Plausible lengths are those of endoscopy: tissue at 5 to 500 mm.
 """
 
 from typing import NamedTuple
@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 
 from endotsr.sequences.checks.kinds import Finding, finding
 
-NEAREST, FARTHEST = 5.0, 500.0  # mm; medians outside are another unit
-FEW_LEVELS = 6  # whole millimetres, as published clips have them, give a dozen and more
+NEAREST, FARTHEST = 5.0, 500.0  # mm; a median outside indicates another unit
+FEW_LEVELS = 6  # whole millimetres, as in published clips, give a dozen or more
 LITTLE = 0.2  # of the tissue
 FAR_OFF = 4.0
 FULL_SCALE = (255.0, 65535.0)
-MARK, MARKED = 8.0, 0.005  # times the median, of the pixels with depth: a largest number that marks missing depth
+MARK, MARKED = 8.0, 0.005  # a mark of missing depth: times the median, fraction of the pixels
 AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
 LIT, FEWEST = (20, 250), 300  # grey levels that are neither black nor overexposed; pixels of a correlation
 
 
 class DepthFacts(NamedTuple):
-    """What is kept of the depth of a frame."""
+    """Facts on the depth of a frame."""
 
     name: str
     median: float  # 0 without any
     lowest: float
     highest: float
-    levels: int  # different values; of many, those among every eighth
+    levels: int  # distinct values; of many, among every eighth value
     tissue_coverage: float  # fraction of the tissue that has depth
-    stored_highest: float  # largest stored number
-    integers: bool  # the file holds whole numbers
-    at_highest: float = 0.0  # fraction of the pixels with depth that hold the largest one
+    stored_highest: float  # largest stored value
+    integers: bool  # the file stores integers
+    at_highest: float = 0.0  # fraction of the pixels with depth that have the largest value
 
 
 def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: NDArray[np.bool_] | None) -> DepthFacts:
-    """The facts of a frame; `stored` are the numbers of the file, `tissue` its mask or None."""
+    """The facts on a frame; `stored` are the values of the file, `tissue` is the mask or None."""
     known = depth > 0
     values = depth[known]
     inside = known if tissue is None or tissue.shape != depth.shape else known[tissue]
@@ -53,7 +53,7 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
 
 
 def _levels(values: NDArray[np.float32]) -> int:
-    """The number of different values: exact where it is small, which alone matters."""
+    """The number of distinct values, exact if it is small."""
     some = len(np.unique(values[::8]))
     return some if some >= FEW_LEVELS else len(np.unique(values))
 
@@ -61,7 +61,7 @@ def _levels(values: NDArray[np.float32]) -> int:
 def depth_findings(
     facts: list[DepthFacts], where: str, arbitrary: bool, near: float, assumed: str = ""
 ) -> list[Finding]:
-    """Findings on the depth of a sequence. `assumed`: what is not measured of it, as sequence.toml states."""
+    """Findings on the depth of a sequence. `assumed`: unmeasured properties as stated in sequence.toml."""
     with_depth = [fact for fact in facts if fact.median > 0]
     if not with_depth:
         return [finding("no-depth", where, "no pixel of any frame has depth")]
@@ -81,12 +81,12 @@ def depth_findings(
 
 
 def usual_depth(facts: list[DepthFacts]) -> float:
-    """The median over the frames with depth of their median depth; 0 without any."""
+    """The median over the frames with depth of their median depth; 0 without depth."""
     return float(np.median([fact.median for fact in facts if fact.median] or [0.0]))
 
 
 def _of_frame(fact: DepthFacts, usual: float, where: str, i: int) -> list[Finding]:
-    """A frame without depth, or with depth of another size; `usual` is the median over the frames."""
+    """A frame without depth, or with depth at another scale; `usual` is the median over the frames."""
     if fact.median == 0:
         return [finding("frame-without-depth", where, f"{fact.name} has no depth", i)]
     ratio = fact.median / usual
@@ -96,7 +96,7 @@ def _of_frame(fact: DepthFacts, usual: float, where: str, i: int) -> list[Findin
 
 
 def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
-    """Depth that is a picture of depth, or was cut to a few numbers."""
+    """Depth that is a rendering of depth, or was truncated to a few values."""
     highest = {fact.stored_highest for fact in facts}
     integers = all(fact.integers for fact in facts)
     if integers and max(highest) <= 3:
@@ -114,7 +114,7 @@ def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
 
 
 def mark_finding(facts: list[DepthFacts], where: str) -> list[Finding]:
-    """A warning where most frames hold one far too large number at many pixels, such as 65535 or 1e6."""
+    """A warning if many pixels of most frames have one far too large value, such as 65535 or 1e6."""
     found = [fact for fact in facts if fact.at_highest > MARKED and fact.highest > MARK * fact.median]
     if not found or len(found) <= len(facts) / 2:
         return []
@@ -125,7 +125,7 @@ def mark_finding(facts: list[DepthFacts], where: str) -> list[Finding]:
 
 
 def unit_finding(usual: float, where: str) -> list[Finding]:
-    """A warning on a median depth, in millimetres, that no endoscope sees."""
+    """A warning on a median depth, in millimetres, outside the range of an endoscope."""
     if NEAREST <= usual <= FARTHEST:
         return []
     guesses = ((256.0, "millimetres times 256"), (1e-3, "metres"), (0.1, "centimetres"), (1000.0, "micrometres"))
@@ -137,9 +137,9 @@ def unit_finding(usual: float, where: str) -> list[Finding]:
 def light_correlation(
     picture: NDArray[np.uint8], depth: NDArray[np.float32], tissue: NDArray[np.bool_] | None
 ) -> float:
-    """The rank correlation of brightness with depth over the tissue of a frame; not a number with too few pixels.
+    """The rank correlation of brightness with depth over the tissue of a frame; NaN for too few pixels.
 
-    picture (H, W, 3), depth (H, W), 0 = none; tissue (H, W) or None. Black and overexposed pixels are left out.
+    picture (H, W, 3), depth (H, W), 0 = none; tissue (H, W) or None. Black and overexposed pixels are ignored.
     """
     from scipy.stats import rankdata
 
@@ -158,9 +158,9 @@ def light_correlation(
 
 
 def light_finding(correlations: list[float], where: str) -> list[Finding]:
-    """A warning where brightness grows with depth in every frame that was looked at."""
+    """A warning if brightness increases with depth in every checked frame."""
     known = [value for value in correlations if np.isfinite(value)]
     if not known or np.median(known) < AGAINST_LIGHT or min(known) < AGAINST_LIGHT / 2:
         return []
-    what = f"what the depth calls far is brighter (rank correlation {np.median(known):.2f}; of depth it is negative)"
+    what = f"brightness increases with depth (rank correlation {np.median(known):.2f}; a true depth has a negative one)"
     return [finding("depth-against-light", where, what)]

@@ -1,6 +1,6 @@
-"""Checks of the pictures: black, white, grey, repeated frames, jumps of the exposure, gaps in the numbers.
+"""Checks of the pictures: black, white, grey and repeated frames, exposure jumps, gaps in the frame numbers.
 
-In: one small `FrameFacts` a frame, so that a clip of any length fits. Out: findings.
+In: one small `FrameFacts` per frame, for clips of any length. Out: findings.
 """
 
 from itertools import pairwise
@@ -17,38 +17,38 @@ from endotsr.sequences.files import frame_numbers, shortened
 
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
-SAME = 0.05  # mean difference in grey levels: two recorded frames differ by sensor noise of 0.5 and more
-FROZEN = 0.5  # as SAME, from the first frame of a clip to any other: an encoder improves a still picture a little
-WOVEN = 1.15  # of `FrameFacts.comb`, over the frames: pictures of two moments each
+SAME = 0.05  # mean difference in grey levels; sensor noise makes recorded frames differ by 0.5 or more
+FROZEN = 0.5  # as SAME, from the first frame of a clip to any other; encoders refine a still picture
+WOVEN = 1.15  # median of `FrameFacts.comb`, above which pictures are interlaced
 LEAST_ROWS = 16
 JUMP = 2.0  # ratio of the mean brightness of neighbouring frames; published clips stay within 1.15
 FLAT = 4  # grey levels between the darkest and the brightest pixel of a channel: a frame of one colour
-NOTHING = 0.5  # of the frames: a clip of more black, white or one-coloured frames shows nothing
+NOTHING = 0.5  # of the frames; a clip with more black, white or one-coloured frames shows nothing
 BLUE = 20.0  # grey levels of blue above red; in two public clips red is 30 and 47 above blue
 CLIPPED = 0.3  # of the pixels of a frame at 255 in all channels
 
 
 class FrameFacts(NamedTuple):
-    """What is kept of a picture."""
+    """Facts on a picture."""
 
     name: str
     small: NDArray[np.int16]  # (h, w, 3) every eighth pixel
     clipped: float  # fraction at full white
-    comb: float  # how unlike neighbouring rows are, against rows two apart
+    comb: float  # difference of neighbouring rows relative to rows two apart
 
 
 def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
-    """The facts of a picture (H, W, 3)."""
+    """The facts on a picture (H, W, 3)."""
     step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
     small = picture[::step, ::step].astype(np.int16)
     return FrameFacts(name, small, float((small == 255).all(axis=2).mean()), _comb(picture))
 
 
 def _comb(picture: NDArray[np.uint8]) -> float:
-    """The mean distance of a row from its two neighbours, over that from the rows two apart.
+    """The mean difference between a row and its two neighbours, relative to rows two apart.
 
-    Progressive pictures have 0.5 to 0.8, noise alone 1, and pictures woven of two moments 1.1 to 2.3: their even rows
-    show one moment, the odd rows another. 0 for a picture of few rows or without any detail.
+    Progressive pictures have 0.5 to 0.8, pure noise 1, and interlaced pictures 1.1 to 2.3: their even and odd rows show
+    different times. 0 for a picture with few rows or without detail.
     """
     if picture.shape[0] < LEAST_ROWS:
         return 0.0
@@ -80,7 +80,7 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
 
 
 def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -> list[Finding]:
-    """A clip that shows nothing, or one picture for ever."""
+    """A clip without content, or with one constant picture."""
     flat = [float(np.ptp(fact.small, axis=(0, 1)).max()) <= FLAT for fact in facts]
     empty = [k for k, mean in enumerate(means) if flat[k] or not BLACK <= mean <= WHITE]
     if len(empty) > NOTHING * len(facts):
@@ -97,7 +97,7 @@ def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -
 
 
 def _blue_finding(facts: list[FrameFacts], where: str) -> list[Finding]:
-    """A warning on a clip whose pictures are blue where tissue is red."""
+    """A warning on a clip whose pictures are more blue than red."""
     blueness = float(np.median([fact.small[:, :, 2].mean() - fact.small[:, :, 0].mean() for fact in facts] or [0.0]))
     if blueness < BLUE:
         return []
@@ -105,7 +105,7 @@ def _blue_finding(facts: list[FrameFacts], where: str) -> list[Finding]:
 
 
 def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:
-    """A frame without a picture, or without colour in much of it."""
+    """A frame without content, or overexposed in large parts."""
     if mean < BLACK:
         return [finding("black-frame", where, f"{fact.name} is black (mean {mean:.1f} of 255)", i)]
     if mean > WHITE:
@@ -116,7 +116,7 @@ def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding
 
 
 def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: str, i: int) -> list[Finding]:
-    """A repeated frame, a jump of the brightness; `ratio` is that of the means."""
+    """A repeated frame or a brightness jump; `ratio` is the ratio of mean brightness."""
     found = []
     if np.abs(fact.small - before.small).mean() < SAME:
         found.append(finding("duplicated-frame", where, f"{fact.name} repeats {before.name}", i))
@@ -126,7 +126,7 @@ def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: st
 
 
 def time_findings(seconds: NDArray[np.float64] | None, where: str) -> list[Finding]:
-    """A note on frames whose times are stated because they are not evenly spaced."""
+    """A note on stated, uneven frame times."""
     if seconds is None or len(seconds) < 2:
         return []
     steps = np.diff(seconds)
@@ -134,12 +134,12 @@ def time_findings(seconds: NDArray[np.float64] | None, where: str) -> list[Findi
 
 
 def profile_findings(file: Path) -> list[Finding]:
-    """A note on a picture whose colour profile (ICC) is not sRGB; one file stands for the clip."""
+    """A note on a picture with a colour profile (ICC) other than sRGB; one file represents the clip."""
     return [finding("colour-profile", file, "states a colour profile other than sRGB")] if other_profile(file) else []
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:
-    """Numbers that are missing between the frames, as after a frame was deleted or not decoded."""
+    """Missing frame numbers, for example of deleted or undecodable frames."""
     numbers = frame_numbers(files)
     if numbers is None or len(files) < 3 or len(numbers[0]) != 1:
         return []

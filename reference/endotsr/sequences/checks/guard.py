@@ -1,7 +1,7 @@
 """The checks of `endotsr check` on frames that a training reads: refusals stop it, warnings become notes.
 
-In: the facts that a reader collected of every frame, masks, depth and cameras. Out: sentences for the notes of the
-sequence, or an `InputError` in the words of the finding.
+In: the frames that a reader collected, and the cameras. Out: sentences for the notes of the sequence, or an
+`InputError` with the text of the finding.
 """
 
 from collections import Counter
@@ -34,7 +34,7 @@ def guarded(files: FrameFiles, frames: Frames, cameras: list[Camera], near: floa
 
 
 def notes_of(findings: list[Finding]) -> list[str]:
-    """One sentence a finding, the worst first, at most `MOST` of a kind. Raises InputError for a refusal."""
+    """One sentence per finding, worst first, at most `MOST` of a kind. Raises InputError for a refusal."""
     findings = worst_first(findings)
     for finding in findings:
         if finding.level == "refusal":
@@ -51,7 +51,7 @@ def notes_of(findings: list[Finding]) -> list[str]:
 
 
 def with_coverage(facts: list[DepthFacts], depth: NDArray[np.float32], masks: NDArray[np.bool_]) -> list[DepthFacts]:
-    """The facts of the depth with the fraction of the tissue that has depth. depth, masks: (n, H, W)."""
+    """The facts on the depth with the fraction of tissue that has depth. depth, masks: (n, H, W)."""
     found = []
     for fact, plane, mask in zip(facts, depth, masks):
         tissue = np.count_nonzero(mask)

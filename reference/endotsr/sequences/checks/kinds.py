@@ -1,13 +1,13 @@
-"""Everything that `endotsr check` can find, and a finding: how serious it is, why it matters, and how it is mended.
+"""The kinds of findings of `endotsr check`, each with level, reason and remedy.
 
-The code of a kind is its name in `--json` and stays the same in every version.
+The code of a kind is its name in `--json` and is stable across versions.
 """
 
 from typing import Literal, NamedTuple
 
 Level = Literal["refusal", "warning", "note"]
 
-REFUSED = "a training refuses it"
+REFUSED = "training refuses it"
 LEAVE_OUT = "leave the frame out: endotsr prepare CLIP --out CLIP --replace --drop FRAME"
 ONE_CAMERA = (
     "one camera: endotsr depth --given FILES --kind relative (inverse depth of a network, not metric), a COLMAP model,"
@@ -17,7 +17,7 @@ SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
 
 
 class Kind(NamedTuple):
-    """One kind of finding. A refusal is what `endotsr train` refuses as well."""
+    """One kind of finding. `endotsr train` also refuses what is a refusal here."""
 
     level: Level
     why: str
@@ -27,15 +27,15 @@ class Kind(NamedTuple):
 KINDS: dict[str, Kind] = {
     # files
     "sequence-file": Kind("refusal", "sequence.toml defines the meaning of the files", "correct the key"),
-    "images-files": Kind("refusal", "a training reads them", "supply the images, one file per frame"),
-    "masks-files": Kind("refusal", "a training reads them", "supply the masks, one file per frame"),
-    "depth-files": Kind("refusal", "a training reads them", "supply the depth, one file per frame"),
+    "images-files": Kind("refusal", "training reads them", "supply the images, one file per frame"),
+    "masks-files": Kind("refusal", "training reads them", "supply the masks, one file per frame"),
+    "depth-files": Kind("refusal", "training reads them", "supply the depth, one file per frame"),
     "pairing": Kind("refusal", REFUSED, "supply or delete the file"),
     "size": Kind("refusal", "all files of a sequence have one size", "export it again"),
     "frames": Kind("refusal", REFUSED, "more frames, or another split"),
     "number-gap": Kind("warning", "frames count as evenly spaced in time",
                        "supply the missing frames, or cut the clip there"),
-    "uneven-times": Kind("note", "the times of the training are those of sequence.toml", "none needed"),
+    "uneven-times": Kind("note", "training uses the times in sequence.toml", "none needed"),
     # pictures
     "picture": Kind("refusal", REFUSED, f"copy or export the file again, or {LEAVE_OUT}"),
     "no-picture": Kind("refusal", "there is nothing to reconstruct",
@@ -47,11 +47,11 @@ KINDS: dict[str, Kind] = {
     "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does",
                                 "prepare the video itself, or deinterlace it before exporting pictures"),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
-    "duplicated-frame": Kind("warning", "a held-out frame that repeats a training frame makes the metrics too good, and"
-                             " time stands still there", LEAVE_OUT),
+    "duplicated-frame": Kind("warning", "a held-out copy of a training frame makes the metrics too good, and"
+                             " the motion stops there", LEAVE_OUT),
     "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
                           "fit exposures (model.exposure = true), or cut the clip with --frames"),
-    "another-scene": Kind("warning", "a training fits one scene, and nothing connects what lies before and after a cut",
+    "another-scene": Kind("warning", "training fits one scene, and the parts before and after a cut are unrelated",
                           "cut the clip there: endotsr prepare --frames; or train it with --windows auto"),
     "two-views": Kind("warning", "a stereo pair in one picture is not one view",
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
@@ -59,7 +59,7 @@ KINDS: dict[str, Kind] = {
                               "prepare each separately: --frames ::2, and --frames 1::2"),
     "blue-pictures": Kind("warning", "tissue is red: red and blue may be exchanged, as OpenCV stores them",
                           "export the pictures again as RGB; none needed for blue light"),
-    "colour-profile": Kind("note", "its numbers are read as sRGB, so that colours differ from what a viewer shows",
+    "colour-profile": Kind("note", "its values are read as sRGB: colours differ from those in a viewer",
                            "convert the pictures to sRGB where colours matter"),
     "grey-pictures": Kind("note", "polarity cannot be checked by colour", "none needed"),
     # masks
@@ -83,7 +83,7 @@ KINDS: dict[str, Kind] = {
                           "take scale and shift from points of a reconstruction, or from a stereo pair"),
     "depth-file": Kind("refusal", REFUSED, f"export the depth again, or {LEAVE_OUT}"),
     "depth-values": Kind("refusal", REFUSED, "store lengths"),
-    "frame-without-depth": Kind("note", "it takes no part in the initialisation", "none needed if these are few"),
+    "frame-without-depth": Kind("note", "the initialisation ignores it", "none needed if these are few"),
     "little-depth": Kind("warning", "the scene is initialised only where there is depth",
                          "another stereo method, or wider ranges"),
     "near-plane": Kind("warning", "tissue in front of the near plane is not drawn", "check the unit of the depth"),
@@ -99,9 +99,9 @@ KINDS: dict[str, Kind] = {
     "normalised-depth": Kind("warning", "each frame looks stretched to the full range, so its values are not"
                              " lengths", "store lengths with one scale for all frames"),
     "coarse-depth": Kind("warning", "surfaces become steps", "store 16 bits with a smaller step"),
-    "inverted-depth": Kind("refusal", "near and far are exchanged: the file holds disparity, or an inverted picture",
+    "inverted-depth": Kind("refusal", "near and far are exchanged: the file contains disparity, or an inverted picture",
                            "read it as disparity: endotsr depth --given FOLDER --kind disparity"),
-    "depth-against-light": Kind("warning", "the light is on the scope, so that near tissue is brighter: the file may"
+    "depth-against-light": Kind("warning", "the light is on the scope, which makes near tissue brighter: the file may"
                                 " hold disparity or an inverse depth, or be mirrored or upside down",
                                 "read a disparity as such: endotsr depth --given FOLDER --kind disparity"),
     "flipped-depth": Kind("warning", "the depth does not match the tissue in the picture",
@@ -123,13 +123,13 @@ KINDS: dict[str, Kind] = {
     # cost
     "disk": Kind("refusal", REFUSED, SMALLER),
     "frames-in-file": Kind("note", "that is more than half of sequence.memory", "none needed"),
-    "memory": Kind("warning", "the training would be stopped",
+    "memory": Kind("warning", "training would run out of memory",
                    "endotsr prepare --scale 0.5, or a smaller --sequence.memory"),
 }  # fmt: skip
 
 
 class Finding(NamedTuple):
-    """One thing that a check found."""
+    """One result of a check."""
 
     level: Level
     code: str  # key of `KINDS`
@@ -147,7 +147,7 @@ class Finding(NamedTuple):
 
 
 def finding(code: str, where: object, what: str, frame: int | None = None) -> Finding:
-    """A finding of a kind of `KINDS`, at a file or folder and, where it concerns one, a frame."""
+    """A finding of a kind in `KINDS`, for a file or folder and optionally a frame."""
     kind = KINDS[code]
     return Finding(kind.level, code, str(where), frame, what, kind.why, kind.remedy)
 

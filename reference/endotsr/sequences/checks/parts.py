@@ -1,4 +1,4 @@
-"""The files of a sequence, listed as far as they can be: what is missing becomes a finding, and the rest is checked."""
+"""The files of a sequence. Missing files become findings, and the rest is checked."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +22,7 @@ from endotsr.splatting.camera import Camera
 
 
 class Parts(NamedTuple):
-    """What a sequence consists of; lists are empty where there is nothing."""
+    """The parts of a sequence; lists of missing parts are empty."""
 
     folder: Path
     images: list[Path]
@@ -34,15 +34,15 @@ class Parts(NamedTuple):
     arbitrary: bool
     camera_file: Path
     cameras: Callable[[int, int], list[Camera]]  # of pictures of this width and height
-    seconds: NDArray[np.float64] | None = None  # of the frames, where they are not evenly spaced
-    stated_in: str = ""  # the file that states the polarity of the masks; "": the settings do
-    assumed: str = ""  # what is not measured of the depth
+    seconds: NDArray[np.float64] | None = None  # of uneven frames; None: evenly spaced
+    stated_in: str = ""  # the file that states the polarity of the masks; "": the settings state it
+    assumed: str = ""  # properties of the depth that are not measured
 
 
 def parts_of(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
     """List the parts of a folder in the common or the EndoNeRF layout; findings are appended.
 
-    Raises:  InputError if there is no folder, or its layout has to be prepared first.
+    Raises:  InputError without a folder, or for a layout that needs `endotsr prepare`.
     """
     if not folder.exists():
         raise InputError(f"{folder}: sequence folder not found")
@@ -106,7 +106,7 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
 
 
 def _stated(file: SequenceFile, where: Path) -> list[Finding]:
-    """Findings on what `sequence.toml` states, or leaves out."""
+    """Findings on the statements of `sequence.toml`."""
     found = []
     if file.depth is None:
         found.append(finding("no-depth", where, "[depth] is missing"))

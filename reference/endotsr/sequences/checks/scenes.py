@@ -1,7 +1,7 @@
-"""Checks of what the pictures show: one scene, and one view of it.
+"""Checks that the pictures show one view of one scene.
 
-In: small grey pictures of the frames. Out: findings. A clip that was joined of two takes, and a stereo pair that is
-taken for one picture, are each trained without an error and give a scene that means nothing.
+In: small grey pictures of the frames. Out: findings. Two joined takes, or a stereo pair read as one picture, train
+without an error and give a meaningless scene.
 """
 
 import numpy as np
@@ -9,14 +9,14 @@ import numpy as np
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.checks.kinds import Finding, finding
 
-ALIKE = 0.6  # correlation of the halves of the pictures: two views; published clips of one view stay within 0.3
-OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # of neighbouring frames: below the one, where the others are above the other
-ALTERNATING = 0.2  # by which pictures two apart are more alike than neighbours; motion makes it negative
-FARTHEST = 6  # parts of the width of a half: one of them is the largest shift between two views
+ALIKE = 0.6  # correlation of picture halves that indicates two views; published clips of one view have at most 0.3
+OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # correlation of neighbouring frames: at a cut, and usually elsewhere
+ALTERNATING = 0.2  # correlation of pictures two apart minus that of neighbours; motion makes it negative
+FARTHEST = 6  # the largest shift between two views is 1 / FARTHEST of the width of a half
 
 
 def cut_findings(grey: list[FloatArray], names: list[str], readable: BoolArray, where: str) -> list[Finding]:
-    """Frames with which another scene begins, in a clip whose neighbouring frames are alike elsewhere.
+    """Frames at which another scene begins, in a clip whose neighbouring frames are otherwise similar.
 
     grey       (h, w) of every frame, reduced
     readable   frames that are neither black nor white
@@ -35,7 +35,7 @@ def cut_findings(grey: list[FloatArray], names: list[str], readable: BoolArray, 
 
 
 def alternating_finding(grey: list[FloatArray], where: str) -> list[Finding]:
-    """Pictures of two cameras, or of two kinds of light, in turn.
+    """Alternating pictures of two cameras, or of two kinds of light.
 
     grey   (h, w) of every frame, reduced
     """
@@ -49,7 +49,7 @@ def alternating_finding(grey: list[FloatArray], where: str) -> list[Finding]:
 
 
 def halves_finding(grey: list[FloatArray], where: str) -> list[Finding]:
-    """Pictures that seem to hold two views of one moment.
+    """Pictures that seem to contain two simultaneous views.
 
     grey   (h, w) of every frame, reduced
     """
@@ -73,7 +73,7 @@ def _stacked(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _shifted_correlation(one: FloatArray, other: FloatArray) -> float:
-    """The largest correlation of two pictures over shifts to the side by up to a sixth of the width."""
+    """The largest correlation of two pictures over horizontal shifts of up to a sixth of the width."""
     width = one.shape[1]
     most = width // FARTHEST
     return max(
@@ -83,7 +83,7 @@ def _shifted_correlation(one: FloatArray, other: FloatArray) -> float:
 
 
 def _correlation(one: FloatArray, other: FloatArray) -> float:
-    """Of two pictures of one size; 0 where one of them is constant."""
+    """The correlation of two pictures of one size; 0 if one is constant."""
     one, other = one - one.mean(), other - other.mean()
     size = float(np.sqrt((one * one).sum() * (other * other).sum()))
     return float((one * other).sum()) / size if size > 0 else 0.0

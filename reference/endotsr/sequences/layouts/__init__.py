@@ -1,7 +1,7 @@
-"""The layouts in which recordings come, one file each.
+"""The layouts of recordings, one file each.
 
-A file of this folder holds one value `LAYOUT`; putting it here registers it. `detect` asks the layouts in the order of
-`rank`: those that state what they are first, a plain folder of pictures last.
+Every file in this folder defines a value `LAYOUT` and is registered automatically. `layout_of` tries the layouts in the
+order of `rank`: unambiguous ones first, a plain folder of pictures last.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import depth_step, masks_are_proposed
 
-# What a user may state of a source and only some layouts read; the others follow from these.
+# Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (
     "stereo", "camera", "distortion", "calibration", "baseline", "trajectory", "masks", "depth", "orientation",
 )  # fmt: skip
@@ -30,18 +30,18 @@ class Layout(NamedTuple):
     """One layout on disk."""
 
     name: str
-    about: str  # what a path in this layout holds, for messages
+    about: str  # contents of a path in this layout, for messages
     rank: int  # layouts are tried in ascending order
     recognises: Callable[[Path], bool]
     open: Callable[[Path, SourceOptions], Recording]
-    takes: tuple[str, ...] = ()  # of STATEMENTS: what it reads; anything else that is stated is refused
-    read: Callable[[Path, SequenceConfig, float], Sequence] | None = None  # None: `endotsr prepare` comes first
-    hashes: Callable[[Path, SequenceConfig], dict[str, str]] | None = None  # of the files that `read` reads
+    takes: tuple[str, ...] = ()  # the STATEMENTS that it reads; the others are refused
+    read: Callable[[Path, SequenceConfig, float], Sequence] | None = None  # None: needs `endotsr prepare`
+    hashes: Callable[[Path, SequenceConfig], dict[str, str]] | None = None  # SHA-256 of the files that `read` reads
 
 
 @cache
 def layouts() -> tuple[Layout, ...]:
-    """Every layout, in the order in which they are tried."""
+    """All layouts, in the order in which they are tried."""
     found = [import_module(f"{__name__}.{entry.name}").LAYOUT for entry in iter_modules(__path__)]
     return tuple(sorted(found, key=lambda layout: (layout.rank, layout.name)))
 
@@ -49,7 +49,7 @@ def layouts() -> tuple[Layout, ...]:
 def layout_of(path: Path, name: str = "auto") -> Layout:
     """The layout named, or the first that recognises the path.
 
-    Raises:  InputError if the path does not exist or no layout recognises it, with what would be recognised.
+    Raises:  InputError for an unknown name, a missing path, or a path that no layout recognises, listing the layouts.
     """
     path = Path(path)
     if name != "auto":
@@ -83,7 +83,7 @@ def open_recording(path: Path, options: SourceOptions) -> Recording:
 
 
 def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
-    """Raises InputError for a statement that this layout does not read: its own files say so, or nothing can."""
+    """Raises InputError for a statement that this layout does not read."""
     defaults = SourceOptions()
     for name in STATEMENTS:
         if getattr(options, name) != getattr(defaults, name) and name not in layout.takes:
@@ -92,9 +92,9 @@ def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
 
 
 def read_sequence(path: Path, config: SequenceConfig, near: float) -> Sequence:
-    """The sequence at a path, in any layout that can be trained on as it is.
+    """The sequence at a path, in a layout that training reads directly.
 
-    Raises:  InputError; for another layout it names the commands that make a sequence of it.
+    Raises:  InputError; for another layout, with the command that converts it.
     """
     layout = readable_layout(Path(path))
     assert layout.read is not None
@@ -102,13 +102,13 @@ def read_sequence(path: Path, config: SequenceConfig, near: float) -> Sequence:
 
 
 def readable_layout(path: Path) -> Layout:
-    """The layout of a path that can be trained on as it is; a path that is in no layout is read as EndoNeRF.
+    """The layout of a path that training reads directly. A path in no known layout is read as EndoNeRF.
 
     Raises:  InputError for a layout that needs `endotsr prepare`.
     """
     found = next((layout for layout in layouts() if path.exists() and layout.recognises(path)), None)
     if found is None or (found.name == "pictures" and (path / "depth").is_dir()):
-        found = layout_of(path, "endonerf")  # its messages say what is missing
+        found = layout_of(path, "endonerf")  # its messages name the missing parts
     if found.read is None:
-        raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` makes a sequence of it")
+        raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` converts it")
     return found

@@ -1,6 +1,6 @@
 """C3VD: a registered sequence of a colonoscope in a phantom, with rendered depth and poses.
 
-0_color.png ...       1350x1080, of an omnidirectional camera (Scaramuzza); straightened here to a pinhole camera
+0_color.png ...       1350x1080, omnidirectional camera (Scaramuzza); undistorted here to a pinhole camera
 0000_depth.tiff ...   16 bits, 65535 = 100 mm along the optical axis; 0 and 65535 = none
 pose.txt              16 numbers per line, the transposed camera-to-world matrix, millimetres, OpenCV axes
 """
@@ -20,13 +20,13 @@ from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import CameraPose, PicturePair, Recording, colour_picture, lens_of_matrix
 from endotsr.sequences.sequence_file import checked_rotation, inverse_pose
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import beside
+from endotsr.sequences.sources import matching_files
 from endotsr.untrusted.files import read_text
 
 POSES, COLOUR, DEPTH = "pose.txt", "_color.png", "_depth.tiff"
-STEP, NO_DEPTH = 100.0 / 65535.0, 65535  # mm of one step; beyond the range of the depth
+STEP, NO_DEPTH = 100.0 / 65535.0, 65535  # mm per step; beyond the depth range
 WIDTH, HEIGHT = 1350, 1080
-# The camera CF-HQ190L, as the authors publish it; the centre of the first pixel is (0, 0).
+# The camera CF-HQ190L as published by the authors; the first pixel centre is (0, 0).
 CENTRE, STRETCH = (
     (678.544839263292, 542.975887548343),
     ((0.999986882249990, 0.00288273829525059), (-0.00296316513429569, 1.0)),
@@ -46,7 +46,7 @@ def recognises(path: Path) -> bool:
 
 
 def pinhole_maps() -> Maps:
-    """Where the pixels of a pinhole camera of the same size, centre and central focal length lie in the pictures."""
+    """Maps from a pinhole camera of the same size, centre and central focal length to the pictures."""
     focal, radii = POLYNOMIAL[0], np.linspace(0.0, 950.0, 4000)
     angles = np.arctan2(radii, np.polynomial.polynomial.polyval(radii, POLYNOMIAL))
     x, y = np.meshgrid((np.arange(WIDTH) - CENTRE[0]) / focal, (np.arange(HEIGHT) - CENTRE[1]) / focal)
@@ -83,7 +83,7 @@ def open_c3vd(path: Path, options: SourceOptions) -> Recording:
     poses, maps = read_poses(path / POSES), pinhole_maps()
     if len(poses) != len(files):
         raise InputError(f"{path / POSES}: {len(poses)} poses for {len(files)} pictures; allowed: one per picture")
-    paired = beside(files, planes) if planes else []
+    paired = matching_files(files, planes) if planes else []
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i in wanted:
@@ -110,8 +110,8 @@ def open_c3vd(path: Path, options: SourceOptions) -> Recording:
         poses=poses,
         rate=options.rate,
         notes=[
-            "the camera of C3VD is omnidirectional: straightened to a pinhole camera of the same central focal length,"
-            " which sees 83 degrees of its width"
+            "the camera of C3VD is omnidirectional: undistorted to a pinhole camera of the same central focal length,"
+            " with a horizontal field of view of 83 degrees"
         ],
     )
 

@@ -1,7 +1,7 @@
 """A COLMAP model with its pictures: poses, intrinsics and points of a reconstruction of unknown scale.
 
-The model (cameras, images, points3D; .txt or .bin) lies in the folder, in sparse/0 or in sparse; the pictures in
-images/ or beside the model. Frames are the registered pictures, in the order of the numbers in their names.
+The model (cameras, images, points3D; .txt or .bin) is in the folder, in sparse/0 or in sparse; the pictures are in
+images/ or in the folder. Frames are the registered pictures, ordered by the numbers in their names.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ def recognises(path: Path) -> bool:
 
 
 def open_colmap(path: Path, options: SourceOptions) -> Recording:
-    """The model as a recording. Raises InputError for a picture that is missing, or for several cameras."""
+    """The model as a recording. Raises InputError for a missing picture, or for several cameras."""
     folder = find_model(path)
     if folder is None:
         raise InputError(f"{path}: holds no COLMAP model (cameras.txt or cameras.bin, also in sparse/0)")
@@ -62,7 +62,7 @@ def open_colmap(path: Path, options: SourceOptions) -> Recording:
 
 
 def _file(path: Path, name: str) -> Path:
-    """The file of a registered picture. Raises InputError if it is missing or lies outside of the folder."""
+    """The file of a registered picture. Raises InputError if it is missing or outside the folder."""
     inner = relative_path(name, f"{path}: a picture of the COLMAP model")
     for place in (path / "images" / inner, path / inner):
         if place.is_file():

@@ -1,4 +1,4 @@
-"""The common format: `sequence.toml` beside `images/`; written by `endotsr prepare`."""
+"""The common format, written by `endotsr prepare`: `sequence.toml` and `images/`."""
 
 from endotsr.sequences.common import common_hashes, open_common, read_common, recognises
 from endotsr.sequences.layouts import Layout

@@ -1,7 +1,7 @@
 """Hamlyn, rectified by Endo-Depth-and-Motion: one folder per clip, `rectified01` and so on.
 
 color/ or image01/   left pictures, jpg or png
-image02/             right pictures (optional); their baseline is not in the folder
+image02/             right pictures (optional); the folder does not state the baseline
 depth/ or depth01/   16 bits, millimetres (optional)
 intrinsics.txt       K of the rectified pictures, three lines of three or four numbers, OpenCV's convention
 """
@@ -16,7 +16,7 @@ from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import Recording, lens_of_matrix
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import beside, depth_reader, pictures_from_files, size_of, with_stated
+from endotsr.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
 
 CAMERA = "intrinsics.txt"
 LEFT, RIGHT, DEPTH = ("color", "image01"), ("image02",), ("depth", "depth01")
@@ -41,17 +41,17 @@ def open_hamlyn(path: Path, options: SourceOptions) -> Recording:
     if right:
         check_pairing(left, right)
     width, height = size_of(left)
-    depth = depth_reader(beside(left, list_pictures(depth_folder, DEPTH_ENDINGS)), 1.0) if depth_folder else None
+    depth = list_pictures(depth_folder, DEPTH_ENDINGS) if depth_folder else []
     recording = Recording(
         layout="hamlyn",
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
-        depth=depth,
+        depth=depth_reader(matching_files(left, depth), 1.0) if depth else None,
         lens=lens_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
         baseline=options.baseline,
         rate=options.rate,
-        notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout holds no poses: the camera counts as resting"],
+        notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout has no poses: the camera counts as static"],
     )
     return with_stated(recording, options)
 

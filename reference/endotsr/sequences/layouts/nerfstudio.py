@@ -1,7 +1,7 @@
 """nerfstudio and instant-ngp: `transforms.json` with intrinsics, camera-to-world matrices and names of pictures.
 
-Camera axes are OpenGL's, pixel edges lie at integers, masks are black where a pixel is left out, and a depth file holds
-lengths in thousandths of the unit of the matrices, which is unknown. `ply_file_path` names points of a reconstruction.
+Camera axes are OpenGL's, pixel edges are at integers, masks are black on excluded pixels, and depth files store
+thousandths of the unknown unit of the matrices. `ply_file_path` names points of a reconstruction.
 """
 
 from pathlib import Path
@@ -25,18 +25,18 @@ from endotsr.untrusted.yaml import matrix
 
 FILE = "transforms.json"
 LARGEST_FILE = 1 << 28  # bytes
-DEPTH_STEP = 1e-3  # units of the matrices of one step of the stored depth
+DEPTH_STEP = 1e-3  # units of the matrices per step of the stored depth
 INTRINSICS = ("fl_x", "fl_y", "cx", "cy")
 MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 
 
 def recognises(path: Path) -> bool:
-    """Whether a path is such a file, or a folder that holds it."""
+    """Whether a path is such a file or its folder."""
     return path.name == FILE or (path / FILE).is_file()
 
 
 def read_lens(data: dict[str, Any], frame: dict[str, Any], size: tuple[int, int], where: str) -> Lens:
-    """The intrinsics of a frame: its own, else those of the file. Raises InputError."""
+    """The intrinsics of a frame, by default those of the file. Raises InputError."""
     found = data | frame
     if found.get("camera_model", MODELS[0]) not in MODELS or found.get("k4"):
         raise InputError(
@@ -55,7 +55,7 @@ def read_lens(data: dict[str, Any], frame: dict[str, Any], size: tuple[int, int]
 
 
 def read_points(path: Path) -> FloatArray:
-    """(n, 3) of a PLY file in ASCII, whose first columns are x y z. Raises InputError."""
+    """Points (n, 3) of an ASCII PLY file with first columns x y z. Raises InputError."""
     head, mark, body = read_bytes(path, LARGEST_FILE).decode("ascii", "replace").partition("end_header\n")
     if not mark or "format ascii" not in head:
         raise InputError(f"{path}: allowed: a PLY file in ASCII, as nerfstudio writes it")
@@ -107,7 +107,7 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
         rate=options.rate,
         notes=[f"{FILE}: {len(files)} frames, unit of lengths unknown"]
         + [found.line for found in gap_findings(files)]
-        + ([] if cloud is None else [f"{len(cloud)} points: the file does not say which frame sees which"]),
+        + ([] if cloud is None else [f"{len(cloud)} points: the file does not state their visibility"]),
     )
 
 

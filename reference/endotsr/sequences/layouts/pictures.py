@@ -1,8 +1,8 @@
 """A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one per frame, alone or as stereo pairs.
 
 A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
-or with `000_left.png` beside `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording.
-Everything else about it is stated on the command line.
+or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording. All other properties
+are stated on the command line.
 """
 
 import re
@@ -33,7 +33,7 @@ SIDE = re.compile(r"(?:^|[-_. ])(left|right|l|r)(?:[-_. ]|$)|(?<=\d)(l|r)$", re.
 
 
 def recognises(path: Path) -> bool:
-    """Whether a path is a picture, or a folder that holds pictures directly or in a known pair of folders."""
+    """Whether a path is a picture, or a folder with pictures directly or in a known pair of folders."""
     if path.is_file():
         return path.suffix.lower() in PICTURE_ENDINGS
     return path.is_dir() and any(_holds_pictures(folder) for folder in (path, *(path / left for left, _ in PAIRS)))
@@ -44,7 +44,7 @@ def _holds_pictures(folder: Path) -> bool:
 
 
 def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
-    """Left and right picture files; right is empty without a second folder. Raises InputError."""
+    """Left and right picture files; right is empty for monocular pictures. Raises InputError."""
     for left, right in PAIRS:
         if path.is_dir() and _holds_pictures(path / left):
             both = files_of(path / left, PICTURE_ENDINGS), []
@@ -57,7 +57,7 @@ def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
 
 
 def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
-    """The left and the right files of one folder by their names; None unless every name says its side."""
+    """The left and the right files of one folder by their names; None unless every name states its side."""
     shown = (file for file in path.iterdir() if not file.name.startswith("."))
     files = sorted(file for file in shown if file.suffix.lower() in PICTURE_ENDINGS)
     found: dict[str, list[Path]] = {"l": [], "r": []}

@@ -1,10 +1,10 @@
-"""SCARED: the folder of a keyframe, with the video of a stereo endoscope, its calibration and kinematics.
+"""SCARED: the folder of a keyframe, with stereo video, calibration and kinematics.
 
 endoscope_calibration.yaml        OpenCV: M1 D1 M2 D2 R T, millimetres (camera_calibration.yaml in some copies)
 data/rgb.mp4                      left over right
 data/frame_data.tar.gz            or data/frame_data/: one JSON per frame, camera-pose (4x4), world-to-camera, mm
 
-Depth of the structured light belongs to pictures that are not rectified and is not read; `endotsr depth` matches pairs.
+Structured-light depth belongs to unrectified pictures and is not read; `endotsr depth` matches the pairs.
 """
 
 import tarfile
@@ -49,14 +49,14 @@ def open_scared(path: Path, options: SourceOptions) -> Recording:
     if poses is None:
         poses = _poses(path, recording.count)
         kinematics = (
-            "camera-pose of the kinematics: read as world-to-camera, millimetres; its authors name errors in it"
+            "camera-pose of the kinematics: read as world-to-camera, millimetres; its authors report errors in it"
         )
-        notes.append(kinematics if poses else f"{FOLDER} is missing: the camera counts as resting")
+        notes.append(kinematics if poses else f"{FOLDER} is missing: the camera counts as static")
     return replace(recording, layout="scared", where=path, poses=poses, unit="mm", notes=notes)
 
 
 def _poses(path: Path, count: int) -> list[CameraPose | None] | None:
-    """World-to-camera poses of the frames; None without any file."""
+    """World-to-camera poses of the frames; None without files."""
     texts = _texts(path)
     if not texts:
         return None
@@ -71,7 +71,7 @@ def _poses(path: Path, count: int) -> list[CameraPose | None] | None:
 
 
 def _texts(path: Path) -> list[tuple[str, str | bytes]]:
-    """Names and contents of the JSON files, in order of their names."""
+    """Names and contents of the JSON files, ordered by name."""
     if (path / FOLDER).is_dir():
         files = sorted((path / FOLDER).glob("*.json"))[:MOST_FILES]
         return [(file.name, read_text(file, LARGEST_FILE)) for file in files]

@@ -1,4 +1,4 @@
-"""SERV-CT: an experiment with rectified pairs and reference depth from CT. The pairs are views, not frames of a film.
+"""SERV-CT: an experiment with rectified pairs and reference depth from CT. The pairs are separate views, not a film.
 
 Left_rectified/, Right_rectified/     001.png ...
 Rectified_calibration/                001.json ...: P1, P2 (3x4) in pixels and millimetres, OpenCV's convention
@@ -17,12 +17,12 @@ from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import Lens, Recording, lens_of_matrix
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import beside, depth_reader, pictures_from_files, size_of, with_stated
+from endotsr.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.yaml import matrix
 
 LEFT, RIGHT, CAMERAS, DEPTH = "Left_rectified", "Right_rectified", "Rectified_calibration", "Ground_truth_CT/DepthL"
-STEP = 1.0 / 256.0  # mm of one step of the stored depth
+STEP = 1.0 / 256.0  # mm per step of the stored depth
 
 
 def recognises(path: Path) -> bool:
@@ -56,13 +56,13 @@ def open_servct(path: Path, options: SourceOptions) -> Recording:
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
-        depth=depth_reader(beside(left, depth), STEP) if depth else None,
+        depth=depth_reader(matching_files(left, depth), STEP) if depth else None,
         lens=cameras[0][0],
         baseline=cameras[0][1],
         notes=[
             f"{CAMERAS}: {HALF_A_PIXEL}",
-            "the pairs of SERV-CT are single views whose poses are not given: they suit `endotsr depth` and its"
-            " comparison with the reference, and no training as one scene",
+            "the pairs of SERV-CT are separate views without poses: use them for `endotsr depth` and its comparison"
+            " with the reference, not for training one scene",
         ],
     )
     return with_stated(recording, options)

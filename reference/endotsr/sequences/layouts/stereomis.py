@@ -1,7 +1,7 @@
-"""StereoMIS as it is distributed: one stacked video (left on top), calibration, trajectory and tissue masks.
+"""StereoMIS as distributed: one stacked video (left on top), calibration, trajectory and tissue masks.
 
 *.mp4                      left over right; pictures are numbered from 0
-StereoCalibration.ini      see `calibration`; of one picture of the pair, millimetres
+StereoCalibration.ini      see `calibration_formats`; for one picture of the pair, millimetres
 groundtruth.txt            frame tx ty tz qx qy qz qw, camera-to-world, metres (optional)
 masks/000123l.png          of the left picture, any value above 0 = tissue, perhaps at half size (optional)
 """
@@ -16,7 +16,7 @@ from endotsr.sequences.layouts import Layout
 from endotsr.sequences.layouts.video import open_video
 from endotsr.sequences.recording import Recording
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import mask_reader, numbered
+from endotsr.sequences.sources import mask_reader, matching_files
 from endotsr.sequences.video_file import VIDEO_ENDINGS
 
 CALIBRATION = "StereoCalibration.ini"
@@ -34,7 +34,7 @@ def _videos(path: Path) -> list[Path]:
 
 
 def open_stereomis(path: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording. Raises InputError for more than one video, and what its files are refused for."""
+    """The folder as a recording. Raises InputError for more than one video, and for invalid files."""
     videos = _videos(path)
     if len(videos) != 1:
         raise InputError(f"{path}: {len(videos)} videos ({', '.join(v.name for v in videos)}); allowed: one")
@@ -49,11 +49,11 @@ def open_stereomis(path: Path, options: SourceOptions) -> Recording:
     recording = open_video(videos[0], stated)
     notes = list(recording.notes)
     if stated.trajectory is None:
-        notes.append(f"{TRAJECTORY} is missing: the camera counts as resting")
+        notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
     masks = recording.masks
     if options.masks is None and (path / MASKS).is_dir():
         assert recording.rig is not None
-        files = numbered(list_pictures(path / MASKS, PICTURE_ENDINGS), recording.count)
+        files = matching_files(recording.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
         masks = mask_reader(files, "black", recording.rig.left.width, recording.rig.left.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")

@@ -1,8 +1,7 @@
 """TUM RGB-D folders: `rgb.txt`, `rgb/`, and optionally `depth.txt`, `depth/` and `groundtruth.txt`.
 
-`rgb.txt` and `depth.txt` hold one line per picture, `time file`; `groundtruth.txt` is a trajectory in seconds and
-metres, camera-to-world. Depth is stored in 5000 steps per metre. Pictures, depth and poses belong together within
-0.02 s.
+`rgb.txt` and `depth.txt` have one line per picture, `time file`. `groundtruth.txt` is a camera-to-world trajectory in
+seconds and metres. Depth has 5000 steps per metre. Pictures, depth and poses are matched within 0.02 s.
 """
 
 from pathlib import Path
@@ -26,9 +25,9 @@ from endotsr.untrusted.files import read_text
 from endotsr.untrusted.names import relative_path
 
 LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
-STEP = 1000.0 / 5000.0  # mm of one step of the stored depth
+STEP = 1000.0 / 5000.0  # mm per step of the stored depth
 LONGEST = 0.02  # seconds between a picture and its depth or pose
-DEFAULT = (525.0, 525.0, 320.0, 240.0)  # the intrinsics that the authors of the layout recommend, 640x480
+DEFAULT = (525.0, 525.0, 320.0, 240.0)  # the intrinsics recommended by the authors of the layout, 640x480
 
 
 def recognises(path: Path) -> bool:
@@ -65,7 +64,7 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
     notes = []
     if lens is None and (width, height) == (640, 480):
         lens = Lens(*DEFAULT, width, height)
-        notes.append("no --camera: the intrinsics that the authors of the layout recommend")
+        notes.append("no --camera: the intrinsics recommended by the authors of the layout")
     depth = None
     if (path / DEPTH_LIST).is_file():
         stamps, planes = read_list(path / DEPTH_LIST)

@@ -38,8 +38,8 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
     lens, rig = stated_camera(options, width, height, path)
     notes = _notes(facts, rate, path)
     if facts.turn:
-        done = f"turned by {facts.turn} degrees counter-clockwise" if quarters else "taken as stored"
-        notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth are of these")
+        done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
+        notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth refer to these")
     poses, note = stated_poses(options, facts.count, rate, times)
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
@@ -66,11 +66,11 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
 
 
 def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int:
-    """Quarter turns counter-clockwise that are made. Raises InputError if the file states some and the user nothing."""
+    """Counter-clockwise quarter turns to apply. Raises InputError for a stated rotation without --orientation."""
     if facts.turn and options.orientation is None:
         raise InputError(
-            f"{path}: the file states that its pictures are shown turned by {facts.turn} degrees counter-clockwise;"
-            " intrinsics, masks and depth hold for one of the two: allowed: --orientation turned (as players and ffmpeg"
+            f"{path}: the file states that its pictures are shown rotated by {facts.turn} degrees counter-clockwise;"
+            " intrinsics, masks and depth fit only one of the two: allowed: --orientation turned (as players and ffmpeg"
             " show them) or --orientation stored (as the sensor wrote them)"
         )
     return facts.turn // 90 if options.orientation == "turned" else 0
@@ -82,9 +82,9 @@ def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
     ]
     found += [f"{path.name}: {remark}" for remark in facts.remarks]
     if facts.interlaced:
-        found.append(f"{path.name} is interlaced: deinterlaced, one picture for the two fields (bwdif)")
+        found.append(f"{path.name} is interlaced: deinterlaced to one picture per two fields (bwdif)")
     if facts.pixel_shape != 1:
-        found.append(f"{path.name}: pixels are {facts.pixel_shape:.4g} times as wide as high: fx and fy differ by that")
+        found.append(f"{path.name}: pixels are {facts.pixel_shape:.4g} times as wide as high, as are fx and fy")
     if facts.times is None:
         found.append(f"{path.name} states no times: frames count as evenly spaced")
     return found
