@@ -46,6 +46,7 @@ from endotsr.sequences.sources import matching_files
 from endotsr.sequences.splits import parse_frame_range, split_frames
 
 T = TypeVar("T")
+Size = tuple[int, ...]  # height, width
 SAMPLED = 16  # frames whose masks are checked against pictures and depth
 STEP = 4  # pixels between their sampled rows and columns
 
@@ -83,6 +84,15 @@ class _Pass:
         except InputError as error:
             self.findings.append(finding(code, where, " ".join(str(error).split()), frame))
             return None
+
+    def sized(self, make: Callable[[], NDArray], code: str, file: Path, i: int, size: Size | None) -> NDArray | None:
+        """As `tried`, for the array of a file, which another size than `size` refuses as well."""
+        found = self.tried(make, code, file, i)
+        if found is None or size is None or found.shape[:2] == size:
+            return found
+        what = f"{found.shape[1]}x{found.shape[0]} pixels, the first picture has {size[1]}x{size[0]}"
+        self.findings.append(finding("size", file, what, i))
+        return None
 
 
 def check_sequence(path: Path, config: Config) -> Checked:
@@ -124,19 +134,16 @@ def _pairing(parts: Parts, run: _Pass) -> None:
             run.tried(lambda other=other: check_pairing(parts.images, other), "pairing", other[0].parent)
 
 
-def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
-    """Read every frame once. Returns the size (height, width) of the first readable picture."""
+def _read_frames(parts: Parts, run: _Pass) -> Size | None:
+    """Read every frame once. Returns the size of the first readable picture."""
     masks, depth = (_paired(parts.images, files) for files in (parts.masks, parts.depth))
     sampled = set(np.linspace(0, len(parts.images) - 1, min(SAMPLED, len(parts.images))).astype(int).tolist())
     size = None
     for i, file in enumerate(parts.images):
-        picture = run.tried(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i)
+        picture = run.sized(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i, size)
         if picture is None:
             continue
         size = size or picture.shape[:2]
-        if picture.shape[:2] != size:
-            run.findings.append(_other_size(file, i, picture.shape, size))
-            continue
         run.frames.append(frame_facts(file.name, picture))
         tissue = _mask(parts, run, masks[i], i, size)
         found = _depth(parts, run, depth[i], i, size, tissue)
@@ -157,18 +164,11 @@ def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
         return [None] * len(images)  # reported by the check of the pairing
 
 
-def _other_size(file: Path, i: int, shape: tuple[int, ...], size: tuple[int, ...]) -> Finding:
-    what = f"{shape[1]}x{shape[0]} pixels, the first picture has {size[1]}x{size[0]}"
-    return finding("size", file, what, i)
-
-
-def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, ...]) -> NDArray[np.bool_] | None:
+def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: Size) -> NDArray[np.bool_] | None:
     if file is None:
         return None
-    plane = run.tried(lambda: grey_plane(read_picture(file), file), "mask", file, i)
-    if plane is None or plane.shape != size:
-        if plane is not None:
-            run.findings.append(_other_size(file, i, plane.shape, size))
+    plane = run.sized(lambda: grey_plane(read_picture(file), file), "mask", file, i, size)
+    if plane is None:
         return None
     read = lambda: tissue_masks([plane], [str(file)], parts.excluded_value)[0]
     tissue = run.tried(read, "mask-values", file, i)
@@ -178,15 +178,12 @@ def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, 
 
 
 def _depth(
-    parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, ...], tissue: NDArray[np.bool_] | None
+    parts: Parts, run: _Pass, file: Path | None, i: int, size: Size, tissue: NDArray[np.bool_] | None
 ) -> NDArray[np.float32] | None:
     if file is None:
         return None
-    stored = run.tried(lambda: read_plane(file), "depth-file", file, i)
+    stored = run.sized(lambda: read_plane(file), "depth-file", file, i, size)
     if stored is None:
-        return None
-    if stored.shape != size:
-        run.findings.append(_other_size(file, i, stored.shape, size))
         return None
     depth = run.tried(lambda: depth_plane(stored, parts.depth_scale, file), "depth-values", file, i)
     if depth is None:
@@ -232,7 +229,7 @@ def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
     run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where)
 
 
-def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Cost:
+def _cost(parts: Parts, size: Size, config: Config, run: _Pass) -> Cost:
     """Memory, disk and time of a training, with findings if they are insufficient."""
     height, width, count, where = *size[:2], len(parts.images), str(parts.folder)
     cost = estimated_cost(count, width, height, config)
