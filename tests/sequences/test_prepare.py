@@ -13,8 +13,9 @@ from endotsr.errors import InputError
 from endotsr.opencv import read_png, write_png
 from endotsr.opencv.stereo import rectification_maps
 from endotsr.sequences.common import open_common, read_common
+from endotsr.sequences.depth_files import step_of_depth
 from endotsr.sequences.layouts import layout_of, open_recording, read_sequence
-from endotsr.sequences.prepare import PrepareSettings, prepare, step_of_depth
+from endotsr.sequences.prepare import PrepareSettings, prepare
 from endotsr.sequences.recording import lens_of_matrix
 from endotsr.sequences.sequence_file import read_sequence_file
 from endotsr.sequences.source_options import SourceOptions

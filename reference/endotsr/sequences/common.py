@@ -176,14 +176,11 @@ def cameras_of(contents: Contents) -> list[Camera]:
     """One camera per frame; the same object for all frames of a static camera."""
     entry, count = contents.file.camera, len(contents.images)
     lens = (entry.fx, entry.fy, entry.cx, entry.cy, entry.width, entry.height)
-    poses = contents.poses
-    if poses is None or (
-        all((p.rotation == poses[0].rotation).all() for p in poses)
-        and all((p.translation == poses[0].translation).all() for p in poses)
-    ):
-        pose = poses[0] if poses else CameraPose(np.eye(3), np.zeros(3))
-        return [Camera(pose.rotation, pose.translation, *lens)] * count
-    return [Camera(pose.rotation, pose.translation, *lens) for pose in poses]
+    poses = contents.poses or [CameraPose(np.eye(3), np.zeros(3))]
+    cameras = [Camera(*pose, *lens) for pose in poses]
+    static = all((pose.rotation == poses[0].rotation).all() for pose in poses)
+    static &= all((pose.translation == poses[0].translation).all() for pose in poses)
+    return cameras[:1] * count if static else cameras
 
 
 def _sized(contents: Contents, pixels: NDArray, path: Path) -> NDArray:

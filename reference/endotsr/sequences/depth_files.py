@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.opencv import area_resize
+from endotsr.opencv import area_resize, write_png
 from endotsr.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
 from endotsr.sequences.masks import sparse_step
 from endotsr.sequences.recording import grey_plane
@@ -19,6 +19,7 @@ CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
 LEAST_DEPTH_FRACTION = 0.05  # of a frame; the median of fewer pixels may be an outlier
 DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
+DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
 ALLOWED = "allowed: an .npy file of numbers"
@@ -126,3 +127,17 @@ def far_off(depth: NDArray[np.float32], factor: float) -> list[tuple[int, float]
     usual = float(np.median(list(medians.values()) or [1.0]))
     ratios = [(i, median / usual) for i, median in medians.items()]
     return [(i, ratio) for i, ratio in ratios if not 1 / factor <= ratio <= factor]
+
+
+def step_of_depth(largest: float) -> float:
+    """The step of 16-bit depth: the smallest 1, 2 or 5 times a power of ten for which eight times `largest` fits."""
+    least = largest / DEPTH_LEVELS
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(f"{next(factor for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)) * power:.1g}")
+
+
+def write_levels(path: Path, depth: NDArray[np.float32], step: float) -> int:
+    """Write depth in 16-bit steps, at least 1 where there is depth. Returns the number of pixels clipped at 65535."""
+    levels = np.rint(depth / step)
+    write_png(path, np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16))
+    return int(np.count_nonzero(levels > 65535))

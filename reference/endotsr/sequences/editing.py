@@ -14,7 +14,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.recording import Lens, Picture, PicturePair, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import masks_are_proposed, stated_masks
-from endotsr.sequences.splits import parse_frame_range
+from endotsr.sequences.splits import evenly_spaced, parse_frame_range
 
 ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
@@ -70,11 +70,53 @@ def _seconds(part: str, recording: Recording) -> list[int]:
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
         raise InputError(f"--frames {part!r}: no span of seconds; {ALLOWED}")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
-    times = recording.times if recording.times is not None else np.arange(recording.count) / (recording.rate or 1.0)
+    times = recording.seconds(list(range(recording.count)))
     elapsed: FloatArray = times - times[0]
     if np.isfinite(last) and last > elapsed[-1] + 1.5 / (recording.rate or 1.0):
         raise InputError(f"--frames {part!r}: the source ends after {elapsed[-1]:.3f} seconds")
     return np.flatnonzero((elapsed >= first - 1e-9) & (elapsed < last - 1e-9)).tolist()
+
+
+def thinned(recording: Recording, frames: list[int], rate: float | None, notes: list[str]) -> list[int]:
+    """The frames nearest to the times of a lower frame rate; all frames without a rate. Raises InputError."""
+    if not frames:
+        raise InputError(f"{recording.where}: no frame is left")
+    if rate is None:
+        return frames
+    if recording.rate is None:
+        raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
+    if rate > recording.rate:
+        raise InputError(f"rate {rate:g}: the source has {recording.rate:g} frames per second; allowed: no more")
+    seconds = recording.seconds(frames)
+    wanted = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * rate + 1e-6) + 1) / rate
+    kept = np.unique(np.abs(seconds[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
+    notes.append(f"{len(kept)} of {len(frames)} frames kept for {rate:g} a second, by their times")
+    return [frames[k] for k in kept]
+
+
+def written_times(
+    recording: Recording, frames: list[int], rate: float | None, notes: list[str]
+) -> tuple[list[float] | None, float]:
+    """The times for `sequence.toml`, None for evenly spaced frames, and the mean frame rate.
+
+    rate     the requested frame rate, or None
+    """
+    seconds = recording.seconds(frames)
+    if len(frames) < 2:
+        return None, float(recording.rate or 0.0)
+    mean = (len(frames) - 1) / float(seconds[-1] - seconds[0])
+    whole = recording.rate and frames == list(range(frames[0], frames[-1] + 1))
+    known = recording.rate or recording.times is not None
+    even = evenly_spaced(seconds)
+    stated = float(rate if rate and even else recording.rate if whole and even and recording.rate else mean)
+    if even:
+        return None, stated if known else 0.0
+    steps, unit = np.diff(seconds), "s" if known else "frames"
+    notes.append(
+        f"the frames are not evenly spaced ({steps.min():.3g} to {steps.max():.3g} {unit} apart): sequence.toml states"
+        " their times, and a training uses them"
+    )
+    return [round(float(s), 6) for s in seconds - seconds[0]], stated if known else 0.0
 
 
 def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.sequences.checks.depth import LITTLE, depth_facts, mark_finding
 from endotsr.sequences.common import list_contents, open_common
-from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
+from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.sequences.files import check_pairing, list_pictures
-from endotsr.sequences.prepare import step_of_depth, write_levels
 from endotsr.sequences.recording import ARBITRARY, Lens, PicturePair, Recording
 from endotsr.sequences.relative_depth import Align, MadeDepth, relative_depth
 from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text

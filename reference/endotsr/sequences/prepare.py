@@ -19,8 +19,8 @@ from endotsr.opencv.pictures import write_jpeg
 from endotsr.sequences.checks.cameras import lens_findings
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.sequences.checks.guard import notes_of
-from endotsr.sequences.depth_files import CLIPPED
-from endotsr.sequences.editing import chosen_frames, without
+from endotsr.sequences.depth_files import CLIPPED, step_of_depth, write_levels
+from endotsr.sequences.editing import chosen_frames, thinned, without, written_times
 from endotsr.sequences.files import shortened
 from endotsr.sequences.points import depth_from_points
 from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, PicturePair, Recording
@@ -38,13 +38,11 @@ from endotsr.sequences.sequence_file import (
     SequenceFile,
     write_sequence_file,
 )
-from endotsr.sequences.splits import evenly_spaced
 from endotsr.sequences.stated_depth import refuse_no_lengths
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
 from endotsr.untrusted.writing import new_folder
 
-DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
 LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers
 OnFrame = Callable[[int, int], None]
 
@@ -77,63 +75,14 @@ def prepare(
     Raises:  InputError, leaving nothing behind.
     """
     notes = list(recording.notes)
-    chosen = select_frames(recording, settings, notes)
+    frames = without(chosen_frames(settings.frames, recording), settings.drop, recording)
+    chosen = thinned(recording, frames, settings.rate, notes)
     chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
     refuse_no_lengths(recording, chosen)
     with new_folder(Path(out), FILE_NAME if replace else "") as folder:
         found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
     return found, notes
-
-
-def select_frames(recording: Recording, settings: PrepareSettings, notes: list[str]) -> list[int]:
-    """The frame range, thinned to the wanted rate. Raises InputError."""
-    frames = without(chosen_frames(settings.frames, recording), settings.drop, recording)
-    if not frames:
-        raise InputError(f"{recording.where}: no frame is left")
-    if settings.rate is None:
-        return frames
-    if recording.rate is None:
-        raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
-    if settings.rate > recording.rate:
-        known = f"the source has {recording.rate:g} frames per second"
-        raise InputError(f"rate {settings.rate:g}: {known}; allowed: no more")
-    seconds = _seconds(recording, frames)
-    wanted = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * settings.rate + 1e-6) + 1) / settings.rate
-    kept = np.unique(np.abs(seconds[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
-    notes.append(f"{len(kept)} of {len(frames)} frames kept for {settings.rate:g} a second, by their times")
-    return [frames[k] for k in kept]
-
-
-def _seconds(recording: Recording, frames: list[int]) -> NDArray[np.float64]:
-    """Times of these frames, seconds; their numbers if neither times nor a rate are known."""
-    numbers = np.array(frames, np.float64)
-    return numbers / (recording.rate or 1.0) if recording.times is None else recording.times[frames]
-
-
-def written_times(
-    recording: Recording, frames: list[int], rate: float | None, notes: list[str]
-) -> tuple[list[float] | None, float]:
-    """The times for `sequence.toml`, None for evenly spaced frames, and the mean frame rate.
-
-    rate     the requested frame rate, or None
-    """
-    seconds = _seconds(recording, frames)
-    if len(frames) < 2:
-        return None, float(recording.rate or 0.0)
-    mean = (len(frames) - 1) / float(seconds[-1] - seconds[0])
-    whole = recording.rate and frames == list(range(frames[0], frames[-1] + 1))
-    known = recording.rate or recording.times is not None
-    even = evenly_spaced(seconds)
-    stated = float(rate if rate and even else recording.rate if whole and even and recording.rate else mean)
-    if even:
-        return None, stated if known else 0.0
-    steps, unit = np.diff(seconds), "s" if known else "frames"
-    notes.append(
-        f"the frames are not evenly spaced ({steps.min():.3g} to {steps.max():.3g} {unit} apart): sequence.toml states"
-        " their times, and a training uses them"
-    )
-    return [round(float(s), 6) for s in seconds - seconds[0]], stated if known else 0.0
 
 
 def _poses_and_masks(
@@ -248,13 +197,6 @@ def _depth(
     return depth_from_points(recording.points(i), straight.pose(pose), straight.lens, points)
 
 
-def step_of_depth(largest: float) -> float:
-    """The step of 16-bit depth: the smallest 1, 2 or 5 times a power of ten for which eight times `largest` fits."""
-    least = largest / DEPTH_LEVELS
-    power = 10.0 ** np.floor(np.log10(least))
-    return float(f"{next(factor for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)) * power:.1g}")
-
-
 def _write_pictures(folder: Path, k: int, pair: PicturePair, ending: str) -> None:
     for name, picture in ((IMAGES, pair.left), (RIGHT, pair.right)):
         if picture is not None:
@@ -271,13 +213,6 @@ def _write_mask(folder: Path, k: int, mask: NDArray[np.bool_]) -> None:
 def _depth_file(folder: Path, k: int) -> Path:
     (folder / DEPTH).mkdir(exist_ok=True)
     return folder / DEPTH / f"{k:06d}.png"
-
-
-def write_levels(path: Path, depth: NDArray[np.float32], step: float) -> int:
-    """Write depth in 16-bit steps, at least 1 where there is depth. Returns the number of pixels clipped at 65535."""
-    levels = np.rint(depth / step)
-    write_png(path, np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16))
-    return int(np.count_nonzero(levels > 65535))
 
 
 def _file_of(

@@ -104,6 +104,10 @@ class Recording:
         """Number of frames."""
         return len(self.names)
 
+    def seconds(self, frames: list[int]) -> NDArray[np.float64]:
+        """Times of these frames, seconds; their numbers if neither times nor a rate are known."""
+        return np.array(frames) / (self.rate or 1.0) if self.times is None else self.times[frames]
+
 
 def lens_of_matrix(
     matrix: FloatArray, width: int, height: int, distortion: tuple[float, ...] = (), *, where: object

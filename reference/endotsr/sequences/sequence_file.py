@@ -207,15 +207,12 @@ def _plain_name(folder: str) -> bool:
 def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
     """World-to-camera poses in OpenCV axes, translation in scene units; None for a static camera.
 
-    Raises:  InputError naming the frame.
+    Raises:  InputError naming the frame of the first invalid pose, or for a wrong number of poses.
     """
-    if found.poses is None:
-        return None
-    entry = found.poses
-    if len(entry.matrices) != found.frames:
-        raise InputError(f"{path}: poses.matrices: {len(entry.matrices)} rows for {found.frames} frames")
-    scale = scene_factor(found.unit)
-    return [_pose(row, entry, scale, f"{path}: poses.matrices: frame {i}") for i, row in enumerate(entry.matrices)]
+    poses, faults = read_poses_with_gaps(found, path)
+    if faults:
+        raise InputError(faults[0])
+    return None if poses is None else [pose for pose in poses if pose is not None]
 
 
 def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
@@ -223,15 +220,14 @@ def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPo
 
     Raises:  InputError for a wrong number of poses.
     """
-    try:
-        every = read_poses(found, path)
-        return (None if every is None else [*every]), []
-    except InputError:
-        if found.poses is None or len(found.poses.matrices) != found.frames:
-            raise
+    if found.poses is None:
+        return None, []
+    rows = found.poses.matrices
+    if len(rows) != found.frames:
+        raise InputError(f"{path}: poses.matrices: {len(rows)} rows for {found.frames} frames")
     poses: list[CameraPose | None] = []
     faults = []
-    for i, row in enumerate(found.poses.matrices):
+    for i, row in enumerate(rows):
         try:
             poses.append(_pose(row, found.poses, scene_factor(found.unit), f"{path}: poses.matrices: frame {i}"))
         except InputError as error:
