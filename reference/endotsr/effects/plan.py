@@ -170,7 +170,7 @@ def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Con
     periodic = any(line.cycles <= dictionary.frequency_max for line in inspection.lines)
     if periodic or not inspection.lines:
         return periodic, motion.reason
-    return False, f"The rates found lie above the {dictionary.frequency_max:g} cycles that the stamps can carry."
+    return False, f"The rates found exceed the {dictionary.frequency_max:g} cycles that the stamps can carry."
 
 
 def _remarks(inspection: Inspection) -> tuple[str, ...]:

@@ -142,8 +142,8 @@ def _aligned(contents: Contents, relative: Callable[[int], FloatArray], source: 
         assert line is not None
         if line.scale <= 0:
             raise InputError(
-                f"{source}: frame {contents.images[i].stem}: the numbers fall where the depth of {contents.folder.name}"
-                " says near; allowed: a relative inverse depth, larger = nearer"
+                f"{source}: frame {contents.images[i].stem}: the values decrease towards the camera, according to"
+                f" the depth of {contents.folder.name}; allowed: a relative inverse depth, larger = nearer"
             )
         found, z = line.depth(reference[i][0]), reference[i][1]
         apart.append(np.abs(found - z)[z > 0] / z[z > 0])
@@ -188,7 +188,7 @@ def _assumed_line(
     samples = [values[np.isfinite(values)][::37] for values in map(relative, group)]
     low, high = np.percentile(np.concatenate(samples) if any(map(len, samples)) else [0.0], EXTREMES)
     if not high > low:
-        raise InputError(f"{source}: the numbers are all {low:g}; allowed: a relative inverse depth")
+        raise InputError(f"{source}: all values are {low:g}; allowed: a relative inverse depth")
     scale = (1 - 1 / farthest) / (high - low)
     return StraightLine(float(scale), float(1 - scale * high))
 

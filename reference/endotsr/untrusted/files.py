@@ -63,7 +63,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
         except OSError as error:
             raise _refusal(path, error) from None
     if len(data) > size:
-        raise InputError(f"{path}: grew while it was read; allowed: a file that nobody is writing")
+        raise InputError(f"{path}: grew while it was read; allowed: a file that is not being written")
     return data
 
 
