@@ -107,10 +107,10 @@ def _made(options: DepthOptions) -> "DepthReport":
         made = from_files(folder, given, options.kind, options.unit_scale)
     else:
         made = from_pairs(folder, options.stereo)
-    return write_depth(folder, made, options.replace, _said)
+    return write_depth(folder, made, options.replace, _show_count)
 
 
-def _said(done: int, total: int) -> None:
+def _show_count(done: int, total: int) -> None:
     """Show a counter on a terminal; nothing for a pipe or a file."""
     if sys.stdout.isatty():
         print(f"\rframe {done} of {total}", end="\n" if done == total else "", flush=True)

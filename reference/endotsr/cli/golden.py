@@ -102,7 +102,7 @@ def _judge(words: list[str]) -> int:
     golden = read_golden(golden_folder(options.golden))
     asked = {"level": options.level, "again": options.again, "only": options.only}
     report = judge(golden, options.outdir, options.precision, **asked)
-    return _tell(report, golden, options.outdir, options)
+    return _report(report, golden, options.outdir, options)
 
 
 def _run(words: list[str]) -> int:
@@ -124,10 +124,10 @@ def _run(words: list[str]) -> int:
         report = judge(golden, folders[0], options.precision, level=options.level, again=again, only=options.only)
         if any(notes):
             without_claim(report, list(filter(None, notes)))
-        return _tell(report, golden, folders[0], options)
+        return _report(report, golden, folders[0], options)
 
 
-def _tell(report, golden, outdir: Path, options: _Reported) -> int:
+def _report(report, golden, outdir: Path, options: _Reported) -> int:
     from endotsr.golden.judge.report import as_html, as_json, as_table
 
     if report.first_wrong and options.search > 0:

@@ -12,7 +12,7 @@ import sys
 
 from endotsr import __version__
 from endotsr.cli.parts.commands import COMMANDS, FORMER
-from endotsr.cli.parts.output import saying, split_output
+from endotsr.cli.parts.output import redirected, split_output
 from endotsr.errors import CalibrationError, InputError
 from endotsr.runs.stopping import signals_stop
 from endotsr.untrusted.names import plain_line
@@ -33,7 +33,7 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # the terminal's encoding may lack letters of a file name
     try:
         output, words = split_output(argv)
-        with saying(output):
+        with redirected(output):
             return _main(words)
     except InputError as error:
         return _fail(str(error))

@@ -188,8 +188,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     if options.effects == "auto":
         config, lines, effects = planned_settings(sequence, config, explicit_settings(TrainOptions, words))
         found["effects"] = effects
-    _say_settings(config, schedule_note)
-    _say_sequence(source, sequence)
+    _print_settings(config, schedule_note)
+    _print_sequence(source, sequence)
     for line in lines:
         print(line)
     print("starting", flush=True)
@@ -256,7 +256,7 @@ def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
     return found, note
 
 
-def _say_settings(config: Config, schedule_note: str) -> None:
+def _print_settings(config: Config, schedule_note: str) -> None:
     changed = differences(config, PRESETS[config.preset], config.preset)
     print(f"settings: preset {config.preset}{', except' if changed else ''}")
     for line in changed:
@@ -265,7 +265,7 @@ def _say_settings(config: Config, schedule_note: str) -> None:
         print(schedule_note)
 
 
-def _say_sequence(source: str, sequence: "Sequence") -> None:
+def _print_sequence(source: str, sequence: "Sequence") -> None:
     print(
         f"sequence: {source}, {sequence.count} frames of {sequence.width}x{sequence.height}, "
         f"{len(sequence.train_index)} for training, {len(sequence.test_index)} held out"

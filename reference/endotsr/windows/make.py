@@ -102,7 +102,7 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
         reporter.begin(watch.total)
         try:
             for wave in waves(record):
-                todo = [window_job(run, record, k, config, cold=_lonely(jobs[k], found, reporter)) for k in wave]
+                todo = [window_job(run, record, k, config, cold=_starts_cold(jobs[k], found, reporter)) for k in wave]
                 _made(todo, outcomes, reporter, watch, found)
         except KeyboardInterrupt:
             done = sum(outcome.status == FINISHED for outcome in found.values())
@@ -188,7 +188,7 @@ def frame_range(selected: str, window: Window) -> str:
     return f"{first + window.first * step}:{first + (window.end - 1) * step + 1}:{step}"
 
 
-def _lonely(job: Job, found: dict[str, Outcome], reporter: Reporter) -> bool:
+def _starts_cold(job: Job, found: dict[str, Outcome], reporter: Reporter) -> bool:
     """Whether a warm window that is not begun has no finished neighbour; reports it."""
     if not isinstance(job.start, CarriedStart) or Path(job.folder).exists():
         return False

@@ -44,7 +44,7 @@ def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
 
 
 @contextlib.contextmanager
-def saying(output: OutputOptions) -> Iterator[None]:
+def redirected(output: OutputOptions) -> Iterator[None]:
     """Redirect standard output and standard error for the block; an existing log file is overwritten.
 
     Raises: InputError if the log file cannot be written.
