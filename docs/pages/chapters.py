@@ -70,9 +70,9 @@ def missing(name: str, chapter: Chapter) -> list[str]:
     return [element for element, there in wanted.items() if not there]
 
 
-def chapters(folder: Path = NOTEBOOKS) -> dict[str, Chapter]:
+def chapters() -> dict[str, Chapter]:
     """Every notebook by the stem of its file."""
-    return {file.stem: chapter_of(file.read_text(encoding="utf-8")) for file in sorted(folder.glob("*.py"))}
+    return {file.stem: chapter_of(file.read_text(encoding="utf-8")) for file in sorted(NOTEBOOKS.glob("*.py"))}
 
 
 def measured() -> dict[str, Any]:

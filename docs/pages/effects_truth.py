@@ -48,13 +48,13 @@ def truth(file: Path, seeds: int, iterations: int) -> dict[str, Any]:
     return {"seeds": seeds, **about, "scenes": scenes}
 
 
-def simulated_scene(scene: str, seed: int, frames: int = FRAMES) -> Any:
+def simulated_scene(scene: str, seed: int) -> Any:
     """160x128 pixels."""
     from effects_study import settings_of
 
     from endotsr.simulator.simulate import simulate
 
-    return simulate(settings_of(SCENES[scene], seed, frames))
+    return simulate(settings_of(SCENES[scene], seed, FRAMES))
 
 
 def scores(simulated: Any, variant: str, seed: int, iterations: int) -> dict[str, float]:

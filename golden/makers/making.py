@@ -1,8 +1,7 @@
 """A golden case before its answers are computed: inputs with their recipes, settings, and the mistakes it reveals.
 
-Every array has its own seed, the text "family/case/array" (a draw number may follow). The top 24 bits of a word of
-`judge.words`, over 2^24, are a number in [0, 1). All real outputs are float32 numbers, so ports of either precision
-have equal inputs.
+Every array has its own seed, the text "family/case/array". The top 24 bits of a word of `judge.words`, over 2^24, are
+a number in [0, 1). All real outputs are float32 numbers, so ports of either precision have equal inputs.
 """
 
 from typing import Any, NamedTuple
@@ -43,9 +42,9 @@ def given(values: NDArray | float | list, recipe: str, unit: str = "1") -> Made:
     return Made(single(array) if array.dtype.kind == "f" else array, recipe, unit)
 
 
-def scalar(value: float, unit: str = "1") -> Made:
+def scalar(value: float) -> Made:
     """A number as an array without axes."""
-    return given(np.array(value), repr(value), unit)
+    return given(np.array(value), repr(value))
 
 
 def changed(made: Made, index: object, values: NDArray | float | list, recipe: str) -> Made:
@@ -80,12 +79,12 @@ class Spec(NamedTuple):
 class Seeds:
     """Uniform arrays of one case, each under its own seed "family/case/array"."""
 
-    def __init__(self, family: str, case: str, draw: int = 0) -> None:
-        self.name, self.draw = f"{family}/{case}", f"#{draw}" if draw else ""
+    def __init__(self, family: str, case: str) -> None:
+        self.name = f"{family}/{case}"
 
     def seed(self, array: str) -> str:
         """The seed text of an array."""
-        return f"{self.name}/{array}{self.draw}"
+        return f"{self.name}/{array}"
 
     def uniform(self, array: str, low: float, high: float, *shape: int, unit: str = "1") -> Made:
         """See `uniform`."""

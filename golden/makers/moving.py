@@ -20,18 +20,16 @@ def model_settings(**changes: Any) -> dict[str, Any]:
     return msgspec.to_builtins(msgspec.structs.replace(model, **changes))
 
 
-def moving_inputs(
-    seeds: Seeds, degree: int, static: bool, count: int = COUNT, frequencies: int = FREQUENCIES
-) -> dict[str, Made]:
+def moving_inputs(seeds: Seeds, degree: int, static: bool, frequencies: int = FREQUENCIES) -> dict[str, Made]:
     """Raw parameters of every component, all nonzero."""
-    shape, atoms = (10, BASES, count), 2 * frequencies
+    shape, atoms = (10, BASES, COUNT), 2 * frequencies
     centre = seeds.uniform("fdm_centre", 0.1, 0.7, *shape)
-    return scene_inputs(seeds, count, degree, pose(static)) | {
+    return scene_inputs(seeds, COUNT, degree, pose(static)) | {
         "fdm_weight": seeds.uniform("fdm_weight", -0.08, 0.08, *shape, unit="raw parameter"),
         "fdm_centre": centre,
         "fdm_width": seeds.uniform("fdm_width", 0.25, 0.5, *shape),
-        "appearance_coefficients": seeds.uniform("colour_coefficients", -0.5, 0.5, 3, atoms, count),
-        "motion_coefficients": seeds.uniform("motion_coefficients", -0.05, 0.05, 3, atoms, count, unit="scene unit"),
+        "appearance_coefficients": seeds.uniform("colour_coefficients", -0.5, 0.5, 3, atoms, COUNT),
+        "motion_coefficients": seeds.uniform("motion_coefficients", -0.05, 0.05, 3, atoms, COUNT, unit="scene unit"),
         "times": stamps(FRAMES),
         "train_index": train_index(FRAMES),
     }

@@ -74,7 +74,7 @@ def logit_of(opacity: list[float]) -> Made:
     return given(np.log(values) - np.log1p(-values), "logit of " + ", ".join(f"{v:.6g}" for v in opacity))
 
 
-def scene_inputs(seeds: Seeds, count: int, degree: int, cast: dict[str, Made], small: float = -1.2) -> dict[str, Made]:
+def scene_inputs(seeds: Seeds, count: int, degree: int, cast: dict[str, Made]) -> dict[str, Made]:
     """Raw parameters of overlapping Gaussians in view of a camera."""
     quaternion = seeds.uniform("quaternion", -1.0, 1.0, 4, count)
     harmonics = seeds.uniform("harmonics", -0.25, 0.25, (degree + 1) ** 2, 3, count)
@@ -82,7 +82,7 @@ def scene_inputs(seeds: Seeds, count: int, degree: int, cast: dict[str, Made], s
     return {
         "position": seen_at(spread_points(seeds, count, 0.4), cast),
         "quaternion": changed(quaternion, 0, quaternion.array[0] + 1.5, "w plus 1.5"),
-        "log_scale": seeds.uniform("log_scale", small, 0.2, 3, count),
+        "log_scale": seeds.uniform("log_scale", -1.2, 0.2, 3, count),
         "opacity_logit": seeds.uniform("opacity_logit", -1.5, 3.0, count),
         "harmonics": changed(harmonics, 0, first, "[0] times 3 plus 0.5"),
     } | cast

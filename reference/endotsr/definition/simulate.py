@@ -9,9 +9,9 @@ from endotsr.definition.projection import Camera
 Sequence = namedtuple("Sequence", "images masks depth times cameras train_index test_index")
 
 
-def simulate(width=32, height=24, frames=16, seed=0):
+def simulate(width=32, height=24, frames=16):
     """Sequence: images (n, 3, H, W) of 8 bit, masks and depth (n, H, W) in scene units; frame 1, 9, ... is held out."""
-    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, (3, 2))[..., None, None]
+    phase = np.random.default_rng(0).uniform(0, 2 * np.pi, (3, 2))[..., None, None]
     y, x = np.mgrid[0.5:height, 0.5:width] / width
     images, depth, masks = [], [], []
     for t in np.arange(frames) / frames:

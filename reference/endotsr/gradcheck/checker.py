@@ -80,7 +80,7 @@ class PairReport(NamedTuple):
         return not self.failures
 
 
-def check_pair(pair: Pair, rng: np.random.Generator, settings: Settings = DOUBLE) -> PairReport:
+def check_pair(pair: Pair, rng: np.random.Generator) -> PairReport:
     """Check a registered pair at inputs drawn from `rng`."""
     inputs = pair.inputs(rng)
     return check_function(
@@ -92,7 +92,6 @@ def check_pair(pair: Pair, rng: np.random.Generator, settings: Settings = DOUBLE
         traced=pair.traced,
         hard=pair.hard(inputs) if pair.hard else None,
         rng=rng,
-        settings=settings,
         label=(pair.name, pair.equation, pair.function),
     )
 

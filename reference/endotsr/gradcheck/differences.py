@@ -110,7 +110,7 @@ class Taylor(NamedTuple):
         return self.linear or self.slope >= 1.9
 
 
-def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER) -> Taylor:
+def taylor_slope(line: Line, derivative: float) -> Taylor:
     """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it clearly exceeds rounding.
 
     The remainder of a correct derivative falls as h^2 or faster; with a wrong derivative it falls as h.
@@ -120,7 +120,7 @@ def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER)
         raise ValueError("the line has no value at 0")
     clear = 1e4 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(origin))
     points: list[tuple[float, float]] = []
-    for step in steps:
+    for step in LADDER:
         ahead = line(step)
         remainder = 0.0 if ahead is None else abs(float(np.sum(ahead - origin)) - step * derivative)
         if remainder > clear:

@@ -40,7 +40,7 @@ class Session:
         return {"output": np.asarray(answer)} if self.bare else {k: np.asarray(v) for k, v in answer.items()}
 
     def _cotangent(self, output: NDArray) -> NDArray:
-        """Dense cotangents, never near zero, scaled so that every output contributes."""
+        """Dense cotangents, never near zero, scaled for a contribution of every output."""
         size = float(np.sqrt(np.mean(np.square(output, dtype=np.float64)))) if output.size else 1.0
         draw = self.rng.choice([-1.0, 1.0], output.shape) * self.rng.uniform(0.5, 1.5, output.shape)
         return np.asarray(draw / (size if size > 0 and np.isfinite(size) else 1.0), output.dtype)

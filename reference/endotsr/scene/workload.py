@@ -103,9 +103,9 @@ def _normal(
     return out
 
 
-def sequence(width: int = WIDTH, height: int = HEIGHT, seed: int = 11, frames: int = FRAMES) -> Sequence:
+def sequence(width: int = WIDTH, height: int = HEIGHT, *, frames: int = FRAMES) -> Sequence:
     """Target frames: a smooth moving pattern with fine texture, with one corner covered by an instrument."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(11)
     row, column = np.mgrid[0:height, 0:width].astype(np.float64)
     column, row = column * (WIDTH / width), row * (HEIGHT / height)
     depth = surface(column, row).astype(np.float32)

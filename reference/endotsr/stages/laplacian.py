@@ -41,16 +41,17 @@ def _laplacian_trace(inputs: Inputs, settings: Settings, saved: tuple[Any, Any])
     return {f"signs_{j}": sign for j, sign in enumerate(saved[0].signs, start=1)}
 
 
-def observed_image(shape: tuple[int, int, int] = IMAGE_SHAPE) -> NDArray[np.float64]:
+def observed_image() -> NDArray[np.float64]:
     """The fixed observed image of the gradient checks, from a closed formula."""
-    c, y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
+    c, y, x = np.meshgrid(*(np.arange(n) for n in IMAGE_SHAPE), indexing="ij")
     return 0.5 + 0.3 * np.sin(0.9 * x + 0.4 * c) * np.cos(0.7 * y)
 
 
-def tissue_mask(shape: tuple[int, int] = IMAGE_SHAPE[1:]) -> NDArray[np.bool_]:
+def tissue_mask() -> NDArray[np.bool_]:
     """Its mask: an instrument in the lower right corner, small enough for valid pixels at every level."""
-    y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
-    return (y < shape[0] - 2) | (x < shape[1] - 3)
+    _, height, width = IMAGE_SHAPE
+    y, x = np.meshgrid(np.arange(height), np.arange(width), indexing="ij")
+    return (y < height - 2) | (x < width - 3)
 
 
 def _kink_distance(rendered: NDArray, masks: SupportMasks) -> float:

@@ -68,14 +68,14 @@ def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> 
     return _with_open(path, root, lambda handle: _read_open(handle, largest))
 
 
-def read_text(path: Path, root: Path, largest: int = LONGEST_HEADER) -> str:
-    """A small UTF-8 text, with the same checks. Raises Refused."""
+def read_text(path: Path, root: Path) -> str:
+    """A UTF-8 text of at most LONGEST_HEADER bytes, with the same checks. Raises Refused."""
 
     def read(handle: int) -> str:
         _check_regular(handle)
-        data = os.read(handle, largest + 1)
-        if len(data) > largest:
-            raise Refused(f"longer than {largest} bytes")
+        data = os.read(handle, LONGEST_HEADER + 1)
+        if len(data) > LONGEST_HEADER:
+            raise Refused(f"longer than {LONGEST_HEADER} bytes")
         try:
             return data.decode()
         except UnicodeDecodeError:
