@@ -118,7 +118,7 @@ one[:, :, 0] = coefficients
 by_colour = base + np.array([Y00 * appearance_forward(one, p, beta)[0][0, 0] for p in phis])
 assert np.abs(by_colour - target).max() < 0.02
 
-# without A: a bright Gaussian (0.7) beside a dull one (0.45); the mixture at the pixel
+# without A: a bright Gaussian (0.7) next to a dull one (0.45); the mixture at the pixel
 # depends on how far it is
 distance = np.linspace(4, 0, 400)
 mixed = 0.45 + 0.25 * np.exp(-(distance**2) / 3)

@@ -288,7 +288,7 @@ assert all(report.passed for report in reports)
 #
 # 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (5.2) and (5.6).
 # 2. Write `covariance_reverse` from (5.3), (5.6) and (5.8) and let the golden cases judge it: `--only covariance`
-#    ({doc}`index`). Which case fails if the division by the length is left out?
+#    ({doc}`index`). Which case fails if the division by the length is omitted?
 # 3. The cell below answers this one. Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ instead of
 #    $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many parameter sets describe one
 #    ellipsoid?

@@ -127,7 +127,7 @@ single, saved_32 = render(made(**needle, dtype=np.float32), wide)
 a, b, c = saved.projected.covariance2d[:, 0]
 det, o = saved.projected.determinant[0], 1 / (1 + np.exp(-2.0))
 along = np.arange(300)
-# The pixels of the diagonal, which lie on the needle.
+# The pixels of the diagonal, which the needle covers.
 d = along + 0.5 - saved.projected.mean2d[:, :1]
 truth = double.opacity[along, along]
 np.testing.assert_allclose(truth, alpha_text(*d, a, b, c, det, o), rtol=1e-9)

@@ -232,7 +232,7 @@ plt.show()
 #
 # A Gaussian always stores 11 base parameters. There are also three harmonic coefficients for each of the $(d+1)^2$
 # functions up to degree $d$, ten channels of $B$ bases with three numbers each, and $2\cdot3F$ numbers for each Fourier
-# component. The optimiser holds two more numbers for each.
+# component. The optimiser stores two more numbers for each.
 
 
 # %% tags=["transcription"]

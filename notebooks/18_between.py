@@ -247,7 +247,7 @@ print(f"q: {q[8:40, 16:-16].mean():.3f} above, {q[56:-8, 16:-16].mean():.3f} bel
 assert q[8:40, 16:-16].mean() < 0.02 and q[56:-8, 16:-16].mean() > 0.98
 
 # %% [markdown]
-# ## Figure: one moment between two frames
+# ## Figure: one time between two frames
 #
 # A clip with breathing, a beat, a pulled spot, highlights and a grasper, here with 16 frames. One frame is omitted and
 # predicted from its neighbours, two frames away on either side. Below each picture is its error, from 0 (black) to 0.15

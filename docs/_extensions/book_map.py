@@ -104,7 +104,7 @@ UNDIFFERENTIATED = {
         ("endotsr.evaluation.metrics.ssim_full", "endotsr.evaluation.metrics.ssim_tissue"),
         "a metric is only reported",
         "tests/evaluation/test_metrics.py",
-        "none: the map is that of (B7), which has cases",
+        "none: it uses the map of (B7), which has cases",
     ),
     "m3": Undifferentiated(
         ("endotsr.evaluation.lpips.lpips",),

@@ -95,7 +95,7 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
 
 
 def draw_ablations(folder: Path) -> None:
-    """The differences in the file of every ablation, and their intervals beside it: NAME.json and NAME.svg."""
+    """Write the differences of every ablation to its file NAME.json, and a figure of their intervals to NAME.svg."""
     for name, found in read(folder).items():
         if found is not None and found["increments"]:
             write_json(folder / FILES[name], found)

@@ -12,7 +12,7 @@ from endotsr.sweeps.ablation_page import increment_table, level_table
 BEGIN_MINUTES = 1.0  # of a worker before its first iteration, kernels not compiled before
 PLANNED_RUNS, PLANNED_CORES = (15, 42), (2, 8, 16, 64)
 WIDTH = 640  # px, of the recorded clip at full size
-Record = Any  # what a file of docs/results holds
+Record = Any  # content of a file of docs/results
 
 
 def tables(found: Record | None) -> str:

@@ -15,7 +15,7 @@ from over_seeds import interval
 from endotsr.sweeps.ablation import COMPARISONS, FIXED, Contrast, paired
 from endotsr.sweeps.execute import FINISHED
 
-Record = Any  # what a file of docs/results holds
+Record = Any  # content of a file of docs/results
 WHOLE = next(c for c in COMPARISONS if c.claim == "all three")  # the whole method against the base
 DETAIL = Contrast("L added to A and S, fixed count", f"A+S+L{FIXED}", f"A+S{FIXED}")
 PROTOCOLS = (  # what is held out, comparison, split, metric
@@ -80,7 +80,7 @@ def right_eye(half: Record | None) -> str:
 
 def decided(low: float, high: float) -> str:
     """The verdict without a published value, from the ends of the interval."""
-    return "gains" if low > 0 else "loses" if high < 0 else "not decided: the interval holds 0"
+    return "gains" if low > 0 else "loses" if high < 0 else "not decided: the interval contains 0"
 
 
 def _about(rows: list[Record], split: str) -> str:

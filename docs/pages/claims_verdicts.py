@@ -34,7 +34,7 @@ RANGES = (  # what is compared, metric, published range, format
     ("LPIPS, if its input is in [-1, 1]", "lpips_symmetric", (-0.0096, -0.0035), "{:+.4f}"),
 )
 STEPS = COMPARISONS[:3]  # of the paper's cumulative ablation
-Record = Any  # what a file of docs/results holds
+Record = Any  # content of a file of docs/results
 
 
 def verdicts(found: Record | None, half: list[Record | None], runs: list[Record]) -> str:
@@ -71,7 +71,7 @@ def increment_verdict(
         return "not decided: the interval is wider" if low < HUNDREDTH and high > -HUNDREDTH else "not reproduced"
     holds, nothing = low <= last and first <= high, low <= 0.0 <= high
     if holds:
-        return "not decided: the interval holds 0 too" if nothing else "reproduced"
+        return "not decided: the interval contains 0 too" if nothing else "reproduced"
     if nothing:
         return "not reproduced"
     return "direction reproduced, size not" if (low > 0) == (published > 0) else "not reproduced: the opposite"

@@ -104,7 +104,7 @@ def noise_of(clip: Path, scale: float) -> float:
 def frame_numbers(sequence: Sequence, index: int, errors: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
     """Mean squared error over the tissue of every prediction, weight of the blend's noise, and motion.
 
-    blend_noise   variance of the noise of the blend over that of a frame: (1 - f)^2 + f^2, 1 if a neighbour is alone
+    blend_noise   variance of the blend's noise relative to a frame: (1 - f)^2 + f^2, 1 with one neighbour
     motion_px     mean length of the flow between the neighbours over the tissue
     """
     near, tissue = neighbours(sequence, index), sequence.masks[index]

@@ -122,7 +122,7 @@ def clip_table(runs: dict[str, Any]) -> str:
 
 
 def noise_table(runs: dict[str, Any]) -> str:
-    """Squared error of model, blend and flow without the noise of the held-out frame, and without that of the blend."""
+    """Squared error of model, blend and flow without the noise of the held-out frame and of the blend."""
     rows = []
     for run in runs.values():
         noise = run["noise"] ** 2

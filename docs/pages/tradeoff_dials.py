@@ -23,7 +23,7 @@ class Dial(NamedTuple):
 
 
 CLAMPS = {"none": CLOSE.alpha_max, "0.999": 0.999, "0.99": 0.99, "0.95": 0.95}
-EXPONENTIALS = (3, 5, 7)  # degrees beside the built-in 11
+EXPONENTIALS = (3, 5, 7)  # degrees besides the built-in 11
 TILES = (8, 16, 32)
 
 OMITTED = {

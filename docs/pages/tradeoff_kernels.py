@@ -21,7 +21,7 @@ from endotsr.splatting.fast import blocks as compositing_blocks
 class Variant(NamedTuple):
     """Kernels that differ from the package's: a value of `Setting.kernels`."""
 
-    exponential: int | None = None  # degree of the polynomial for 2^x; None = that of the path
+    exponential: int | None = None  # degree of the polynomial for 2^x; None = unchanged
     tile: int | None = None  # side of the tiles of the path `definition`; None = 16
 
     def __call__(self) -> contextlib.AbstractContextManager[None]:

@@ -61,7 +61,7 @@ def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
 def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
     """The float32 setting with the fewest visits that is right to half a step of 8 bit on every measured scene."""
     every = {"simulated": result} | others
-    found: dict[str, list[tuple[float, float]]] = {}  # setting -> (time, visits) over those of `paper`, by scene
+    found: dict[str, list[tuple[float, float]]] = {}  # setting -> (time, visits) relative to `paper`, by scene
     for scene in every.values():
         by_name = {p["name"]: p for p in scene["points"]}
         paper = by_name[scene["presets"]["paper"]]

@@ -39,7 +39,7 @@ def run_whole_study(
     begin: Callable[[int], None] = lambda steps: None,
     step: Callable[[int], None] = lambda steps: None,
 ) -> dict[str, Any]:
-    """Measure everything; the arguments are those of `endotsr.tradeoff.study.run_study`."""
+    """Measure everything; arguments as for `endotsr.tradeoff.study.run_study`."""
     plan, aim = WholePlan(scene), reference_setting(scene)
     certificate = certify(scene, frame(prepare(scene, aim))[0].colour, aim.raster)
     result = run_study(scene, repeats=repeats, plan=plan, keep=keep, begin=begin, step=step)

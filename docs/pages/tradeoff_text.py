@@ -117,7 +117,7 @@ def _ranked(point: dict[str, Any]) -> Ranked:
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:
-    """Text for the terminal: the final state of every training beside the base, and the summary."""
+    """Text for the terminal: the final state of every training compared with the base, and the summary."""
     rows = training_rows(result)
     lines = [plain(("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians"), rows)]
     lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]

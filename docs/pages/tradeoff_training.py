@@ -33,7 +33,7 @@ METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
 MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # fractions of the iterations
 LPIPS_FROM = 1 / 2  # LPIPS takes several times as long as all other metrics together
 PROBE_WARM, PROBE = 5, 15  # iterations
-GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
+GROWTH = 2.0  # mean cost of an iteration relative to the first ones: Gaussians, residuals and losses are added
 
 
 class StudyTraining(NamedTuple):

@@ -71,7 +71,7 @@ def changed_copy(edits: Sequence[Edit]) -> Iterator[Callable[[str], Stage]]:
     texts = {name: changed_text(module, [e for e in edits if e.module == module]) for module, name in names.items()}
     interpreted = without_compiler(edits)
     again = (set(_files()) if interpreted else _importers(frozenset(texts)) | {REGISTRY}) - SHARED
-    again |= {name.rpartition(".")[0] for name in again} - SHARED - {""}  # packages hold their modules by name
+    again |= {name.rpartition(".")[0] for name in again} - SHARED - {""}  # packages refer to their modules by name
     before = {name: module for name, module in sys.modules.items() if name in again}
     finder, off = _Finder(again, texts), numba.config.DISABLE_JIT  # type: ignore[attr-defined]
     _exchange(again, {})

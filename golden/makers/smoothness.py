@@ -1,7 +1,7 @@
 """Family `smoothness`: the smoothness loss (B9), with the edges of the image given.
 
-A rendered depth and image, a tissue mask and a mask of edges come in, so that no port needs an edge detector. The cases
-separate the squared steps inside tissue from the total variation outside.
+Inputs: a rendered depth and image, a tissue mask and a mask of edges; no port needs an edge detector. The cases
+distinguish the squared steps inside tissue from the total variation outside.
 """
 
 import numpy as np

@@ -16,11 +16,11 @@ from makers.making import Spec
 from makers.registry import JUDGED, Judged
 from makers.wrong import Wrong
 
-MARGIN = 10.0  # size in tolerances from which a mistake counts as detected
+MARGIN = 10.0  # smallest size of a detected mistake, in tolerances
 SAFETY = {"float64": 64.0, "float32": 16.0}  # tolerance over measured spread
 FLOOR = {"float64": 1e-12, "float32": 4e-6}
 STEP = {"float64": 2.0**-52, "float32": 2.0**-23}
-FLIP_STEP = 1e-5  # relative change of the cutoff within which a pixel counts as on it
+FLIP_STEP = 1e-5  # relative change of the cutoff that may flip a pixel on it
 
 
 class Solved(NamedTuple):
@@ -28,7 +28,7 @@ class Solved(NamedTuple):
 
     case: Case
     inputs: dict[str, NDArray]
-    expected: tuple[Outputs, ...]  # one a legal answer
+    expected: tuple[Outputs, ...]  # one per legal answer
 
     def files(self) -> list[tuple[str, str, NDArray]]:
         """(output, path within the case, array) of every expected array."""
@@ -44,15 +44,15 @@ def kind_of(array: NDArray) -> str:
 
 
 def stored_inputs(spec: Spec) -> dict[str, NDArray]:
-    """The inputs of a case as they are stored."""
+    """The inputs of a case as stored."""
     return {name: stored(made.array) for name, made in spec.inputs.items()}
 
 
 def solve(spec: Spec, operation: Stage, wrong: Mapping[str, Wrong] | None) -> Solved:
     """A case with its answers.
 
-    wrong    what wrong ports answer to it, by flag; None leaves the mistakes out
-    Raises:  ValueError if a flag of the case names a mistake that the case does not show.
+    wrong    answers of wrong ports, by flag; None omits the mistakes
+    Raises:  ValueError if the case does not reveal a mistake listed in its flags.
     """
     inputs = stored_inputs(spec)
     runs = [reference(operation, inputs, s, "float64", "definition") for s in (spec.settings, *spec.either)]
@@ -117,7 +117,7 @@ def _rule(name: str, asked: Judged, spread: tuple[float, float], answers: int) -
 
 
 def _shaken(spec: Spec, inputs: Inputs, step: float, draw: int) -> dict[str, NDArray]:
-    """Every real input times 1 +- step, those of `still` kept."""
+    """Every real input times 1 +- step, except for the inputs in `still`."""
     out = dict(inputs)
     for name, array in inputs.items():
         if array.dtype.kind == "f" and name not in spec.still:
@@ -213,7 +213,7 @@ def _detected(mistake: Mistake, rules: dict[str, Rule]) -> bool:
 def _shown(
     made: Outputs, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Judged], precision: str
 ) -> dict[str, Shown]:
-    """Every output that a wrong answer changes by more than half its tolerance, from the nearest legal answer."""
+    """Every output of a wrong answer that differs from the nearest legal answer by more than half its tolerance."""
     tries = []
     for right in answers:
         sizes = {name: _size(stored(made[name]), right[name], rules[name], precision) for name in right if name in made}
@@ -235,7 +235,7 @@ def _one(name: str, wrong: NDArray, right: NDArray, rule: Rule) -> Shown:
 
 
 def _without_shared_integers(found: dict[str, Mistake], rules: dict[str, Rule]) -> dict[str, Mistake]:
-    """No fingerprint of an integer or boolean output that two mistakes give alike."""
+    """Remove fingerprints of integer or boolean outputs that two mistakes have in common."""
     seen: dict[tuple[str, float | None], int] = {}
     for mistake in found.values():
         for name, one in mistake.shows.items():
@@ -255,7 +255,7 @@ def _without_shared_integers(found: dict[str, Mistake], rules: dict[str, Rule]) 
 
 
 def _size(wrong: NDArray, right: NDArray, rule: Rule, precision: str) -> float:
-    """How many tolerances a wrong output is away; a flip budget counts its flips too."""
+    """Distance of a wrong output in tolerances; with a flip budget, flips count too."""
     tolerance = rule.float64 if precision == "float64" else rule.float32
     if wrong.shape != right.shape:
         return math.inf

@@ -48,7 +48,7 @@ def wrong_ports(family: str) -> Iterator[WrongPort]:
     """The mistakes of a family, from `<family>.toml` in this folder, if any.
 
     An entry has the keys `title`, `wrong` and `changes`, and may have `operations` and `rounding`. A change is [module,
-    old text, new text, number of places]. The module defaults to that of the head of the file, the number to 1.
+    old text, new text, number of places]. The default module is in the head of the file, the default number is 1.
     `operations` in the head is the default of the entries.
     """
     file = Path(__file__).with_name(f"{family}.toml")

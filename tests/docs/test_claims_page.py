@@ -49,7 +49,7 @@ def test_without_results_every_claim_says_so():
         (0.29, 0.2, 0.4, 3, "reproduced"),
         (0.29, 0.2, 0.4, 2, "not decided: 2 of 3 seeds"),
         (0.29, None, None, 3, "not decided: 3 of 3 seeds"),
-        (0.29, -0.1, 0.4, 3, "not decided: the interval holds 0 too"),
+        (0.29, -0.1, 0.4, 3, "not decided: the interval contains 0 too"),
         (0.29, -0.1, 0.2, 3, "not reproduced"),
         (0.29, 0.4, 0.5, 3, "direction reproduced, size not"),
         (0.29, -0.4, -0.2, 3, "not reproduced: the opposite"),
@@ -115,7 +115,7 @@ def half_record(gains: list[float]) -> dict:
 
 
 @pytest.mark.parametrize("gains, verdict", [([0.2, 0.3, 0.4], "gains"), ([-0.2, -0.3, -0.4], "loses"),
-                                            ([-0.1, 0.1, 0.2], "not decided: the interval holds 0"),
+                                            ([-0.1, 0.1, 0.2], "not decided: the interval contains 0"),
                                             ([0.3, 0.4], "not decided: 2 of 3 seeds")])  # fmt: skip
 def test_other_frames_are_decided_without_a_published_value(gains, verdict):
     """Against SciPy; the right camera at held-out times has the same differences, at training times none."""
@@ -181,7 +181,7 @@ def test_the_power_of_the_test_is_what_a_simulation_finds(pairs):
 
 
 @pytest.mark.parametrize("low, high, verdict", [(0.2, 0.4, "reproduced"), (0.7, 0.9, "direction reproduced, size not"),
-                                                (-0.1, 0.4, "not decided: the interval holds 0 too"),
+                                                (-0.1, 0.4, "not decided: the interval contains 0 too"),
                                                 (-0.1, 0.2, "not reproduced")])  # fmt: skip
 def test_a_published_range_is_met_or_not(low, high, verdict):
     assert increment_verdict(0.31, low, high, 3, 0.66) == verdict == increment_verdict(0.66, low, high, 3, 0.31)

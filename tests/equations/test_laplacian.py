@@ -298,7 +298,7 @@ def test_float32_gradient_is_the_float64_gradient():
 def test_refused_input():
     rendered, observed = images((8, 8))
     masks = support_masks(np.ones((8, 8)))
-    with pytest.raises(ValueError, match="fit"):
+    with pytest.raises(ValueError, match="disagree"):
         laplacian_loss_forward(rendered[:, :7], observed, masks)
     with pytest.raises(ValueError, match="in the masks"):
         laplacian_loss_forward(rendered, observed, masks, "half_pixel")

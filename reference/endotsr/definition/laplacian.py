@@ -7,7 +7,7 @@ import numpy as np
 # bands[0] + expand(bands[1] + expand(...)) is the image.
 LaplacianLevels = namedtuple("LaplacianLevels", "bands coarse")
 SupportMasks = namedtuple("SupportMasks", "image bands upsampling")  # Valid values of every band.
-# Derivative of the loss with respect to every band, and what the adjoint needs.
+# Derivative of the loss with respect to every band, and the constants of the adjoint.
 LaplacianSaved = namedtuple("LaplacianSaved", "slopes masks")
 
 

@@ -31,7 +31,7 @@ def photometric_loss(colour, targets, ssim_weight):
 
 
 def no_edges(depth):
-    """No edges, in place of a Canny edge map, which has no closed formula."""
+    """No edges, instead of a Canny edge map, which has no closed formula."""
     return np.zeros(depth.shape, bool)
 
 

@@ -232,7 +232,7 @@ def laplacian_loss_forward(
     Oracle:     `endotsr.definition.laplacian`, the difference of two separate pyramids.
     """
     if rendered.shape != observed.shape or rendered.shape[1:] != masks.image.shape:
-        raise ValueError(f"rendered {rendered.shape}, observed {observed.shape}, mask {masks.image.shape} do not fit")
+        raise ValueError(f"rendered {rendered.shape}, observed {observed.shape}, mask {masks.image.shape} disagree")
     if masks.upsampling != upsampling:
         raise ValueError(f"upsampling: {upsampling!r}, but {masks.upsampling!r} in the masks")
     dtype = rendered.dtype
@@ -271,7 +271,7 @@ def pull_back(
 ) -> FloatArray:
     """Adjoint of masked image -> bands: sum_j scales[j] (d P_j / d image)^T fields[j], 0 outside the mask.
 
-    From coarse to fine, with g_j the gradient of G_j and s_j = scales[j] fields[j] that of P_j:
+    From coarse to fine, with g_j the gradient of G_j and s_j = scales[j] fields[j] the gradient of P_j:
         g_3 = -expand^T s_3,   g_{j-1} = -expand^T s_{j-1} + s_j + reduce^T g_j,   and no first term for g_0.
     """
     real = np.dtype(dtype).type

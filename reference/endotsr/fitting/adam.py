@@ -38,7 +38,7 @@ class AdamState:
 
     first: dict[str, FloatArray] = field(default_factory=dict)  # m, shape of the parameter
     second: dict[str, FloatArray] = field(default_factory=dict)  # v, shape of the parameter
-    step: dict[str, int] = field(default_factory=dict)  # k, steps taken so far
+    step: dict[str, int] = field(default_factory=dict)  # k, number of steps so far
 
 
 def adam_state(parameters: Mapping[str, FloatArray]) -> AdamState:

@@ -19,7 +19,7 @@ WINDOW = 100  # iterations of a mean of the loss, and between two checks of the 
 RISE = 3.0  # times the lowest mean so far
 FAR_OFF = 10.0  # times the radius of the scene at the start
 FAR_OFF_FRACTION = 0.01  # of the Gaussians
-WATCHED_TERM = "l1"  # its weight is the same in every iteration, unlike that of the Laplacian loss
+WATCHED_TERM = "l1"  # its weight is constant, unlike the weight of the Laplacian loss
 ADVICE = (
     "smaller rates may help (--optimiser.position, --optimiser.deformation, --optimiser.scale), "
     "and so may a look at the unit of the depth and at the poses"

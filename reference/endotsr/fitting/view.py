@@ -5,8 +5,8 @@
 
 In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and the gradient of every array. The
 gradient check and the golden family `objective` call this function. Training computes the same with the same functions
-(`training_step`), but fuses the largest reverse passes with the Adam step that follows (`fused/`); one such step
-equals `view_gradients` followed by `adam_update` bit by bit (tested).
+(`training_step`), but fuses the largest reverse passes with the Adam step that follows (`fused/`). One such step is
+bitwise equal to `view_gradients` followed by `adam_update` (tested).
 """
 
 from typing import NamedTuple

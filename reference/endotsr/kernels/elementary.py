@@ -114,7 +114,7 @@ def exponential(x):
 
     returns  e^x in the dtype of x. float32: within 0.502 of the last place, 0 below -104, infinite above 88.72
     Reverse: e^x, written out where it is used.
-    Oracle:  numpy.exp in float64; bit by bit the expf of the C library of Linux.
+    Oracle:  numpy.exp in float64; bitwise, expf of glibc.
     """
     return _exponential_float32(x) if np.asarray(x).dtype == np.float32 else _exponential_float64(x)
 
@@ -124,7 +124,7 @@ def logarithm(x):
 
     returns  log x in the dtype of x. float32: within 0.82 of the last place, and exactly 0 at 1
     Reverse: 1 / x, written out where it is used.
-    Oracle:  numpy.log in float64; bit by bit the logf of the C library of Linux.
+    Oracle:  numpy.log in float64; bitwise, logf of glibc.
     """
     return _logarithm_float32(x) if np.asarray(x).dtype == np.float32 else _logarithm_float64(x)
 

@@ -1,4 +1,4 @@
-"""2^x for x <= 0 as straight-line arithmetic, so that loops over pixels and Gaussians vectorise.
+"""2^x for x <= 0 as straight-line arithmetic, which vectorises in loops over pixels and Gaussians.
 
 The library exponential is a scalar call inside a compiled loop; this one is a polynomial and a shift.
 Split x = k + f with k = trunc(x) and f in (-1, 0]. 2^f is a polynomial with p(0) = 1 and p(-1) = 1/2

@@ -124,7 +124,7 @@ def jit(function: F, *, contract: bool = False) -> F:
 
 
 def jit_inline(function: F) -> F:
-    """Compile a small helper that other kernels call; it is inlined into them and has no cache entry of its own."""
+    """Compile a small helper that other kernels call; it is inlined into them and has no separate cache entry."""
     compiled: Any = numba.njit(inline="always", error_model="numpy")(function)
     return compiled
 

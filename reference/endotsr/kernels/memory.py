@@ -42,9 +42,7 @@ def memory_limit(gigabytes: float) -> float:
 
 def unknown_memory() -> str:
     """A note on the assumed amount of memory; "" if the system reports the amount."""
-    return (
-        "" if memory_of_machine() else f"the system does not say how much memory it has: {ASSUMED / 1e9:g} GB assumed"
-    )
+    return "" if memory_of_machine() else f"the system does not report its memory: {ASSUMED / 1e9:g} GB assumed"
 
 
 def bytes_of(value: object) -> int:

@@ -24,7 +24,7 @@ RANGES_PER_THREAD = 16  # the shortest range is tasks / (threads RANGES_PER_THRE
 
 
 class _Job(NamedTuple):
-    """Ranges that any thread may take; every range taken puts one entry into `done`."""
+    """Ranges for any thread; every finished range puts one entry into `done`."""
 
     kernel: Callable[..., Any]
     arguments: tuple[Any, ...]

@@ -155,7 +155,7 @@ def _tile_starts(counts, starts, pair_starts):
 
 
 def _fill_lists(first, last, tile_box, tiles_x, counts, pair_starts, ranks, slots):
-    """Write every pair to its place; `counts` holds the next free place of each (chunk, tile)."""
+    """Write every pair to its position; `counts` is the next free position of each (chunk, tile)."""
     n = tile_box.shape[0]
     for chunk in range(first, last):
         position = counts[chunk]

@@ -197,7 +197,7 @@ def _composite_reverse(
                     if behind < stop:
                         break
                     kept[n, 0], kept[n, 1], kept[n, 2], kept[n, 3] = alpha, t, e, dy
-                    # the alpha that multiplies dL/dalpha: zero where the clamp holds, unless the deviation passes it
+                    # the alpha that multiplies dL/dalpha: zero if clamped, unless the deviation passes the clamp
                     kept[n, 4] = value if value <= alpha_max or pass_clamped else zero
                     hit[n] = p
                     n += 1

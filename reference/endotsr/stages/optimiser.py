@@ -122,8 +122,7 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _sizes(state: TrainingState) -> dict[str, float]:
-    """What a trajectory tells of its state after an iteration: sums over all entries, 0 of an array "
-    "that is not there."""
+    """The state of a trajectory after an iteration: sums over all entries, 0 for a missing array."""
     squares = {f"square_{name}": _total(array * array) for name, array in arrays(state.gaussians).items()}
     return squares | {
         "first_moments": sum(_total(abs(array)) for array in state.adam.first.values()),

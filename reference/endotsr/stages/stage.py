@@ -1,7 +1,7 @@
 """A stage: a forward pass, its reverse pass, their results, and the inputs of its checks.
 
-The names of arrays and settings are those of the golden cases. `d_NAME` is the derivative of the loss with respect to
-NAME: a cotangent where NAME is an output, a gradient where it is an input.
+Arrays and settings have the same names as in the golden cases. `d_NAME` is the derivative of the loss with respect to
+NAME: a cotangent if NAME is an output, a gradient if it is an input.
 """
 
 from collections.abc import Callable, Mapping

@@ -74,7 +74,7 @@ def relations(
     """All relations between two arrays of the same shape, the most specific first.
 
     kind, tolerance   as of the rule of the output
-    others            the other arrays of the case: inputs, and what is expected of the other outputs
+    others            the other arrays of the case: inputs, and the expected other outputs
     """
     pair = OutputPair(got, expected, kind, tolerance)
     if not pair.wrong.any():

@@ -42,7 +42,7 @@ class OutputReport(msgspec.Struct, kw_only=True):
     got: float | None = None
     expected: float | None = None
     forms: list[str] = []
-    """relations to the expected array that hold to the tolerance, the most telling first"""
+    """relations to the expected array, satisfied to the tolerance, the most specific first"""
 
 
 class CaseReport(msgspec.Struct, kw_only=True):
@@ -59,13 +59,13 @@ class CaseReport(msgspec.Struct, kw_only=True):
     """mistakes that explain the refusals of this case, best first"""
     made_for: list[str] = []
     answer: int = 0
-    """which of several legal answers it was held against"""
+    """the one of several legal answers with which it was compared"""
     first_wrong: str = ""
-    """of a trajectory: the first wrong iteration, what is wrong there, and where to look"""
+    """of a trajectory: the first wrong iteration, its wrong outputs, and the place to look at"""
     events: list[str] = []
-    """what happens at this iteration or the one before"""
+    """events at this iteration or the one before"""
     evidence: dict[str, Evidence] = {}
-    """by mistake; not part of the JSON report, whose suspects hold the sums"""
+    """by mistake; not part of the JSON report, whose suspects have the sums"""
 
 
 class Report(msgspec.Struct, kw_only=True):
@@ -77,28 +77,28 @@ class Report(msgspec.Struct, kw_only=True):
     level: int
     """highest level that is complete, -1 = none; also of a port that fails"""
     without: tuple[str, ...]
-    """operations that the port declares not to do"""
+    """operations that the port declares as omitted"""
     claim: str
     levels: dict[int, tuple[int, int]]
-    """passed and asked outputs by level"""
+    """passed and requested outputs by level"""
     cases: list[CaseReport]
     suspects: list[Suspect]
     notes: list[str]
     diagnosis: list[str] = []
-    """the first wrong operation and how its outputs relate to the expected ones; empty where nothing is refused"""
+    """the first wrong operation and the relations of its outputs to the expected ones; empty if nothing is refused"""
     causes: list[str] = []
-    """changes of the definition that give the outputs of that operation as the port wrote them; see golden.search"""
+    """changes of the definition that reproduce the port's outputs of that operation; see golden.search"""
     inside: list[str] = []
-    """the first wrong array inside that operation, of those that the port wrote; see golden.search.inside"""
+    """the first wrong array inside that operation, among the port's intermediate arrays; see golden.search.inside"""
     failures: list[str] = []
-    """how the port failed as a program"""
+    """failures of the port as a program"""
 
     first_wrong: str = ""
     """the first operation with a refused output"""
 
     @property
     def passed(self) -> bool:
-        """Whether the asked level is complete."""
+        """Whether the requested level is complete."""
         return self.level >= self.asked_level
 
 
@@ -288,7 +288,7 @@ def _together(found: list[OutputReport]) -> Status:
 
 
 def _taken(path: Path, root: Path, asked: Output, precision: Precision) -> NDArray:
-    """The output as an array of the asked shape and kind. Raises Refused."""
+    """The output as an array of the requested shape and kind. Raises Refused."""
     count = int(np.prod(asked.shape))
     got = read_plain(path, root, largest=8 * max(count, 1))
     if got.shape != asked.shape:

@@ -166,7 +166,7 @@ class Trial:
         enough = {"forward": self.wrong_forward, "refused": self.wrong if sum(map(bool, self.refusals)) > 1 else 0}
         if whole and enough.get(whole, TELLING) >= TELLING:
             if spot and not self.forward_refused and spot.place.phases == {"forward"}:
-                rank = (rank[0] + 1, *rank[1:])  # what is refused is computed elsewhere
+                rank = (rank[0] + 1, *rank[1:])  # the refused outputs are computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
             self.hits.append(Hit(text, where, function, whole, (int(whole in enough), *rank, len(self.hits))))
 
