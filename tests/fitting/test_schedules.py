@@ -133,6 +133,8 @@ def test_densifications_that_are_left():
     left = [schedules.densifications_left(i, PAPER) for i in range(1, 6001) if schedules.densify_now(i, PAPER)]
     assert left == list(range(34, 0, -1))
     assert schedules.densifications_left(6000, PAPER) == 1
+    longer = changed("density", until=3901)  # the last iteration before it densifies
+    assert schedules.densify_now(3900, longer) and schedules.densifications_left(3800, longer) == 2
 
 
 def test_stretched_run_keeps_its_shares():

@@ -41,6 +41,7 @@ from mutation.survey import Checks  # noqa: E402
 
 FOLDERS = (
     "kernels/test_exponential.py",
+    "kernels/test_gather.py",
     "kernels/test_sums.py",
     "definition",
     "equations",

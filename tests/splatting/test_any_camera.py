@@ -29,3 +29,9 @@ def test_the_angle_between_two_rotations_is_the_one_they_were_made_with(degrees)
     other = Rotation.from_rotvec(np.radians(degrees) * np.array([0.6, 0.0, 0.8])) * one
     found = degrees_between(one.as_matrix(), other.as_matrix())
     np.testing.assert_allclose(found, degrees, rtol=1e-9, atol=3e-6)  # an arc cosine has half the digits at its ends
+
+
+def test_a_cosine_above_one_by_rounding_is_an_angle_of_zero():
+    rotation = Rotation.random(rng=0).as_matrix()
+    assert (np.trace(rotation @ rotation.T) - 1) / 2 > 1
+    assert degrees_between(rotation, rotation) == 0.0
