@@ -3,7 +3,7 @@
     python docs/pages/one_camera.py              measure, some minutes on two cores
     python docs/pages/one_camera.py --table      rewrite the table of the last result
 
-Two scenes are simulated: with a resting camera, scale and shift of the relative depth are assumed; with a moving
+Two scenes are simulated: with a fixed camera, scale and shift of the relative depth are assumed; with a moving
 camera, they are fitted to sparse points in every frame. The relative depth is an affine map of the true 1 / z, rounded
 to 16 bits, with a different map in every frame of the moving camera. The points have the true depth at a few hundred
 pixels per frame; 10 % of them are wrong. The result is docs/results/one_camera.json; the table is in
@@ -32,11 +32,11 @@ from endotsr.simulator.truth import read_truth
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "one_camera.json", DOCS / "guides" / "prepare.md"
 SIZE = ["--relief", "2", "--width", "240", "--height", "192", "--frames", "25"]
-SCENES = {"resting": ["pulling", *SIZE], "moving": ["moving-camera", "--instrument.on", *SIZE]}
+SCENES = {"fixed": ["pulling", *SIZE], "moving": ["moving-camera", "--instrument.on", *SIZE]}
 TRAINING = ["--preset", "demo", "--iterations", "600"]
 POINTS, WRONG = 300, 0.1  # points of a frame, and the fraction of them whose depth is up to 30 % off
 WAYS = {
-    "resting": {
+    "fixed": {
         "true": "true depth",
         "relative": "relative depth, farthest assumed three times as far as nearest",
         "flat": "a plane (`--flat`)",
@@ -154,7 +154,7 @@ def table(result: dict[str, Any]) -> str:
     for scene, ways in WAYS.items():
         for way, label in ways.items():
             row = result["scenes"][scene][way]
-            metric = "no" if scene == "resting" and way != "true" else "yes"
+            metric = "no" if scene == "fixed" and way != "true" else "yes"
             rows.append(
                 [f"{scene} camera", label, f"{row['psnr']:.2f}", f"{row['ssim']:.4f}", f"{row['depth']:.1%}", metric]
             )
