@@ -210,7 +210,7 @@ def test_stretches_that_no_basis_reaches_are_left_out_without_a_trace(rng, basis
     reach = QUARTIC_REACH if basis == "quartic" else GAUSSIAN_REACH
     ends = np.repeat([1.5, 0.999, *np.linspace(1.001, 3.0, 7), 0.999, 2.0], STRETCH)[:count]
     widths = np.full(count, 0.01)
-    widths[9 * STRETCH : 10 * STRETCH], widths[4 * STRETCH + 3], ends[4 * STRETCH + 3] = 3.0, 3.0, 0.999
+    widths[9 * STRETCH : 10 * STRETCH], widths[5 * STRETCH - 1], ends[5 * STRETCH - 1] = 3.0, 3.0, 0.999
     centre[:], width[:] = (0.4 + ends * np.sqrt(reach * (widths**2 + 1e-4))).astype(dtype), widths
     centre[:, :, 5 * STRETCH + 1], centre[:, :, 9 * STRETCH - 1], centre[2, 1, 7 * STRETCH] = 0.4, 0.4, np.nan
     d_offsets = rng.normal(size=(10, count)).astype(dtype)
