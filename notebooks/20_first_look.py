@@ -206,7 +206,7 @@ for name, on in (("full size", False), ("coarse start", True)):
         training={"seed": 0, "threads": 1, "coarse_start": on},
         on_message=messages.append,
     )
-    said = [line for line in messages if "full size after iteration" in line]
+    said = [line for line in messages if "full-size frames after iteration" in line]
     ends[name] = int(said[0].split()[-1]) if said else 0
 held_out = {
     name: run.evaluate()["held_out"]["mean"]["psnr_tissue"] for name, run in runs.items()
