@@ -14,7 +14,7 @@ from scipy import stats
 from endotsr.effects.clip import LUMINANCE, TILE, Clip, residual, slow_courses, tile_map, tile_means, without_gaps
 from endotsr.effects.noise import Noise
 from endotsr.effects.tracks import FlowTracks
-from endotsr.effects.verdict import Curve, EffectVerdict, Map
+from endotsr.effects.verdict import Curve, EffectVerdict, Map, sentence
 from endotsr.kernels.arrays import BoolArray, FloatArray, IndexArray
 
 DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside this range are not compared
@@ -146,8 +146,7 @@ def _verdict(
         "white balance": f"the channels drift apart by {255 * ranges['white balance']:.1f} grey levels",
         "local": f"the light changes by itself in {fraction:.0%} of the tissue",
     }
-    said = ", ".join(words[name] for name in found)
-    reason = said[0].upper() + said[1:] + "." if said else "No gain, white balance or local light changes visibly."
+    reason = sentence(words, found, "No gain, white balance or local light changes visibly.")
     picture = np.full((clip.images.shape[2] // TILE) * (clip.images.shape[3] // TILE), np.nan)
     picture[ratios.tiles] = 255 * sizes
     lines = {"gain": 100 * common, "red": 100 * balance[:, 0], "blue": 100 * balance[:, 2]}

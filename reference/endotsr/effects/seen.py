@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from endotsr.effects.clip import Clip
 from endotsr.effects.noise import NORMAL_MAD
-from endotsr.effects.verdict import Curve, EffectVerdict, Map
+from endotsr.effects.verdict import Curve, EffectVerdict, Map, sentence
 from endotsr.kernels.arrays import BoolArray
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import camera_centre
@@ -101,8 +101,7 @@ def depth_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
         "quantised": f"depth moves in steps of {step:.3g} {sequence.unit}",
         "flicker": f"depth flickers by {flicker:.3g} {sequence.unit} (standard deviation)",
     }
-    said = ", ".join(words[name] for name in found)
-    reason = said[0].upper() + said[1:] + "." if said else "Depth is dense, fine and steady."
+    reason = sentence(words, found, "Depth is dense, fine and steady.")
     if not any(usable):
         found, reason = ["unusable"], "No training frame has ten pixels of depth that differ."
     details = {"usable": any(usable), "holes": holes, "step": step, "flicker": flicker, "median_depth": median}

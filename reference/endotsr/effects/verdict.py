@@ -1,6 +1,6 @@
 """The result of one test: presence of an effect, confidence, and a map or curve for display."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -55,6 +55,12 @@ class EffectVerdict(NamedTuple):
             return 1.0
         small, large = sorted((abs(self.statistic), abs(self.threshold)))
         return 1.0 - 0.5 * (small / large) ** 2 if large > 0 else 0.5
+
+
+def sentence(clauses: Mapping[str, str], found: Iterable[str], otherwise: str) -> str:
+    """One sentence that joins the clauses of what was found; `otherwise` if nothing was."""
+    joined = ", ".join(clauses[name] for name in found)
+    return joined[0].upper() + joined[1:] + "." if joined else otherwise
 
 
 def verdict_record(verdict: EffectVerdict) -> dict[str, Any]:
