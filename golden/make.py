@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from endotsr.errors import InputError
-from endotsr.golden.judge.store import golden_folder, read_golden
+from endotsr.port.judge.store import golden_folder, read_golden
 from makers.generate import check, write
 from makers.registry import all_wrong_ports
 from makers.wrong import answer_wrongly

@@ -36,10 +36,10 @@ import msgspec
 import numpy as np
 
 import endotsr
+from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.definition import view as definition
-from endotsr.evaluation.metrics import psnr_tissue
-from endotsr.evaluation.trajectories import trajectory_error
-from endotsr.simulator import SimulatorSettings, simulate, with_effects
+from endotsr.results.evaluation.metrics import psnr_tissue
+from endotsr.results.evaluation.trajectories import trajectory_error
 
 # %% [markdown]
 # ## The pipeline

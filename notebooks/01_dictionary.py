@@ -30,7 +30,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.definition import dictionary as definition
-from endotsr.equations.dictionary import (
+from endotsr.method.equations.dictionary import (
     atom_statistics,
     dictionary_forward,
     dictionary_reverse,
@@ -39,7 +39,7 @@ from endotsr.equations.dictionary import (
     normalise_reverse,
     report_atoms,
 )
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %% [markdown]
 # ## The dictionary

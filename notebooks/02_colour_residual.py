@@ -26,9 +26,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.definition import appearance as definition
-from endotsr.equations.appearance import Y00, appearance_forward, appearance_reverse
-from endotsr.equations.dictionary import atom_statistics, frequencies, normalised_atoms
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.method.equations.appearance import Y00, appearance_forward, appearance_reverse
+from endotsr.method.equations.dictionary import atom_statistics, frequencies, normalised_atoms
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(2)

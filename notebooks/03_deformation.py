@@ -26,8 +26,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.definition import deformation as definition
-from endotsr.equations.deformation import deformation_forward, deformation_reverse
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.method.equations.deformation import deformation_forward, deformation_reverse
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(3)

@@ -28,14 +28,14 @@ from scipy import stats
 
 from endotsr.definition import matern as definition_of_prior
 from endotsr.definition import motion as definition
-from endotsr.equations.dictionary import dictionary_forward, frequencies
-from endotsr.equations.matern import (
+from endotsr.method.equations.dictionary import dictionary_forward, frequencies
+from endotsr.method.equations.matern import (
     matern_penalty_forward,
     matern_penalty_reverse,
     matern_weights,
 )
-from endotsr.equations.motion import motion_forward, motion_reverse
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.method.equations.motion import motion_forward, motion_reverse
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(4)

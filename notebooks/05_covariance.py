@@ -26,19 +26,19 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.definition import covariance as definition
-from endotsr.gradcheck import (
+from endotsr.method.splatting.covariance import (
+    Shape,
+    covariance_forward,
+    covariance_matrix,
+    covariance_reverse,
+)
+from endotsr.port.gradcheck import (
     all_pairs,
     check_function,
     check_pair,
     one_thread,
     pair_stream,
     table,
-)
-from endotsr.splatting.covariance import (
-    Shape,
-    covariance_forward,
-    covariance_matrix,
-    covariance_reverse,
 )
 
 # %%

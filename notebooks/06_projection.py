@@ -29,16 +29,16 @@ import numpy as np
 from endotsr.definition import pose as pose_definition
 from endotsr.definition import projection as definition
 from endotsr.definition import settings as definition_settings
-from endotsr.equations.pose import pose_forward, pose_reverse
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.covariance import Shape, covariance_forward
-from endotsr.splatting.projection import (
+from endotsr.method.equations.pose import pose_forward, pose_reverse
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.covariance import Shape, covariance_forward
+from endotsr.method.splatting.projection import (
     projection_forward,
     projection_reverse,
     projection_reverse_footprint,
 )
-from endotsr.splatting.settings import EXACT, PAPER
+from endotsr.method.splatting.settings import EXACT, PAPER
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(6)

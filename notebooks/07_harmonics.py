@@ -27,8 +27,8 @@ import numpy as np
 from scipy.special import factorial, lpmv
 
 from endotsr.definition import harmonics as definition
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
+from endotsr.method.splatting.harmonics import harmonics_forward, harmonics_reverse
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(7)

@@ -26,20 +26,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.definition import compositing as definition
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.compositing import (
+from endotsr.method.splatting.binning import depth_order, screen_boxes, tile_lists
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.compositing import (
     TILE_HEIGHT,
     TILE_WIDTH,
     background_gradient,
     composite_forward,
     composite_reverse,
 )
-from endotsr.splatting.projection import Projected
-from endotsr.splatting.records import gather_gradients, log_opacity, pack_records
-from endotsr.splatting.render import Scene, render_forward
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.method.splatting.projection import Projected
+from endotsr.method.splatting.records import gather_gradients, log_opacity, pack_records
+from endotsr.method.splatting.render import Scene, render_forward
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 rng = np.random.default_rng(8)

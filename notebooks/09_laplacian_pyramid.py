@@ -25,15 +25,15 @@ import inspect
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.definition import laplacian as definition
-from endotsr.equations.laplacian import (
+from endotsr.method.equations.laplacian import (
     laplacian_levels,
     laplacian_loss_forward,
     laplacian_loss_reverse,
     support_masks,
 )
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.simulator import SimulatorSettings, simulate
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(9)

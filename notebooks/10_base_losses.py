@@ -30,23 +30,27 @@ import inspect
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.clips.opencv import canny_edges
+from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.definition import depth as depth_definition
 from endotsr.definition import exposure as exposure_definition
 from endotsr.definition import masked_l1 as l1_definition
 from endotsr.definition import masked_ssim as definition
 from endotsr.definition import smoothness as smoothness_definition
-from endotsr.equations.exposure import exposure_forward, exposure_reverse
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.losses.depth import (
+from endotsr.method.equations.exposure import exposure_forward, exposure_reverse
+from endotsr.method.losses.depth import (
     depth_target,
     normalised_depth_forward,
     normalised_depth_reverse,
 )
-from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
-from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
-from endotsr.opencv import canny_edges
-from endotsr.simulator import SimulatorSettings, simulate
+from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.method.losses.masked_ssim import (
+    masked_ssim_forward,
+    masked_ssim_reverse,
+    ssim_target,
+)
+from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %%
 rng = np.random.default_rng(10)

@@ -27,14 +27,14 @@ import msgspec
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.config import PAPER
 from endotsr.definition import calibration as definition
-from endotsr.equations.calibration import calibrate, calibration_views, rms
-from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse
 from endotsr.errors import CalibrationError
-from endotsr.fitting.objective import frame_targets, photometric_loss
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.simulator import SimulatorSettings, simulate
+from endotsr.method.equations.calibration import calibrate, calibration_views, rms
+from endotsr.method.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.training.fitting.objective import frame_targets, photometric_loss
 
 # %%
 sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence

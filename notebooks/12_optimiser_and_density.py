@@ -31,20 +31,20 @@ from endotsr.config import PAPER, DensityConfig
 from endotsr.definition import adam as definition
 from endotsr.definition import density_control as definition_of_density
 from endotsr.definition import schedules as definition_of_schedules
-from endotsr.fitting.adam import adam_state, adam_step, adam_update, regather
-from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.scene.density_control import (
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.covariance import covariance_forward
+from endotsr.method.splatting.render import Scene, render_forward, render_reverse
+from endotsr.method.splatting.settings import PAPER as RASTER
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.training.fitting.adam import adam_state, adam_step, adam_update, regather
+from endotsr.training.fitting.schedules import active_degree, densify_now, learning_rates
+from endotsr.training.scene.density_control import (
     DensityStatistics,
     densify,
     empty_statistics,
     gather_statistics,
 )
-from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.covariance import covariance_forward
-from endotsr.splatting.render import Scene, render_forward, render_reverse
-from endotsr.splatting.settings import PAPER as RASTER
+from endotsr.training.scene.gaussians import Gaussians, arrays
 
 # %%
 rng = np.random.default_rng(12)

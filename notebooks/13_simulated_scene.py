@@ -25,11 +25,11 @@ import os
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.clips.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.config import InitialisationConfig, ModelConfig
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.scene.initialisation import Y00, gaussians_at, initialise
-from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
-from endotsr.splatting.camera import backproject
+from endotsr.method.splatting.camera import backproject
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.training.scene.initialisation import Y00, gaussians_at, initialise
 
 # %%
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"

@@ -36,14 +36,14 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import correlate1d
 
+from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.config import PAPER, with_iterations
-from endotsr.evaluation.baselines import BASELINES
-from endotsr.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
-from endotsr.fitting.model import render_at
-from endotsr.fitting.state import new_training, training_constants
-from endotsr.fitting.trainer import training_step
-from endotsr.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
-from endotsr.simulator import SimulatorSettings, simulate
+from endotsr.port.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
+from endotsr.results.evaluation.baselines import BASELINES
+from endotsr.results.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
+from endotsr.training.fitting.model import render_at
+from endotsr.training.fitting.state import new_training, training_constants
+from endotsr.training.fitting.trainer import training_step
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 replace = msgspec.structs.replace

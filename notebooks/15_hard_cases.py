@@ -25,12 +25,27 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.equations.laplacian import (
+from endotsr.method.equations.laplacian import (
     laplacian_loss_forward,
     laplacian_loss_reverse,
     support_masks,
 )
-from endotsr.gradcheck import (
+from endotsr.method.kernels.constants import Y00
+from endotsr.method.losses.depth import (
+    depth_target,
+    normalised_depth_forward,
+    normalised_depth_reverse,
+)
+from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.method.losses.masked_ssim import (
+    masked_ssim_forward,
+    masked_ssim_reverse,
+    ssim_target,
+)
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import Scene, render_forward, render_reverse
+from endotsr.method.splatting.settings import EXACT, PAPER
+from endotsr.port.gradcheck import (
     all_pairs,
     check_function,
     check_pair,
@@ -40,17 +55,6 @@ from endotsr.gradcheck import (
     summary,
     table,
 )
-from endotsr.kernels.constants import Y00
-from endotsr.losses.depth import (
-    depth_target,
-    normalised_depth_forward,
-    normalised_depth_reverse,
-)
-from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import Scene, render_forward, render_reverse
-from endotsr.splatting.settings import EXACT, PAPER
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 rng = np.random.default_rng(15)

@@ -28,13 +28,13 @@ import numpy as np
 
 from endotsr.config import PAPER as RUN
 from endotsr.config import ModelConfig
-from endotsr.fitting.model import scene_at, spectral_from
-from endotsr.scene import workload
-from endotsr.splatting.render import render_forward
-from endotsr.tradeoff.measure import errors, frame, prepare, seconds
-from endotsr.tradeoff.scenes import StudyScene
-from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting
-from endotsr.tradeoff.study import Ranked, non_dominated, reference_setting
+from endotsr.method.splatting.render import render_forward
+from endotsr.studies.tradeoff.measure import errors, frame, prepare, seconds
+from endotsr.studies.tradeoff.scenes import StudyScene
+from endotsr.studies.tradeoff.settings import ACCURATE, CLOSE, Setting
+from endotsr.studies.tradeoff.study import Ranked, non_dominated, reference_setting
+from endotsr.training.fitting.model import scene_at, spectral_from
+from endotsr.training.scene import workload
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"

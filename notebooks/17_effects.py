@@ -27,16 +27,16 @@ import matplotlib.pyplot as plt
 import msgspec
 import numpy as np
 
+from endotsr.clips.effects.clip import TILE, training_clip
+from endotsr.clips.effects.inspect import inspect_sequence
+from endotsr.clips.effects.noise import temporal_noise
+from endotsr.clips.effects.plan import apply_plan, make_plan
+from endotsr.clips.effects.rigid import inverse_depth
+from endotsr.clips.effects.savings import memory_fraction, numbers_of_a_gaussian
+from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
+from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER
-from endotsr.effects.clip import TILE, training_clip
-from endotsr.effects.inspect import inspect_sequence
-from endotsr.effects.noise import temporal_noise
-from endotsr.effects.plan import apply_plan, make_plan
-from endotsr.effects.rigid import inverse_depth
-from endotsr.effects.savings import memory_fraction, numbers_of_a_gaussian
-from endotsr.equations.dictionary import frequencies, report_atoms
-from endotsr.simulator.settings import SimulatorSettings, with_effects
-from endotsr.simulator.simulate import simulate
+from endotsr.method.equations.dictionary import frequencies, report_atoms
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
@@ -271,7 +271,7 @@ for name, inspection in found.items():
 # Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both are within the 1 to 16 cycles
 # of the dictionary, and 63 frames resolve 31.5 cycles. The test of rates requires three cycles,
 # so it finds the beat and not the breath.
-from endotsr.effects.periodic import LEAST_CYCLES
+from endotsr.clips.effects.periodic import LEAST_CYCLES
 
 seconds = 63 / 15
 beats, breaths = 72 / 60 * seconds, 15 / 60 * seconds

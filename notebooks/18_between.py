@@ -28,14 +28,14 @@ import msgspec
 import numpy as np
 
 import endotsr
-from endotsr.evaluation.metrics import psnr_tissue
-from endotsr.evaluation.trajectories import trajectory_error
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.opencv import warp_cubic
-from endotsr.sequences import between as definition
-from endotsr.sequences.between import Flows, flows_between, frame_between, motion_between
-from endotsr.simulator import SimulatorSettings, simulate, with_effects
-from endotsr.simulator.scenes import named_scene
+from endotsr.clips.opencv import warp_cubic
+from endotsr.clips.sequences import between as definition
+from endotsr.clips.sequences.between import Flows, flows_between, frame_between, motion_between
+from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
+from endotsr.clips.simulator.scenes import named_scene
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.results.evaluation.metrics import psnr_tissue
+from endotsr.results.evaluation.trajectories import trajectory_error
 
 # %% [markdown]
 # ## The problem

@@ -28,21 +28,21 @@ import msgspec
 import numpy as np
 
 import endotsr
+from endotsr.clips.sequences import tracks as definition_of_tracks
+from endotsr.clips.sequences.tracks import follow
+from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
+from endotsr.clips.simulator.scenes import named_scene
+from endotsr.clips.simulator.trajectories import material_at, material_tracks
 from endotsr.definition.matern import matern_weights
-from endotsr.equations.dictionary import dictionary_forward, frequencies
-from endotsr.evaluation.metrics import psnr_tissue
-from endotsr.evaluation.trajectories import displacement, trajectory_error
-from endotsr.fitting.model import scene_at
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.scene import tracked_motion as definition
-from endotsr.scene.gaussians import Gaussians
-from endotsr.scene.tracked_motion import with_tracked_motion
-from endotsr.sequences import tracks as definition_of_tracks
-from endotsr.sequences.tracks import follow
-from endotsr.simulator import SimulatorSettings, simulate, with_effects
-from endotsr.simulator.scenes import named_scene
-from endotsr.simulator.trajectories import material_at, material_tracks
-from endotsr.splatting.camera import backproject
+from endotsr.method.equations.dictionary import dictionary_forward, frequencies
+from endotsr.method.splatting.camera import backproject
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.results.evaluation.metrics import psnr_tissue
+from endotsr.results.evaluation.trajectories import displacement, trajectory_error
+from endotsr.training.fitting.model import scene_at
+from endotsr.training.scene import tracked_motion as definition
+from endotsr.training.scene.gaussians import Gaussians
+from endotsr.training.scene.tracked_motion import with_tracked_motion
 
 # %%
 replace = msgspec.structs.replace

@@ -29,19 +29,19 @@ import msgspec
 import numpy as np
 
 import endotsr
+from endotsr.clips.sequences.smaller import halved
+from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.config import PAPER, DensityConfig, with_iterations
 from endotsr.definition import density_control as definition_of_density
-from endotsr.fitting import coarse_start as definition
-from endotsr.fitting.coarse_start import coarse_start, fit_error
-from endotsr.fitting.state import new_training
-from endotsr.fitting.trainer import training_step
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.losses.smoothness import smoothness_forward
-from endotsr.scene.density_control import DensityStatistics, densify
-from endotsr.scene.gaussians import Gaussians
-from endotsr.sequences.smaller import halved
-from endotsr.simulator import SimulatorSettings, simulate
-from endotsr.splatting.camera import project, scale_camera
+from endotsr.method.losses.smoothness import smoothness_forward
+from endotsr.method.splatting.camera import project, scale_camera
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.training.fitting import coarse_start as definition
+from endotsr.training.fitting.coarse_start import coarse_start, fit_error
+from endotsr.training.fitting.state import new_training
+from endotsr.training.fitting.trainer import training_step
+from endotsr.training.scene.density_control import DensityStatistics, densify
+from endotsr.training.scene.gaussians import Gaussians
 
 # %%
 replace = msgspec.structs.replace

@@ -29,19 +29,19 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import endotsr
+from endotsr.clips.simulator import SimulatorSettings
+from endotsr.clips.simulator.folder import write_sequence
+from endotsr.clips.simulator.scenes import scene_of
 from endotsr.config import config_from_dict
-from endotsr.evaluation.metrics import psnr_tissue
-from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.runs.folder import open_run
-from endotsr.simulator import SimulatorSettings
-from endotsr.simulator.folder import write_sequence
-from endotsr.simulator.scenes import scene_of
-from endotsr.sweeps.execute import execute
-from endotsr.windows import scene as definition
-from endotsr.windows.carry import CarriedStart
-from endotsr.windows.make import make_windows, plan_recording, window_folder
-from endotsr.windows.plan import Wanted
-from endotsr.windows.scene import open_windows
+from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.results.evaluation.metrics import psnr_tissue
+from endotsr.studies.sweeps.execute import execute
+from endotsr.studies.windows import scene as definition
+from endotsr.studies.windows.carry import CarriedStart
+from endotsr.studies.windows.make import make_windows, plan_recording, window_folder
+from endotsr.studies.windows.plan import Wanted
+from endotsr.studies.windows.scene import open_windows
+from endotsr.training.runs.folder import open_run
 
 # %% [markdown]
 # ## Two windows

@@ -12,7 +12,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, settings
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE / "splatting")]  # made_up_scenes is used in other folders too
+sys.path[:0] = [str(HERE), str(HERE / "method" / "splatting")]  # made_up_scenes is used in other folders too
 sys.path += [str(HERE.parent / name) for name in ("golden", "docs/pages")]  # programs that are not installed
 
 # No deadline: the first call of a kernel compiles it. Fixtures hold nothing that an example changes.
@@ -29,7 +29,7 @@ def pytest_xdist_auto_num_workers(config):
     """Workers of `-n auto`: one a core for folders of tests, none for files and tests that are named one by one."""
     if all(Path(word.partition("::")[0]).suffix == ".py" for word in config.args):
         return 0
-    from endotsr.kernels.machine import usable_cores
+    from endotsr.method.kernels.machine import usable_cores
 
     cores = usable_cores()
     return min(cores, LARGEST_CREW) if cores > 1 else 0
@@ -39,7 +39,7 @@ def pytest_xdist_setupnodes(config):
     """Before the workers of a whole run start: compile the kernels of a training once, which each would compile."""
     if config.args == config.getini("testpaths") and not config.option.keyword:
         from endotsr.config import config_from_dict
-        from endotsr.fitting.compile_ahead import compile_ahead
+        from endotsr.training.fitting.compile_ahead import compile_ahead
 
         for precision in ("float32", "float64"):
             compile_ahead(config_from_dict({"training": {"precision": precision}}))

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.opencv import write_png
+from endotsr.clips.sequences.poses import rows_from_cameras
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
-from endotsr.opencv import write_png
-from endotsr.sequences.poses import rows_from_cameras
-from endotsr.sequences.sequence import Sequence
 
 
 def write_endonerf(sequence: Sequence, folder: Path) -> None:

@@ -13,8 +13,21 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 ALL = (
-    *("tests/cli", "tests/faults", "tests/golden/judge", "tests/report", "tests/sequences", "tests/simulator"),
-    *("tests/sweeps", "tests/evaluation", "tests/export", "tests/views", "tests/test_api.py"),
+    *(
+        "tests/cli",
+        "tests/faults",
+        "tests/port/judge",
+        "tests/results/report",
+        "tests/clips/sequences",
+        "tests/clips/simulator",
+    ),
+    *(
+        "tests/studies/sweeps",
+        "tests/results/evaluation",
+        "tests/results/export",
+        "tests/results/views",
+        "tests/test_api.py",
+    ),
 )
 
 

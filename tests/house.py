@@ -13,14 +13,29 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
-# From the ground up. A module imports its own room and the rooms before it, nothing else.
-ROOMS = (
-    "definition", "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv",
-    "sequences", "scene", "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views",
-    "stages", "gradcheck", "golden", "bench", "tradeoff", "sweeps", "windows", "api", "cli", "__main__",
+# The doors of the package from the ground up: storeys with their rooms, and single modules. A storey imports itself and
+# what stands before it; inside a storey, a room imports itself and the rooms before it.
+STOREYS: dict[str, tuple[str, ...]] = {
+    "errors": (),
+    "untrusted": (),
+    "config": (),
+    "definition": (),
+    "method": ("kernels", "equations", "losses", "splatting"),
+    "clips": ("opencv", "sequences", "simulator", "effects"),
+    "training": ("scene", "fitting", "runs"),
+    "results": ("evaluation", "report", "export", "views"),
+    "port": ("stages", "gradcheck", "judge", "contract", "reference", "search"),
+    "studies": ("bench", "tradeoff", "sweeps", "windows"),
+    "api": (),
+    "cli": (),
+    "__main__": (),
+}
+ROOMS = tuple(room for storey, rooms in STOREYS.items() for room in (storey, *(f"{storey}.{name}" for name in rooms)))
+METHOD = (
+    "definition", "method.kernels", "method.equations", "method.losses", "method.splatting", "training.scene",
+    "training.fitting",
 )  # fmt: skip
-METHOD = ("definition", "kernels", "equations", "losses", "splatting", "scene", "fitting")
-GROUND = ("errors", "untrusted", "config", "opencv", "sequences")  # what the method may know beside itself
+GROUND = ("errors", "untrusted", "config", "clips.opencv", "clips.sequences")  # what the method may know beside itself
 BESIDE = ("golden", "docs/pages")  # folders of programs that run in the repository and are not installed
 LONGEST_FUNCTION = 40  # lines
 MOST_POSITIONAL = 12
@@ -64,7 +79,13 @@ def imports(root: Path = ROOT) -> frozenset[tuple[str, str]]:
 
 
 def room(module: str) -> str:
-    """The first part of a dotted name."""
+    """The storey and room of a dotted name, `method.splatting`; the storey alone where it has no rooms."""
+    parts = module.split(".")
+    return ".".join(parts[:2]) if STOREYS.get(parts[0]) else parts[0]
+
+
+def storey(module: str) -> str:
+    """The first part of a dotted name: the door."""
     return module.split(".")[0]
 
 

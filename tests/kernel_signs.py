@@ -1,6 +1,6 @@
 """Flip one sign of the package at a time and run the notebooks that use it: one of them must fail.
 
-The whole run by hand (hours): python tests/kernel_signs.py [module ...], for example equations.deformation
+The whole run by hand (hours): python tests/kernel_signs.py [module ...], for example method.equations.deformation
 A sample, the same each time: python tests/kernel_signs.py --sample 10; a small one runs in the tests.
 Each flip lives in a forked process: the module and all that import it are loaded anew there, compiled without the
 disk cache.
@@ -24,8 +24,14 @@ import notebook_signs
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "reference" / "endotsr"
 # What the notebooks transcribe: the equations and the rooms that are made of them.
-ROOMS = ("equations", "losses", "splatting")
-SINGLE = ("fitting.adam", "fitting.objective", "fitting.schedules", "scene.density_control", "scene.initialisation")
+ROOMS = ("method.equations", "method.losses", "method.splatting")
+SINGLE = (
+    "training.fitting.adam",
+    "training.fitting.objective",
+    "training.fitting.schedules",
+    "training.scene.density_control",
+    "training.scene.initialisation",
+)
 
 
 @cache
@@ -65,7 +71,11 @@ def notebooks_for(module: str) -> list[Path]:
 
 
 def modules() -> list[str]:
-    rooms = [f"endotsr.{room}.{file.stem}" for room in ROOMS for file in sorted((PACKAGE / room).glob("[a-z]*.py"))]
+    rooms = [
+        f"endotsr.{room}.{file.stem}"
+        for room in ROOMS
+        for file in sorted(PACKAGE.joinpath(*room.split(".")).glob("[a-z]*.py"))
+    ]
     return [*rooms, *(f"endotsr.{name}" for name in SINGLE)]
 
 
@@ -77,7 +87,7 @@ def load_changed(module: str, source: str) -> None:
     """Put a changed module in the place of the original, and forget everything that was built on that."""
     import numba
 
-    import endotsr.kernels.jit as compiler
+    import endotsr.method.kernels.jit as compiler
 
     stale = dependents(module)
     for name in stale & set(sys.modules):

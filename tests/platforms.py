@@ -91,7 +91,7 @@ def surprises(rows: list[dict[str, Any]]) -> list[str]:
 
 def main(words: list[str]) -> int:
     """The command."""
-    from endotsr.runs.machine import now
+    from endotsr.training.runs.machine import now
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)

@@ -14,7 +14,7 @@ import pytest
 import endotsr
 from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
-from endotsr.runs.files import finite
+from endotsr.training.runs.files import finite
 
 SIMULATOR = {"width": 48, "height": 32, "frames": 9}
 POINTS = {"first_frame_points": 150, "other_frame_points": 40}

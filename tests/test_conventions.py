@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from endotsr.gradcheck import all_pairs, definition_pairs
+from endotsr.port.gradcheck import all_pairs, definition_pairs
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "reference" / "endotsr"
@@ -19,8 +19,8 @@ ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
 CONTRACTING = {  # the fast compositing, and the peak of the machine beside it
-    *("splatting/fast/blocks.py", "splatting/fast/tiles.py"),
-    "bench/peaks.py",
+    *("method/splatting/fast/blocks.py", "method/splatting/fast/tiles.py"),
+    "studies/bench/peaks.py",
 }
 PEERS = [
     ROOT / "docs" / "pages" / name for name in ("bench_gsplat.py", "bench_peers.py")
@@ -218,7 +218,7 @@ def test_no_pickle_through_numpy():
 
 @pytest.mark.parametrize(
     ("library", "files"),
-    [("cv2", ["opencv/library.py"]), ("av", ["sequences/film_file.py", "sequences/video_file.py"])],
+    [("cv2", ["clips/opencv/library.py"]), ("av", ["clips/sequences/film_file.py", "clips/sequences/video_file.py"])],
 )
 def test_a_decoder_is_imported_in_one_file_and_an_encoder_in_another(library, files):
     assert [f.relative_to(PACKAGE).as_posix() for f in SOURCES if library in imported(f)] == files

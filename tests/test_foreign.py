@@ -10,9 +10,9 @@ pytestmark = pytest.mark.skipif(not foreign.Path("/proc/self/fd").exists(), reas
 
 # Of every kind of promise: locks, links, records, memory, the text of files, a closed pipe, files replaced whole.
 CHOSEN = (
-    "tests/golden/judge/test_hostile.py",
-    "tests/sequences/test_frame_store.py",
-    "tests/sweeps/test_capacity.py",
+    "tests/port/judge/test_hostile.py",
+    "tests/clips/sequences/test_frame_store.py",
+    "tests/studies/sweeps/test_capacity.py",
     "tests/faults/test_checkpoints.py",
     "tests/cli/test_cli_run_folder.py",
     "tests/cli/test_cli_train.py::test_a_run_is_trained_by_one_process_alone",
@@ -21,7 +21,7 @@ CHOSEN = (
 SEEN = """
 import errno, os, shutil, sys, tempfile
 from pathlib import Path
-import endotsr.runs.files as files
+import endotsr.training.runs.files as files
 assert os.name == "posix" and files.os.name == "nt" and files.sys.platform == "win32"
 assert not hasattr(files.os, "O_NOFOLLOW") and hasattr(os, "O_NOFOLLOW")
 folder = Path(tempfile.mkdtemp())

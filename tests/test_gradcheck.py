@@ -2,7 +2,7 @@
 
 import pytest
 
-from endotsr.gradcheck import all_pairs, check_pair, check_precision, one_thread, pair_stream, table
+from endotsr.port.gradcheck import all_pairs, check_pair, check_precision, one_thread, pair_stream, table
 
 PAIRS = all_pairs()
 SEEDS = (0, 1)

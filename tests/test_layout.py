@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+import tomllib
 
 import msgspec
 import pytest
@@ -16,7 +17,16 @@ def test_every_room_is_on_the_list():
 
 
 def test_imports_run_down_only():
+    """Between rooms; import-linter checks the storeys (`lint-imports`, in `pyproject.toml`)."""
     assert house.upward() == []
+
+
+def test_the_storeys_of_import_linter_are_those_of_the_house():
+    contract = tomllib.loads((house.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    layers = [name.removeprefix("endotsr.") for name in contract["contracts"][0]["layers"]]
+    above_definition = [name for name in house.STOREYS if name not in ("errors", "untrusted", "config", "definition")]
+    assert layers[: len(above_definition)] == above_definition[::-1]
+    assert set(layers) == set(house.STOREYS)
 
 
 def test_no_modules_import_one_another():
@@ -32,7 +42,7 @@ def test_the_definition_knows_numpy_alone():
             assert {part.split(".")[0] for node in nodes for part in house.names_of(node)} <= known, name
     assert {house.room(b) for a, b in house.imports() if house.room(a) == "definition"} == {"definition"}
     users = {house.room(a) for a, b in house.imports() if house.room(b) == "definition"}
-    assert users == {"definition", "stages"}, "nothing that is fitted computes with the definition"
+    assert users == {"definition", "port.stages"}, "nothing that is fitted computes with the definition"
 
 
 def test_the_definition_is_short():
@@ -52,16 +62,15 @@ def test_the_definition_starts_without_a_compiler():
 
 
 def test_equations_know_nothing_but_kernels():
-    assert {house.room(b) for a, b in house.imports() if house.room(a) == "equations"} <= {
-        "equations",
-        "kernels",
-        "errors",
-    }
+    used = {house.room(b) for a, b in house.imports() if house.room(a) == "method.equations"}
+    assert used <= {"method.equations", "method.kernels", "errors"}
 
 
 def test_the_trainer_knows_no_file_format():
-    known = {"sequences.sequence", "sequences.splits", "sequences.between", "sequences.smaller"}
-    assert {b for a, b in house.imports() if house.room(a) == "fitting" and house.room(b) == "sequences"} <= known
+    known = {"clips.sequences.sequence", "clips.sequences.splits", "clips.sequences.between", "clips.sequences.smaller"}
+    assert {
+        b for a, b in house.imports() if house.room(a) == "training.fitting" and house.room(b) == "clips.sequences"
+    } <= known
 
 
 def test_rooms_of_the_method_import_no_instrument():
@@ -80,9 +89,9 @@ def test_the_package_imports_nothing_that_is_not_installed():
         assert not {module.split(".")[0] for module in found} & beside, name
 
 
-@pytest.mark.parametrize("name", ["scene", "splatting", "losses", "equations"])
+@pytest.mark.parametrize("name", ["training.scene", "method.splatting", "method.losses", "method.equations"])
 def test_what_is_fitted_does_not_know_the_optimiser(name):
-    assert not [b for a, b in house.imports() if house.room(a) == name and house.room(b) == "fitting"]
+    assert not [b for a, b in house.imports() if house.room(a) == name and house.room(b) == "training.fitting"]
 
 
 def test_data_between_rooms_is_typed():
@@ -113,10 +122,10 @@ def test_settings_and_commands_are_counted():
 def test_an_import_that_runs_up_is_seen(tmp_path):
     package = tmp_path / "reference" / "endotsr"
     for name, text in (
-        ("kernels/jit.py", "from endotsr.scene import gaussians\n"),
-        ("scene/gaussians.py", "import endotsr.kernels.jit\n"),
+        ("method/kernels/jit.py", "from endotsr.training.scene import gaussians\n"),
+        ("training/scene/gaussians.py", "import endotsr.method.kernels.jit\n"),
     ):
         (package / name).parent.mkdir(parents=True)
         (package / name).write_text(text)
-    assert house.upward(tmp_path) == ["kernels.jit -> scene.gaussians"]
-    assert house.circles(tmp_path) == [["kernels.jit", "scene.gaussians"]]
+    assert house.upward(tmp_path) == ["method.kernels.jit -> training.scene.gaussians"]
+    assert house.circles(tmp_path) == [["method.kernels.jit", "training.scene.gaussians"]]

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from endotsr.config import DEMO, PAPER, PRESETS, SHARP, Config, with_iterations
-from endotsr.splatting import settings as raster
+from endotsr.method.splatting import settings as raster
 
 ROOT = Path(__file__).parent.parent
 SPECIFICATION = ROOT / "docs" / "specification"

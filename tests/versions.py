@@ -3,7 +3,7 @@
     python tests/versions.py lowest                                lowest versions that pyproject.toml allows
     python tests/versions.py newest                                newest ones
     python tests/versions.py opencv4                               newest ones, but OpenCV 4
-    python tests/versions.py lowest --python python3.11 --folder /tmp/lowest tests/sequences      what, where, with what
+    python tests/versions.py lowest --python python3.11 --folder /tmp/lowest tests/clips/sequences    what, where
 
 `lowest` takes the last correction of the lowest minor version (`numpy>=2.1` becomes `numpy==2.1.*`). The tests of the
 default list read every kind of file, decode and write films, match stereo pairs, draw figures, and train: they touch
@@ -22,16 +22,16 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 BOUND = re.compile(r"([A-Za-z0-9_.-]+)>=([0-9.]+)")
 TESTS = (
-    "tests/sequences/test_opencv.py",
-    "tests/sequences/test_prepare.py",
-    "tests/sequences/test_stereo_depth.py",
-    "tests/sequences/test_propose_masks.py",
+    "tests/clips/sequences/test_opencv.py",
+    "tests/clips/sequences/test_prepare.py",
+    "tests/clips/sequences/test_stereo_depth.py",
+    "tests/clips/sequences/test_propose_masks.py",
     "tests/cli/test_cli_any_clip.py",
-    "tests/kernels/test_vectors.py",
-    "tests/kernels/test_exponential.py",
-    "tests/fitting/test_adam.py",
-    "tests/report/test_figures.py",
-    "tests/views/test_film.py",
+    "tests/method/kernels/test_vectors.py",
+    "tests/method/kernels/test_exponential.py",
+    "tests/training/fitting/test_adam.py",
+    "tests/results/report/test_figures.py",
+    "tests/results/views/test_film.py",
 )
 OPENCV = "opencv-contrib-python-headless"
 

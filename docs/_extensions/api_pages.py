@@ -16,31 +16,45 @@ API = ROOT / "docs" / "api"
 GROUPS = (
     ("Start here", "Load a sequence, train, render, evaluate, save.", ("package",)),
     (
-        "Recordings and sequences",
-        "From a recording to the arrays that a training reads.",
-        ("sequences", "simulator", "effects", "opencv", "untrusted"),
-    ),
-    ("Training", "The model, its training, and the files of a run.", ("scene", "fitting", "runs", "windows")),
-    ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
-    (
         "The method",
         "Each forward pass has its reverse pass below it; first in plain NumPy, then compiled.",
         ("definition", "equations", "splatting", "losses", "kernels"),
     ),
-    ("Checks and ports", "Gradients, stored numbers, and the registry of both.", ("gradcheck", "golden", "stages")),
-    ("Time and accuracy", "Measurements of this machine, and many runs.", ("bench", "tradeoff", "sweeps")),
+    (
+        "Clips",
+        "From a recording to the arrays that training reads.",
+        ("sequences", "simulator", "effects", "opencv", "untrusted"),
+    ),
+    ("Training", "The model, its training, and the files of a run.", ("scene", "fitting", "runs")),
+    ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
+    (
+        "Ports",
+        "Gradients, stored numbers, and the registry of both.",
+        ("stages", "gradcheck", "judge", "contract", "reference", "search"),
+    ),
+    ("Studies", "Measurements of this machine, and many runs.", ("bench", "tradeoff", "sweeps", "windows")),
     ("Commands", "The program `endotsr`.", ("cli",)),
-)  # in the order of use
+)  # in the order of the storeys
 ROLE = re.compile(r"\{([\w:]+)\}(?=`)")
+
+
+STOREYS = ("method", "clips", "training", "results", "port", "studies")  # doors with rooms behind them
+
+
+def room_of(name: str) -> str:
+    """The room of a dotted module: the part below its storey, or the first part below the package."""
+    parts = name.split(".")[1:]
+    inner = parts[1:] if parts and parts[0] in STOREYS else parts
+    if not inner or (inner == parts and len(parts) == 1 and modules()[name].name != "__init__.py"):
+        return "package"
+    return inner[0]
 
 
 def rooms() -> dict[str, list[str]]:
     """Modules with public definitions, by room of the package."""
     found: dict[str, list[str]] = {}
     for name in dict.fromkeys(dotted.rpartition(".")[0] for dotted in definitions()):
-        parts = name.split(".")
-        room = parts[1] if len(parts) > 2 or modules()[name].name == "__init__.py" else "package"
-        found.setdefault(room, []).append(name)
+        found.setdefault(room_of(name), []).append(name)
     return found
 
 
@@ -55,7 +69,8 @@ def room_page(room: str, names: list[str]) -> str:
 
 def summary(room: str) -> str:
     """The first sentence of the docstring of a room, or of the package for modules without a room."""
-    tree = ast.parse(modules()["endotsr" if room == "package" else f"endotsr.{room}"].read_text(encoding="utf-8"))
+    names = ["endotsr"] if room == "package" else [f"endotsr.{room}", *(f"endotsr.{s}.{room}" for s in STOREYS)]
+    tree = ast.parse(next(modules()[name] for name in names if name in modules()).read_text(encoding="utf-8"))
     first = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
     return re.split(r"(?<=\.)\s", first)[0]
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from package_names import NOTEBOOKS, ROOT, equation_pages, markdown_of, notebooks_of
 
-from endotsr.gradcheck import Pair, all_pairs
+from endotsr.port.gradcheck import Pair, all_pairs
 
 GOLDEN = ROOT / "golden"
 # Displays that are parts of another equation: the blend and the recursion of compositing.
@@ -31,91 +31,91 @@ class Undifferentiated(NamedTuple):
 
 UNDIFFERENTIATED = {
     "7": Undifferentiated(
-        ("endotsr.equations.calibration.calibrate", "endotsr.fitting.objective.calibrate_on"),
+        ("endotsr.method.equations.calibration.calibrate", "endotsr.training.fitting.objective.calibrate_on"),
         "the weight is held fixed",
-        "tests/equations/test_calibration.py",
+        "tests/method/equations/test_calibration.py",
     ),
     "b10": Undifferentiated(
-        ("endotsr.fitting.adam.adam_step", "endotsr.fitting.schedules.learning_rates"),
+        ("endotsr.training.fitting.adam.adam_step", "endotsr.training.fitting.schedules.learning_rates"),
         "a step is not differentiated",
-        "tests/fitting/test_adam.py",
+        "tests/training/fitting/test_adam.py",
     ),
     "b11": Undifferentiated(
-        ("endotsr.scene.density_control.gather_statistics", "endotsr.scene.density_control.densify"),
+        ("endotsr.training.scene.density_control.gather_statistics", "endotsr.training.scene.density_control.densify"),
         "choosing Gaussians is not differentiable",
-        "tests/scene/test_density_control.py",
+        "tests/training/scene/test_density_control.py",
     ),
     "b12": Undifferentiated(
-        ("endotsr.scene.initialisation.initialise",),
+        ("endotsr.training.scene.initialisation.initialise",),
         "it comes before training",
-        "tests/scene/test_initialisation.py",
+        "tests/training/scene/test_initialisation.py",
     ),
     "b14": Undifferentiated(
-        ("endotsr.sequences.between.frame_between", "endotsr.sequences.between.motion_between"),
+        ("endotsr.clips.sequences.between.frame_between", "endotsr.clips.sequences.between.motion_between"),
         "a target is held fixed",
-        "tests/sequences/test_between.py",
+        "tests/clips/sequences/test_between.py",
         "none: dense optical flow is an estimate, and a port may take any",
     ),
     "b15": Undifferentiated(
-        ("endotsr.sequences.tracks.follow", "endotsr.scene.tracked_motion.with_tracked_motion"),
+        ("endotsr.clips.sequences.tracks.follow", "endotsr.training.scene.tracked_motion.with_tracked_motion"),
         "it comes before training",
-        "tests/scene/test_tracked_motion.py",
+        "tests/training/scene/test_tracked_motion.py",
         "none: dense optical flow is an estimate, and a port may take any",
     ),
     "b17": Undifferentiated(
-        ("endotsr.fitting.coarse_start.coarse_ends", "endotsr.sequences.smaller.halved"),
+        ("endotsr.training.fitting.coarse_start.coarse_ends", "endotsr.clips.sequences.smaller.halved"),
         "the choice of the frames is held fixed",
-        "tests/fitting/test_coarse_start.py",
+        "tests/training/fitting/test_coarse_start.py",
         "none: it is an option of training that is not part of the paper",
     ),
     "b18": Undifferentiated(
-        ("endotsr.windows.plan.planned_windows",),
+        ("endotsr.studies.windows.plan.planned_windows",),
         "windows are chosen before training",
-        "tests/windows/test_windows_plan.py",
+        "tests/studies/windows/test_windows_plan.py",
         "none: windows are an option of training that is not part of the paper",
         "none: the guide to recordings shows one",
     ),
     "b18b": Undifferentiated(
-        ("endotsr.windows.scene.blended",),
+        ("endotsr.studies.windows.scene.blended",),
         "it comes after training",
-        "tests/windows/test_scene.py",
+        "tests/studies/windows/test_scene.py",
         "none: windows are an option of training that is not part of the paper",
     ),
     "b18c": Undifferentiated(
-        ("endotsr.windows.carry.carried_state",),
+        ("endotsr.studies.windows.carry.carried_state",),
         "it comes before training",
-        "tests/windows/test_carry.py",
+        "tests/studies/windows/test_carry.py",
         "none: windows are an option of training that is not part of the paper",
     ),
     "b18d": Undifferentiated(
-        ("endotsr.windows.follow.followed",),
+        ("endotsr.studies.windows.follow.followed",),
         "it comes after training",
-        "tests/windows/test_follow.py",
+        "tests/studies/windows/test_follow.py",
         "none: windows are an option of training that is not part of the paper",
         "none: the guide to recordings shows one",
     ),
     "m1": Undifferentiated(
-        ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),
+        ("endotsr.results.evaluation.metrics.psnr", "endotsr.results.evaluation.metrics.psnr_tissue"),
         "a metric is only reported",
-        "tests/evaluation/test_metrics.py",
+        "tests/results/evaluation/test_metrics.py",
         "none: a port is judged by its renders",
     ),
     "m2": Undifferentiated(
-        ("endotsr.evaluation.metrics.ssim_full", "endotsr.evaluation.metrics.ssim_tissue"),
+        ("endotsr.results.evaluation.metrics.ssim_full", "endotsr.results.evaluation.metrics.ssim_tissue"),
         "a metric is only reported",
-        "tests/evaluation/test_metrics.py",
+        "tests/results/evaluation/test_metrics.py",
         "none: it uses the map of (B7), which has cases",
     ),
     "m3": Undifferentiated(
-        ("endotsr.evaluation.lpips.lpips",),
+        ("endotsr.results.evaluation.lpips.lpips",),
         "a metric is only reported",
-        "tests/evaluation/test_lpips.py",
+        "tests/results/evaluation/test_lpips.py",
         "none: it needs a file of weights",
         "none: it needs a file of weights",
     ),
 }
 # Reverse functions whose name does not follow from the forward function's.
-REVERSE_OF = {"endotsr.fitting.objective.image_loss": "endotsr.fitting.objective.image_loss"}
+REVERSE_OF = {"endotsr.training.fitting.objective.image_loss": "endotsr.training.fitting.objective.image_loss"}
 
 
 class Equation(NamedTuple):

@@ -12,9 +12,9 @@ from package_names import PACKAGE, ROOT
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
-from endotsr.golden.judge.store import read_golden
-from endotsr.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
-from endotsr.stages.registry import all_stages
+from endotsr.port.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
+from endotsr.port.judge.store import read_golden
+from endotsr.port.stages.registry import all_stages
 from makers.twins import BOUND, BOUNDS, Distance, all_distances, golden_requests
 
 DOCS = ROOT / "docs"

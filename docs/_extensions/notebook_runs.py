@@ -43,7 +43,7 @@ def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:
     from jupyter_cache.executors import load_executor
 
     from endotsr.config import PAPER
-    from endotsr.fitting.compile_ahead import compile_ahead
+    from endotsr.training.fitting.compile_ahead import compile_ahead
 
     paths = [path for path in (Path(env.doc2path(name)) for name in names) if path.suffix == ".py"]
     if len(paths) < 2 or app.config.nb_execution_mode != "cache":

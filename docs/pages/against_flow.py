@@ -17,11 +17,11 @@ from marks import read_json, write_marked
 from numpy.typing import NDArray
 
 import endotsr
-from endotsr.evaluation.baselines import flow_interpolation, neighbours, unit_image
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.sequences.between import flows_between
-from endotsr.sequences.sequence import Sequence
+from endotsr.clips.sequences.between import flows_between
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.results.evaluation.baselines import flow_interpolation, neighbours, unit_image
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
 
 RESULTS = Path(__file__).parents[1] / "results"
 BRIGHT = 250  # of 255: the largest channel of a highlight, in the frame or in a neighbour

@@ -23,12 +23,12 @@ import numpy as np
 from marks import read_json, write_marked
 
 from endotsr.cli.main import main as endotsr
-from endotsr.opencv import read_png
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
-from endotsr.sequences.common import open_common
-from endotsr.simulator.truth import read_truth
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.common import open_common
+from endotsr.clips.simulator.truth import read_truth
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "any_clip.json", DOCS / "guides" / "prepare.md"

@@ -1,15 +1,14 @@
 """Charts of benchmark results: stacked bars of the stages, and cost against each size.
 
-In: the results of `endotsr.bench.stages` and `bench_scaling`. Out: a picture file, png or svg, in the colours and the
-style of `endotsr.report.style`.
+In: the results of `endotsr.studies.bench.stages` and `bench_scaling`. Out: a picture file, png or svg, in the colours
+and the style of `endotsr.results.report.style`.
 """
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from endotsr.bench.clock import REST, STAGES
-from endotsr.report.style import (
+from endotsr.results.report.style import (
     BLUE,
     GREEN,
     GREY,
@@ -25,6 +24,7 @@ from endotsr.report.style import (
     plain_axes,
     save,
 )
+from endotsr.studies.bench.clock import REST, STAGES
 
 # The stages in five groups, which five colours can distinguish. The tables list every stage.
 GROUPS = {

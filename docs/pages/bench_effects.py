@@ -17,13 +17,13 @@ from unittest import mock
 
 import msgspec
 
-from endotsr.bench.case import BenchCase, representative
 from endotsr.config import PAPER, Config, config_from_dict
-from endotsr.fitting import model, objective
-from endotsr.fitting.fused import step
-from endotsr.report.tables import plain
-from endotsr.scene import workload
-from endotsr.scene.gaussians import arrays
+from endotsr.results.report.tables import plain
+from endotsr.studies.bench.case import BenchCase, representative
+from endotsr.training.fitting import model, objective
+from endotsr.training.fitting.fused import step
+from endotsr.training.scene import workload
+from endotsr.training.scene.gaussians import arrays
 
 
 class Part(NamedTuple):
@@ -101,7 +101,7 @@ def changed(config: Config, part: Part) -> Config:
 
 def _prepared(case: BenchCase, config: Config) -> tuple[Any, Any]:
     """State at a representative iteration of the published schedule, and its constants."""
-    from endotsr.fitting.state import bench_state, training_constants
+    from endotsr.training.fitting.state import bench_state, training_constants
 
     constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in constants.sequence.train_index:
@@ -132,7 +132,7 @@ def _allocated(state: Any, constants: Any, missing: tuple[tuple[Any, str], ...])
 
 def _step(state: Any, constants: Any) -> None:
     """One iteration; the iteration count of the state is restored."""
-    from endotsr.fitting.trainer import training_step
+    from endotsr.training.fitting.trainer import training_step
 
     iteration = state.iteration
     training_step(state, constants)

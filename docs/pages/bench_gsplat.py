@@ -14,10 +14,10 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.kernels.arrays import FloatArray
-from endotsr.splatting.camera import Camera, camera_centre
-from endotsr.splatting.render import Scene
-from endotsr.splatting.settings import RasterSettings
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import Camera, camera_centre
+from endotsr.method.splatting.render import Scene
+from endotsr.method.splatting.settings import RasterSettings
 
 ALPHA_MAX = 0.999  # a constant inside gsplat's Python reference
 JACOBIAN_CLAMP = 1.3  # likewise; measured from the image border, so it equals ours for a centred principal point only
@@ -77,7 +77,7 @@ def render_with_gradients(
 ) -> PeerRender:
     """Colour, depth and the gradients of sum(d_colour * colour) + sum(d_depth * depth), in the dtype of the scene.
 
-    scene, camera, settings, degree, background   as for `endotsr.splatting.render.render_forward`
+    scene, camera, settings, degree, background   as for `endotsr.method.splatting.render.render_forward`
     d_colour (3, H, W), d_depth (H, W)            gradients of a loss with respect to the two images
     Raises: ValueError if gsplat's rules and `settings` differ on this scene, see `difference_of_rules`.
     """

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import bench_peers
 
-from endotsr.bench.clock import REST
 from endotsr.errors import InputError
-from endotsr.report.tables import markdown, memory
+from endotsr.results.report.tables import markdown, memory
+from endotsr.studies.bench.clock import REST
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case of the targets

@@ -14,12 +14,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from endotsr.bench.case import BenchCase, Precision, apart
-from endotsr.bench.clock import repeated, spread
 from endotsr.errors import InputError
-from endotsr.kernels.arrays import FloatArray
-from endotsr.report.tables import plain
-from endotsr.scene import workload
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.results.report.tables import plain
+from endotsr.studies.bench.case import BenchCase, Precision, apart
+from endotsr.studies.bench.clock import repeated, spread
+from endotsr.training.scene import workload
 
 Found = tuple[dict[str, FloatArray], list[float]]
 
@@ -80,8 +80,8 @@ def compare(case: BenchCase) -> dict[str, Any]:
 
 def _view(case: BenchCase) -> tuple[Any, ...]:
     """Scene, camera, settings and the gradients of a loss with respect to colour and depth."""
-    from endotsr.fitting.model import raster_settings
-    from endotsr.splatting.render import Scene
+    from endotsr.method.splatting.render import Scene
+    from endotsr.training.fitting.model import raster_settings
 
     config = case.config()
     made = workload.gaussians(case.gaussians, config)
@@ -93,7 +93,7 @@ def _view(case: BenchCase) -> tuple[Any, ...]:
 
 def _ours(scene: Any, camera: Any, settings: Any, d_colour: FloatArray, d_depth: FloatArray) -> Found:
     """Images and gradients by name, and the seconds of each repeat."""
-    from endotsr.splatting.render import render_forward, render_reverse
+    from endotsr.method.splatting.render import render_forward, render_reverse
 
     found: dict[str, FloatArray] = {}
 

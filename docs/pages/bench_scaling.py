@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from endotsr.bench.case import BenchCase, apart, measure
-from endotsr.bench.clock import REST, SPLAT, STAGES
-from endotsr.bench.stages import Say, line
-from endotsr.report.tables import plain
+from endotsr.results.report.tables import plain
+from endotsr.studies.bench.case import BenchCase, apart, measure
+from endotsr.studies.bench.clock import REST, SPLAT, STAGES
+from endotsr.studies.bench.stages import Say, line
 
 # Stages that grow together, in the order of the legend.
 CURVES: dict[str, tuple[str, ...]] = {

@@ -15,7 +15,7 @@ import time
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.report.tables import plain
+from endotsr.results.report.tables import plain
 
 MOMENTS = ("imported", "sequence made", "initialised", "first iteration", "first iteration with everything")
 
@@ -48,12 +48,12 @@ def fresh_process(cache: str) -> dict[str, float]:
 
 def _first_iterations() -> None:
     """Print each milestone as it is reached; the parent process measures the time."""
-    from endotsr.bench.case import representative
     from endotsr.config import PAPER
-    from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.fitting.state import new_training, training_constants
-    from endotsr.fitting.trainer import training_step
-    from endotsr.scene import workload
+    from endotsr.studies.bench.case import representative
+    from endotsr.training.fitting.compile_ahead import compile_ahead
+    from endotsr.training.fitting.state import new_training, training_constants
+    from endotsr.training.fitting.trainer import training_step
+    from endotsr.training.scene import workload
 
     say = lambda moment: print(json.dumps(moment), flush=True)
     say(MOMENTS[0])

@@ -13,14 +13,14 @@ import bench_peers
 import bench_scaling
 import bench_start
 
-from endotsr.bench import stages
-from endotsr.bench.case import BenchCase, Precision, apart
-from endotsr.bench.stages import Say
 from endotsr.errors import InputError
-from endotsr.export.npz import read_arrays
-from endotsr.kernels.threads import use_threads
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import dated
+from endotsr.method.kernels.threads import use_threads
+from endotsr.results.export.npz import read_arrays
+from endotsr.studies.bench import stages
+from endotsr.studies.bench.case import BenchCase, Precision, apart
+from endotsr.studies.bench.stages import Say
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import dated
 
 RESULTS = Path(__file__).parents[1] / "results"
 FILES = {

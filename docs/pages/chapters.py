@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 from marks import read_json, write_marked
 
 from endotsr.errors import InputError
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS, PAGE = ROOT / "notebooks", ROOT / "notebooks" / "index.md"

@@ -36,9 +36,9 @@ import claims_verdicts
 from marks import read_json, write_marked
 
 from endotsr.errors import InputError
-from endotsr.runs.files import write_json
-from endotsr.sweeps.ablation_page import ablation_record, draw
-from endotsr.sweeps.execute import FINISHED
+from endotsr.studies.sweeps.ablation_page import ablation_record, draw
+from endotsr.studies.sweeps.execute import FINISHED
+from endotsr.training.runs.files import write_json
 
 DOCS = Path(__file__).parents[1]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from claims_verdicts import FULL, NOT_YET
 
-from endotsr.report.tables import markdown
-from endotsr.sweeps.ablation_page import increment_table, level_table
+from endotsr.results.report.tables import markdown
+from endotsr.studies.sweeps.ablation_page import increment_table, level_table
 
 BEGIN_MINUTES = 1.0  # of a worker before its first iteration, kernels not compiled before
 PLANNED_RUNS, PLANNED_CORES = (15, 42), (2, 8, 16, 64)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.sweeps.ablation import COMPARISONS, FIXED
+from endotsr.studies.sweeps.ablation import COMPARISONS, FIXED
 
 POWER, LEVEL = 0.8, 0.05
 FREE, AT_FIXED = "a free number of Gaussians", "a fixed number"

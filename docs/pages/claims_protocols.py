@@ -12,8 +12,8 @@ import numpy as np
 from claims_power import least_size
 from over_seeds import interval
 
-from endotsr.sweeps.ablation import COMPARISONS, FIXED, Contrast, paired
-from endotsr.sweeps.execute import FINISHED
+from endotsr.studies.sweeps.ablation import COMPARISONS, FIXED, Contrast, paired
+from endotsr.studies.sweeps.execute import FINISHED
 
 Record = Any  # content of a file of docs/results
 WHOLE = next(c for c in COMPARISONS if c.claim == "all three")  # the whole method against the base

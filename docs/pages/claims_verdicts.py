@@ -13,9 +13,9 @@ from claims_protocols import LEAST_PAIRS, protocol_rows
 from over_seeds import interval
 from published import PUBLISHED
 
-from endotsr.report.tables import markdown
-from endotsr.sweeps.ablation import COMPARISONS, Contrast
-from endotsr.sweeps.ablation_page import interval_text
+from endotsr.results.report.tables import markdown
+from endotsr.studies.sweeps.ablation import COMPARISONS, Contrast
+from endotsr.studies.sweeps.ablation_page import interval_text
 
 NOT_YET = "Not measured yet."
 HUNDREDTH = 0.01  # dB

@@ -26,9 +26,9 @@ from marks import read_json, write_marked
 
 from endotsr.config import DEMO, PAPER
 from endotsr.errors import InputError
-from endotsr.report.style import save
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import dated, now
+from endotsr.results.report.style import save
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import dated, now
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "effects.md", DOCS / "results"
@@ -106,7 +106,7 @@ def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
 def _clip(name: str, seed: int) -> Any:
     from effects_study import settings_of
 
-    from endotsr.simulator.simulate import simulate
+    from endotsr.clips.simulator.simulate import simulate
 
     return simulate(settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence
 
@@ -115,7 +115,7 @@ def _load_kernels() -> None:
     """A short training, to exclude compilation from the times."""
     from endotsr.api import make_config
     from endotsr.api import train as fit
-    from endotsr.kernels.threads import use_threads
+    from endotsr.method.kernels.threads import use_threads
 
     use_threads(1)
     fit(_clip("everything", 0), make_config("demo", iterations=20, training={"threads": 1}), on_message=print)
@@ -125,8 +125,8 @@ def _pair(sequence: Any, seed: int, iterations: int) -> dict[str, Any]:
     """Both settings on one clip."""
     from endotsr.api import make_config
     from endotsr.api import train as fit
-    from endotsr.effects.auto import planned_settings
-    from endotsr.effects.savings import numbers_of_a_gaussian
+    from endotsr.clips.effects.auto import planned_settings
+    from endotsr.clips.effects.savings import numbers_of_a_gaussian
 
     everything = make_config("demo", iterations=iterations, training={"seed": seed, "threads": 1})
     began = time.process_time()
@@ -146,8 +146,8 @@ def _pair(sequence: Any, seed: int, iterations: int) -> dict[str, Any]:
 
 def real(folders: list[Path]) -> dict[str, Any]:
     """Verdicts and plans on folders; results of other clips are kept."""
-    from endotsr.effects.inspect import inspect_sequence, inspection_record
-    from endotsr.effects.plan import make_plan, plan_record
+    from endotsr.clips.effects.inspect import inspect_sequence, inspection_record
+    from endotsr.clips.effects.plan import make_plan, plan_record
 
     file = RESULTS / FILES["real"]
     found = read_json(file, "docs/pages/effects.py real")["clips"] if file.exists() else {}
@@ -161,7 +161,7 @@ def real(folders: list[Path]) -> dict[str, Any]:
 
 
 def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
-    from endotsr.sequences.endonerf import read_endonerf
+    from endotsr.clips.sequences.endonerf import read_endonerf
 
     return read_endonerf(folder, msgspec.structs.replace(PAPER.sequence, scale=scale), PAPER.raster.near)
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 from effects_study import ANSWERS, UNITS
 from over_seeds import interval
 
-from endotsr.report.style import BLUE, GREEN, INK, SMALL, name_axes, new_figure, plain_axes
-from endotsr.report.tables import markdown
+from endotsr.results.report.style import BLUE, GREEN, INK, SMALL, name_axes, new_figure, plain_axes
+from endotsr.results.report.tables import markdown
 
 ANSWERED = {
     "motion": ("Pixels of tissue move", "time bases (`model.deformation`)", "deformation",

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.opencv import area_resize
-from endotsr.sequences.sequence import Sequence
-from endotsr.sequences.splits import split_frames, time_stamps
-from endotsr.splatting.camera import Camera
+from endotsr.clips.opencv import area_resize
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import split_frames, time_stamps
+from endotsr.method.splatting.camera import Camera
 
 SHRINK = 3  # 1920x1080 to 640x360
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from endotsr.clips.effects.inspect import EFFECTS, Inspection, inspect_sequence
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
+from endotsr.clips.simulator.simulate import SimulatedSequence, simulate
 from endotsr.config import with_settings
-from endotsr.effects.inspect import EFFECTS, Inspection, inspect_sequence
-from endotsr.sequences.sequence import Sequence
-from endotsr.simulator.settings import SimulatorSettings, with_effects
-from endotsr.simulator.simulate import SimulatedSequence, simulate
 
 FIRST_SEED = 200
 FOUND = (*EFFECTS, "periodic motion")

@@ -14,7 +14,7 @@ import numpy as np
 from effects_parts import machine
 from over_seeds import shown
 
-from endotsr.report.tables import markdown
+from endotsr.results.report.tables import markdown
 
 ITERATIONS, FRAMES = 1000, 24
 GREY = 255.0  # grey levels of a display unit
@@ -52,7 +52,7 @@ def simulated_scene(scene: str, seed: int) -> Any:
     """160x128 pixels."""
     from effects_study import settings_of
 
-    from endotsr.simulator.simulate import simulate
+    from endotsr.clips.simulator.simulate import simulate
 
     return simulate(settings_of(SCENES[scene], seed, FRAMES))
 
@@ -62,7 +62,7 @@ def scores(simulated: Any, variant: str, seed: int, iterations: int) -> dict[str
     from endotsr.api import make_config
     from endotsr.api import train as fit
     from endotsr.config import DEMO
-    from endotsr.evaluation.trajectories import trajectory_error
+    from endotsr.results.evaluation.trajectories import trajectory_error
 
     preset, sections = VARIANTS[variant]
     points = {key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")}
@@ -103,10 +103,10 @@ def light_courses(run: Any, simulated: Any) -> tuple[np.ndarray, np.ndarray]:
 
     The residual is the difference of the renders with and without component A, at the pixel of the piece.
     """
-    from endotsr.simulator.folder import tissue_light
-    from endotsr.simulator.frames import make_scene
-    from endotsr.simulator.gain import gain_series, to_display
-    from endotsr.simulator.trajectories import material_at, material_tracks
+    from endotsr.clips.simulator.folder import tissue_light
+    from endotsr.clips.simulator.frames import make_scene
+    from endotsr.clips.simulator.gain import gain_series, to_display
+    from endotsr.clips.simulator.trajectories import material_at, material_tracks
 
     sequence, scene = simulated.sequence, make_scene(simulated.settings)
     height, width = sequence.height, sequence.width

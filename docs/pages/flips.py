@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from marks import write_marked
 
+from endotsr.clips.sequences.checks.check import SAMPLED
+from endotsr.clips.sequences.checks.flips import FLIPS, shading_finding, shading_fit
+from endotsr.clips.sequences.layouts import read_sequence
 from endotsr.config import PAPER
-from endotsr.report.tables import markdown
-from endotsr.sequences.checks.check import SAMPLED
-from endotsr.sequences.checks.flips import FLIPS, shading_finding, shading_fit
-from endotsr.sequences.layouts import read_sequence
+from endotsr.results.report.tables import markdown
 
 PAGE = Path(__file__).parents[1] / "guides" / "prepare.md"
 

@@ -24,12 +24,12 @@ from marks import read_json, write_marked
 from numpy.typing import NDArray
 
 import endotsr
+from endotsr.clips.sequences.between import flows_between
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
-from endotsr.evaluation.baselines import BASELINES, RenderFrame, neighbours, unit_image
-from endotsr.report.style import save
-from endotsr.runs.files import write_json
-from endotsr.sequences.between import flows_between
-from endotsr.sequences.sequence import Sequence
+from endotsr.results.evaluation.baselines import BASELINES, RenderFrame, neighbours, unit_image
+from endotsr.results.report.style import save
+from endotsr.training.runs.files import write_json
 from endotsr.untrusted.writing import replace_file
 
 DOCS = Path(__file__).parents[1]

@@ -7,9 +7,10 @@ import numpy as np
 from full_size_text import LABELS, PREDICTIONS, PRESETS, SPLITS, psnr
 from numpy.typing import NDArray
 
-from endotsr.evaluation.baselines import unit_image
-from endotsr.kernels.arrays import FloatArray
-from endotsr.report.figures import (
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.results.evaluation.baselines import unit_image
+from endotsr.results.report.figures import (
     ERROR_MAP,
     EXCLUDED,
     ByteImage,
@@ -18,8 +19,7 @@ from endotsr.report.figures import (
     tissue_error,
     worst_window,
 )
-from endotsr.report.style import GREY, LIGHT, SMALL, legend, name_axes, new_figure, plain_axes
-from endotsr.sequences.sequence import Sequence
+from endotsr.results.report.style import GREY, LIGHT, SMALL, legend, name_axes, new_figure, plain_axes
 
 WINDOW = 128, 160  # rows and columns of a crop
 BRIGHTEST = 0.06  # error in the brightest colour, display units

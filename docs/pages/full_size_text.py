@@ -9,7 +9,7 @@ import numpy as np
 from against_flow import KINDS
 from numpy.typing import NDArray
 
-from endotsr.report.tables import markdown
+from endotsr.results.report.tables import markdown
 
 RESULTS = Path(__file__).parents[1] / "results"
 PREDICTIONS = ("model", "nearest_frame", "two_neighbours", "flow_interpolation")

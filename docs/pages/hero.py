@@ -13,13 +13,13 @@ from PIL import Image
 
 from endotsr.cli.main import main as endotsr
 from endotsr.errors import InputError
-from endotsr.export.scene import MovingScene, open_scene
-from endotsr.report.figures import ByteImage, bytes_image
-from endotsr.runs.sources import load_run_sequence
+from endotsr.results.export.scene import MovingScene, open_scene
+from endotsr.results.report.figures import ByteImage, bytes_image
+from endotsr.results.views.cameras import fitted, path_cameras, pivot_depth_of
+from endotsr.results.views.panels import GAP
+from endotsr.results.views.preview import encoded
+from endotsr.training.runs.sources import load_run_sequence
 from endotsr.untrusted.writing import replace_file
-from endotsr.views.cameras import fitted, path_cameras, pivot_depth_of
-from endotsr.views.panels import GAP
-from endotsr.views.preview import encoded
 
 HERO = Path(__file__).parents[1] / "results" / "hero.webp"
 WIDTH = 240  # pixels of one of the three pictures

@@ -1,6 +1,6 @@
 """Rates at which the judge names mistakes: the table of docs/guides/port.md, by `python docs/pages/injected.py`.
 
-The counts are those of `python tests/golden/injected/inject.py --json docs/results/injected.json`.
+The counts are those of `python tests/port/injected/inject.py --json docs/results/injected.json`.
 """
 
 from pathlib import Path
@@ -9,11 +9,11 @@ from typing import Any
 from effects_parts import machine
 from marks import read_json, write_marked
 
-from endotsr.report.tables import markdown
+from endotsr.results.report.tables import markdown
 
 DOCS = Path(__file__).parents[1]
 PAGE, FILE = DOCS / "guides" / "port.md", DOCS / "results" / "injected.json"
-MADE_BY = "python tests/golden/injected/inject.py --json docs/results/injected.json"
+MADE_BY = "python tests/port/injected/inject.py --json docs/results/injected.json"
 PORTS = {
     "c99": "in C99",
     "reference": "the reference itself, float32",

@@ -15,7 +15,7 @@ from typing import Any
 
 import endotsr
 from endotsr.errors import InputError
-from endotsr.kernels.machine import usable_cores
+from endotsr.method.kernels.machine import usable_cores
 
 
 def measured(

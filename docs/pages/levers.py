@@ -24,12 +24,12 @@ import numpy as np
 from marks import read_json, write_marked
 from over_seeds import shown
 
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import DEMO
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
-from endotsr.sequences.sequence import Sequence
-from endotsr.sequences.splits import every_eighth
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 SIMULATED: dict[str, dict[str, Any]] = {

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 from marks import write_marked
 
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.checks.cost import estimated_cost
 from endotsr.config import config_from_dict, with_iterations
-from endotsr.opencv import read_png
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
-from endotsr.sequences.checks.cost import estimated_cost
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "long_clip.json", DOCS / "guides" / "prepare.md"

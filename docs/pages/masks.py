@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 from marks import read_json, write_marked
 
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.propose_masks import propose_masks
+from endotsr.clips.sequences.recording import Picture
+from endotsr.clips.simulator.frames import make_scene, simulated_frames
+from endotsr.clips.simulator.scenes import named_scene
 from endotsr.config import with_settings
-from endotsr.kernels.arrays import BoolArray
-from endotsr.opencv import read_png
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.sequences.propose_masks import propose_masks
-from endotsr.sequences.recording import Picture
-from endotsr.simulator.frames import make_scene, simulated_frames
-from endotsr.simulator.scenes import named_scene
+from endotsr.method.kernels.arrays import BoolArray
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "masks.json", DOCS / "guides" / "prepare.md"

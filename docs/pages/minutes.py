@@ -16,10 +16,10 @@ from marks import read_json, write_marked
 from published import PUBLISHED
 
 from endotsr.errors import InputError
-from endotsr.report.style import BLUE, GREY, INK, name_axes, new_figure, plain_axes, save
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.log import log_until
+from endotsr.results.report.style import BLUE, GREY, INK, name_axes, new_figure, plain_axes, save
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.log import log_until
 
 DOCS = Path(__file__).parents[1]
 FILE, PICTURE, PAGE = DOCS / "results" / "minutes.json", DOCS / "results" / "minutes.svg", DOCS / "bench.md"

@@ -22,12 +22,12 @@ import numpy as np
 from any_clip import said
 from marks import read_json, write_marked
 
-from endotsr.opencv import read_png, write_png
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
-from endotsr.sequences.common import open_common
-from endotsr.simulator.truth import read_truth
+from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.common import open_common
+from endotsr.clips.simulator.truth import read_truth
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "one_camera.json", DOCS / "guides" / "prepare.md"
@@ -108,8 +108,8 @@ def _forget_depth(clip: Path) -> None:
 
 def _interpolate(clip: Path) -> None:
     """Planes between the points, as computed by `endotsr prepare` from a reconstruction."""
-    from endotsr.sequences.points import depth_from_points
-    from endotsr.sequences.recording import Pose
+    from endotsr.clips.sequences.points import depth_from_points
+    from endotsr.clips.sequences.recording import Pose
 
     recording = open_common(clip)
     lens = recording.lens

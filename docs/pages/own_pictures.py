@@ -22,12 +22,12 @@ from any_clip import depth_error, said, video_psnr
 from marks import read_json, write_marked
 from over_seeds import shown
 
-from endotsr.opencv import read_png
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
-from endotsr.sequences.common import open_common
-from endotsr.splatting.camera import Camera
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.common import open_common
+from endotsr.method.splatting.camera import Camera
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "own_pictures.json", DOCS / "guides" / "prepare.md"
@@ -47,7 +47,7 @@ INPUT = (("pictures", 1), ("depth_mm", 1), ("coverage", 2))  # the same for ever
 def rectified_pair(clip: Path) -> tuple[Camera, float]:
     """The left camera, and the distance of the cameras in mm that fits the given depth."""
     import endotsr
-    from endotsr.evaluation.right_view import stereo_baseline
+    from endotsr.results.evaluation.right_view import stereo_baseline
 
     sequence = endotsr.load_sequence(clip)
     right = sorted((clip / "images_right").iterdir())

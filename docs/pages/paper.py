@@ -23,7 +23,7 @@ from book_map import Equation, equations  # noqa: E402  # pyright: ignore[report
 from package_names import definitions  # noqa: E402  # pyright: ignore[reportMissingImports]
 
 from endotsr.errors import InputError  # noqa: E402
-from endotsr.report.tables import markdown  # noqa: E402
+from endotsr.results.report.tables import markdown  # noqa: E402
 
 PAGE, CLAIMS, RULINGS = DOCS / "paper.md", DOCS / "claims.md", DOCS / "specification" / "rulings.md"
 RESULTS = DOCS / "results"

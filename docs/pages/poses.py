@@ -22,13 +22,13 @@ import numpy as np
 from marks import read_json, write_marked
 from over_seeds import shown
 
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import DEMO, with_settings
-from endotsr.equations.pose import pose_forward
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
-from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import Camera, backproject, project
+from endotsr.method.equations.pose import pose_forward
+from endotsr.method.splatting.camera import Camera, backproject, project
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "poses.json", DOCS / "guides" / "prepare.md"
@@ -46,7 +46,7 @@ def scene_of(name: str, seed: int) -> Sequence:
     """A simulated scene with its true poses."""
     from effects_study import settings_of
 
-    from endotsr.simulator.simulate import simulate
+    from endotsr.clips.simulator.simulate import simulate
 
     found = settings_of(("noise", *SCENES[name], "camera_motion"), seed, FRAMES, SWING)
     size = {"width": SIZE[0], "height": SIZE[1]}
@@ -89,7 +89,7 @@ def pose_error(cameras: list[Camera], sequence: Sequence) -> float:
 def measured(key: str, runs: dict[str, tuple[str, str, str, int]], clips: dict[str, str]) -> dict[str, float]:
     """Train one run (scene, row of `SETTINGS`, one of `POSES`, seed) and measure it."""
     import endotsr
-    from endotsr.fitting.model import corrected_cameras
+    from endotsr.training.fitting.model import corrected_cameras
 
     scene, label, poses, seed = runs[key]
     given = endotsr.load_sequence(clips[scene]) if scene in clips else scene_of(scene, seed)

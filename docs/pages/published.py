@@ -1,6 +1,6 @@
 """Figures published in the paper, for comparison with measured ones."""
 
-from endotsr.evaluation.records import LabelledMeans
+from endotsr.results.evaluation.records import LabelledMeans
 
 PUBLISHED: dict[str, LabelledMeans] = {
     "pulling": {

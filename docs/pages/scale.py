@@ -3,7 +3,7 @@
     python docs/pages/scale.py      rewrite the part `scale:minutes` of docs/bench.md and docs/results/scale.svg
 
 Nothing is trained. The numbers are the estimates printed by `endotsr check` and at the start of a training
-(`sequences/checks/cost.py`), with the timed trainings of docs/results/minutes.json for comparison.
+(`clips/sequences/checks/cost.py`), with the timed trainings of docs/results/minutes.json for comparison.
 """
 
 import json
@@ -11,11 +11,11 @@ from pathlib import Path
 
 from marks import write_marked
 
+from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
+from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
-from endotsr.report.style import BLUE, GREEN, ORANGE, legend, name_axes, new_figure, plain_axes, save
-from endotsr.report.tables import markdown
-from endotsr.sequences.checks.cost import Cost, estimated_cost
-from endotsr.sequences.splits import every_eighth
+from endotsr.results.report.style import BLUE, GREEN, ORANGE, legend, name_axes, new_figure, plain_axes, save
+from endotsr.results.report.tables import markdown
 
 DOCS = Path(__file__).parents[1]
 PAGE, PICTURE = DOCS / "bench.md", DOCS / "results" / "scale.svg"

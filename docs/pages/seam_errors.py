@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.kernels.arrays import BoolArray, FloatArray
-from endotsr.windows.follow import followed, seam
-from endotsr.windows.scene import WindowedScene
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.studies.windows.follow import followed, seam
+from endotsr.studies.windows.scene import WindowedScene
 
 STEP = 16  # frames over which errors are measured
 EVERY = 3  # pixels between followed points, in rows and columns

@@ -18,10 +18,10 @@ from marks import write_marked
 
 from endotsr.api import Run, open_run
 from endotsr.errors import InputError
-from endotsr.evaluation.metrics import psnr
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import dated
+from endotsr.results.evaluation.metrics import psnr
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import dated
 
 DOCS = Path(__file__).parents[1]
 PAGE, FILE = DOCS / "guides" / "show.md", DOCS / "results" / "show.json"
@@ -66,7 +66,7 @@ def _one(run: Path, words: tuple[str, ...], folder: Path) -> dict[str, float]:
 
 def _in_browser(run: Run, page: Path) -> dict[str, float]:
     """Milliseconds per picture, and PSNR against the reference renderer."""
-    sys.path.insert(0, str(DOCS.parent / "tests" / "views"))
+    sys.path.insert(0, str(DOCS.parent / "tests" / "results" / "views"))
     from browser import drawn
     from frame_rate import milliseconds_a_picture
 

@@ -19,13 +19,13 @@ import numpy as np
 from effects_parts import machine
 from marks import write_marked
 
-from endotsr.opencv import write_png
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import dated
-from endotsr.simulator.folder import write_sequence
-from endotsr.simulator.frames import make_scene, simulated_frames
-from endotsr.simulator.scenes import SCENES, named_scene
+from endotsr.clips.opencv import write_png
+from endotsr.clips.simulator.folder import write_sequence
+from endotsr.clips.simulator.frames import make_scene, simulated_frames
+from endotsr.clips.simulator.scenes import SCENES, named_scene
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import dated
 
 DOCS = Path(__file__).parents[1]
 PAGE, FILE, PICTURE = DOCS / "guides" / "simulate.md", DOCS / "results" / "simulate.json", "simulated_scenes.png"

@@ -19,8 +19,8 @@ from typing import Any
 from any_clip import said
 from marks import read_json, write_marked
 
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "sinus.json", DOCS / "guides" / "prepare.md"

@@ -15,12 +15,12 @@ import numpy as np
 from marks import read_json, write_marked
 
 import endotsr
-from endotsr.evaluation.baselines import neighbours, two_neighbours, unit_image
-from endotsr.opencv import warp_cubic
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.sequences.between import Flows, flows_between, frame_between, motion_between
-from endotsr.sequences.sequence import Sequence
+from endotsr.clips.opencv import warp_cubic
+from endotsr.clips.sequences.between import Flows, flows_between, frame_between, motion_between
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.results.evaluation.baselines import neighbours, two_neighbours, unit_image
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
 
 DOCS = Path(__file__).parents[1]
 PAGE, FILE = DOCS / "specification/b14_between.md", DOCS / "results/targets.json"

@@ -26,10 +26,10 @@ from tradeoff_train import run as run_training
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.tradeoff import RESULT, TradeoffOptions, chosen_scene
 from endotsr.errors import InputError
-from endotsr.kernels.threads import use_threads
-from endotsr.runs.files import write_json
-from endotsr.tradeoff.results import read_result
-from endotsr.tradeoff.study import described
+from endotsr.method.kernels.threads import use_threads
+from endotsr.studies.tradeoff.results import read_result
+from endotsr.studies.tradeoff.study import described
+from endotsr.training.runs.files import write_json
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "tradeoff.md", DOCS / "results"

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import mpmath
 import numpy as np
 
-from endotsr.fitting.model import scene_at
-from endotsr.kernels.arrays import FloatArray, IntArray
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import Scene, render_forward
-from endotsr.splatting.settings import RasterSettings
-from endotsr.tradeoff.scenes import StudyScene, in_precision
-from endotsr.tradeoff.settings import CLOSE
+from endotsr.method.kernels.arrays import FloatArray, IntArray
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import Scene, render_forward
+from endotsr.method.splatting.settings import RasterSettings
+from endotsr.studies.tradeoff.scenes import StudyScene, in_precision
+from endotsr.studies.tradeoff.settings import CLOSE
+from endotsr.training.fitting.model import scene_at
 
 PIXELS = 20
 DIGITS = 30

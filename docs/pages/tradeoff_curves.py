@@ -6,7 +6,7 @@ from typing import Any
 from tradeoff_figures import logarithmic_axes, save_pictures
 from tradeoff_labels import Label, place_labels
 
-from endotsr.report.style import GREY, LIGHT, SMALL, name_axes, new_figure
+from endotsr.results.report.style import GREY, LIGHT, SMALL, name_axes, new_figure
 
 
 def training_figure(result: dict[str, Any]) -> Any:

@@ -1,15 +1,15 @@
 """The dials between exact and fast: their measured values, and omissions with their reasons.
 
-Each dial is varied alone, with accurate values for everything else. `endotsr.tradeoff.settings` has the joint sweep of
-the three most important ones.
+Each dial is varied alone, with accurate values for everything else. `endotsr.studies.tradeoff.settings` has the joint
+sweep of the three most important ones.
 """
 
 from typing import NamedTuple
 
 from tradeoff_kernels import Variant
 
-from endotsr.splatting.settings import RasterSettings
-from endotsr.tradeoff.settings import ACCURATE, CLOSE, CUTOFFS, STOPS, Setting
+from endotsr.method.splatting.settings import RasterSettings
+from endotsr.studies.tradeoff.settings import ACCURATE, CLOSE, CUTOFFS, STOPS, Setting
 
 
 class Dial(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Any
 from tradeoff_labels import Label, place_labels
 from tradeoff_text import small
 
-from endotsr.report.style import (
+from endotsr.results.report.style import (
     BLUE,
     FAINT,
     GREEN,
@@ -22,8 +22,8 @@ from endotsr.report.style import (
     plain_axes,
     save,
 )
-from endotsr.tradeoff.study import cost_of
-from endotsr.tradeoff.text import LEVELS
+from endotsr.studies.tradeoff.study import cost_of
+from endotsr.studies.tradeoff.text import LEVELS
 
 TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
 FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
-from endotsr.kernels.jit import jit, jit_inline
-from endotsr.splatting import compositing
-from endotsr.splatting.fast import blocks as compositing_blocks
+from endotsr.method.kernels.jit import jit, jit_inline
+from endotsr.method.splatting import compositing
+from endotsr.method.splatting.fast import blocks as compositing_blocks
 
 
 class Variant(NamedTuple):

@@ -13,8 +13,8 @@ from tradeoff_text import (
     training_rows,
 )
 
-from endotsr.report.tables import markdown
-from endotsr.tradeoff.text import COLUMNS, front_rows, levels, made
+from endotsr.results.report.tables import markdown
+from endotsr.studies.tradeoff.text import COLUMNS, front_rows, levels, made
 
 TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
 

@@ -11,10 +11,10 @@ import msgspec
 import numpy as np
 
 import endotsr
-from endotsr.evaluation.metrics import psnr_tissue
-from endotsr.fitting.model import render_at
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine
+from endotsr.results.evaluation.metrics import psnr_tissue
+from endotsr.training.fitting.model import render_at
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
 
 FILE = Path(__file__).parents[1] / "results" / "stop.json"
 TRAINED, RENDERED = (1e-3, 1e-2), (1e-2, 1e-3, 1e-6)

@@ -9,9 +9,9 @@ from typing import Any
 from tradeoff_certificate import certify
 from tradeoff_dials import OMITTED, Dial, dials
 
-from endotsr.tradeoff.measure import RenderedFrame, frame, prepare
-from endotsr.tradeoff.scenes import StudyScene
-from endotsr.tradeoff.study import REPEATS, NamedSettings, exact_is_possible, reference_setting, run_study
+from endotsr.studies.tradeoff.measure import RenderedFrame, frame, prepare
+from endotsr.studies.tradeoff.scenes import StudyScene
+from endotsr.studies.tradeoff.study import REPEATS, NamedSettings, exact_is_possible, reference_setting, run_study
 
 SLOW_DIALS = ("support", "exponential", "tile")  # they need the path `definition`
 
@@ -39,7 +39,7 @@ def run_whole_study(
     begin: Callable[[int], None] = lambda steps: None,
     step: Callable[[int], None] = lambda steps: None,
 ) -> dict[str, Any]:
-    """Measure everything; arguments as for `endotsr.tradeoff.study.run_study`."""
+    """Measure everything; arguments as for `endotsr.studies.tradeoff.study.run_study`."""
     plan, aim = WholePlan(scene), reference_setting(scene)
     certificate = certify(scene, frame(prepare(scene, aim))[0].colour, aim.raster)
     result = run_study(scene, repeats=repeats, plan=plan, keep=keep, begin=begin, step=step)

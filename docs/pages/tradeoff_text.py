@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from endotsr.report.tables import duration, plain
-from endotsr.tradeoff.study import Ranked
-from endotsr.tradeoff.text import levels
+from endotsr.results.report.tables import duration, plain
+from endotsr.studies.tradeoff.study import Ranked
+from endotsr.studies.tradeoff.text import levels
 
 # Dominated presets with the reason to keep them. A test fails for a dominated preset without a reason.
 KEPT = {

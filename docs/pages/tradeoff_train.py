@@ -11,13 +11,13 @@ from tradeoff_text import training_lines
 from tradeoff_training import run_training_study
 
 from endotsr.cli.parts.progress import StepBar
+from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.config import PRESETS, config_from_dict
 from endotsr.errors import InputError
-from endotsr.evaluation.lpips import load_lpips_weights
-from endotsr.kernels.threads import use_threads
-from endotsr.runs.files import refuse_folder
-from endotsr.runs.sources import SIMULATED, load_sequence
-from endotsr.simulator.settings import SimulatorSettings
+from endotsr.method.kernels.threads import use_threads
+from endotsr.results.evaluation.lpips import load_lpips_weights
+from endotsr.training.runs.files import refuse_folder
+from endotsr.training.runs.sources import SIMULATED, load_sequence
 
 TRAINING = "training.json"  # in the folder of the measurement
 

@@ -15,19 +15,19 @@ import msgspec
 import numba
 import numpy as np
 
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config, config_from_dict, config_to_toml, with_iterations
 from endotsr.errors import InputError
-from endotsr.evaluation.evaluate import evaluate_frames
-from endotsr.evaluation.lpips import LpipsWeights
-from endotsr.fitting.compile_ahead import rehearse
-from endotsr.fitting.model import render_at, spectral_from, with_corrected_cameras
-from endotsr.fitting.records import LogEntry
-from endotsr.fitting.state import TrainingState, new_training, training_constants
-from endotsr.fitting.trainer import train, training_step
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine, now, versions
-from endotsr.sequences.sequence import Sequence
-from endotsr.tradeoff.results import FORMAT, read_result
+from endotsr.results.evaluation.evaluate import evaluate_frames
+from endotsr.results.evaluation.lpips import LpipsWeights
+from endotsr.studies.tradeoff.results import FORMAT, read_result
+from endotsr.training.fitting.compile_ahead import rehearse
+from endotsr.training.fitting.model import render_at, spectral_from, with_corrected_cameras
+from endotsr.training.fitting.records import LogEntry
+from endotsr.training.fitting.state import TrainingState, new_training, training_constants
+from endotsr.training.fitting.trainer import train, training_step
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine, now, versions
 
 METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
 MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # fractions of the iterations

@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib import colormaps
 
 from endotsr.cli.main import main as endotsr
-from endotsr.opencv import read_png
-from endotsr.opencv.pictures import write_jpeg
-from endotsr.sequences.common import open_common
-from endotsr.sequences.propose_masks import overlay
-from endotsr.sequences.video_file import video_pictures
+from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.sequences.common import open_common
+from endotsr.clips.sequences.propose_masks import overlay
+from endotsr.clips.sequences.video_file import video_pictures
 
 RESULTS = Path(__file__).parents[1] / "results"
 SCENE = ["pulling", "--camera-motion.on", "--width", "240", "--height", "192", "--frames", "10"]

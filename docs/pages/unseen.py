@@ -2,7 +2,7 @@
 
     python docs/pages/unseen.py
 
-The counts are those of `python tests/golden/unseen/by_hand/measure.py --record now`.
+The counts are those of `python tests/port/unseen/by_hand/measure.py --record now`.
 """
 
 from pathlib import Path
@@ -11,12 +11,12 @@ from typing import Any
 from effects_parts import machine
 from marks import read_json, write_marked
 
-from endotsr.report.tables import markdown
+from endotsr.results.report.tables import markdown
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "port.md"
-FILE = ROOT / "tests" / "golden" / "unseen" / "by_hand" / "record.json"
-MADE_BY = "python tests/golden/unseen/by_hand/measure.py --record now"
+FILE = ROOT / "tests" / "port" / "unseen" / "by_hand" / "record.json"
+MADE_BY = "python tests/port/unseen/by_hand/measure.py --record now"
 
 
 def fragments(runs: dict[str, Any]) -> dict[str, str]:

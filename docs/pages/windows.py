@@ -29,15 +29,15 @@ import numpy as np
 from marks import write_marked
 from seam_errors import seam_errors
 
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
-from endotsr.runs.log import log_until
-from endotsr.runs.machine import machine
-from endotsr.simulator.recorded import recorded_positions
-from endotsr.sweeps.execute import execute
-from endotsr.windows.make import WARM, recording_settings, window_job
-from endotsr.windows.record import read_record
-from endotsr.windows.scene import WindowFrames, open_windows
+from endotsr.clips.simulator.recorded import recorded_positions
+from endotsr.results.report.tables import markdown
+from endotsr.studies.sweeps.execute import execute
+from endotsr.studies.windows.make import WARM, recording_settings, window_job
+from endotsr.studies.windows.record import read_record
+from endotsr.studies.windows.scene import WindowFrames, open_windows
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.log import log_until
+from endotsr.training.runs.machine import machine
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "windows.json", DOCS / "guides" / "recording.md"

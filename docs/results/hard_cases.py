@@ -15,9 +15,9 @@ import numpy as np
 from gallery import CASES, DTYPES
 from hard_cases_pictures import PICTURE, drawn, measured
 
-from endotsr.report.style import save
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine, now, versions
+from endotsr.results.report.style import save
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine, now, versions
 
 RECORD = Path(__file__).with_suffix(".json")
 PAGE = Path(__file__).parents[1] / "hard_cases.md"

@@ -11,10 +11,10 @@ import numpy as np
 from gallery.rasteriser import by_division, needle, weight_gradient
 from numpy.typing import NDArray
 
-from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
-from endotsr.report.figures import colour_mapped
-from endotsr.report.style import SMALL, name_axes, new_figure, save
-from endotsr.splatting.projection import footprint
+from endotsr.method.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.method.splatting.projection import footprint
+from endotsr.results.report.figures import colour_mapped
+from endotsr.results.report.style import SMALL, name_axes, new_figure, save
 
 PICTURE = Path(__file__).with_name("hard_cases.png")
 F32 = np.float32

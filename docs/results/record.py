@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from endotsr.report.tables import markdown
-from endotsr.runs.files import write_json
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
 
 sys.path.append(str(Path(__file__).parents[1] / "pages"))
 from published import PUBLISHED

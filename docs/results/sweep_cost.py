@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.cli.sweep import run_spec
-from endotsr.kernels.machine import usable_cores
-from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine, now, versions
-from endotsr.runs.sources import SIMULATED
-from endotsr.sweeps.place import Place
-from endotsr.sweeps.spec import Spec, spec_of
+from endotsr.method.kernels.machine import usable_cores
+from endotsr.studies.sweeps.place import Place
+from endotsr.studies.sweeps.spec import Spec, spec_of
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine, now, versions
+from endotsr.training.runs.sources import SIMULATED
 
 FILE = Path(__file__).with_name("sweep_cost.json")
 RUNS, ITERATIONS = 4, 600

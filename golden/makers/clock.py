@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from endotsr.equations.dictionary import frequencies
+from endotsr.method.equations.dictionary import frequencies
 from makers.making import Made, given
 
 

@@ -7,7 +7,7 @@ the preset legacy, and gradients without division by 1 - alpha.
 
 import numpy as np
 
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
 from makers.making import Seeds, Spec, given
 from makers.screens import flat_covariance, raster_settings, screen_inputs
 from makers.views import PRESETS, logit_of

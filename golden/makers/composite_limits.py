@@ -7,7 +7,7 @@ the other, image and gradient must make the same decision.
 
 import math
 
-from endotsr.splatting.settings import LEGACY, PAPER
+from endotsr.method.splatting.settings import LEGACY, PAPER
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.screens import flat_covariance, raster_settings, screen_inputs
 from makers.views import logit_of

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numba
 
 import endotsr
-from endotsr.stages.stage import Stage
+from endotsr.port.stages.stage import Stage
 
 PACKAGE = Path(endotsr.__file__).parent
 ROOT = "endotsr"
@@ -35,7 +35,7 @@ REGISTRY, CONTRACT = f"{ROOT}.stages.registry", f"{ROOT}.golden.contract"
 class Edit(NamedTuple):
     """A change of the source of one module. The old text must occur exactly `times` times."""
 
-    module: str  # within the package, "losses.masked_l1"
+    module: str  # within the package, "method.losses.masked_l1"
     old: str
     new: str
     times: int = 1

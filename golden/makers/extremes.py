@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, TrainingConfig
-from endotsr.splatting.settings import EXACT
+from endotsr.method.splatting.settings import EXACT
 from makers.making import Seeds, Spec, changed, given, scalar
 from makers.moving import BASES, LENS
 from makers.pose import pose_inputs

@@ -12,9 +12,9 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from endotsr.golden.judge.format import SCHEMAS, FileEntry, FlagNote, Manifest, schema_text, to_json
-from endotsr.golden.judge.npy import header_of, npy_bytes
-from endotsr.kernels.machine import compiled_for
+from endotsr.method.kernels.machine import compiled_for
+from endotsr.port.judge.format import SCHEMAS, FileEntry, FlagNote, Manifest, schema_text, to_json
+from endotsr.port.judge.npy import header_of, npy_bytes
 from makers.solve import Solved
 from makers.wrong import WrongPort
 

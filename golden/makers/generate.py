@@ -9,10 +9,10 @@ import msgspec
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.golden.contract import all_operations
-from endotsr.golden.judge.compare import judged
-from endotsr.golden.judge.format import Case, Manifest, read_struct
-from endotsr.golden.judge.npy import Refused, read_plain
+from endotsr.port.contract import all_operations
+from endotsr.port.judge.compare import judged
+from endotsr.port.judge.format import Case, Manifest, read_struct
+from endotsr.port.judge.npy import Refused, read_plain
 from makers.files import machine_class, rendered_files
 from makers.making import Spec
 from makers.registry import all_specs, all_wrong_ports

@@ -13,13 +13,13 @@ import numpy as np
 
 from endotsr.config import Config
 from endotsr.errors import InputError
-from endotsr.golden.contract import all_operations
-from endotsr.golden.judge.compare import judged
-from endotsr.golden.judge.format import Case
-from endotsr.golden.judge.store import Golden
-from endotsr.golden.reference import reference, stored
-from endotsr.golden.search.requests import with_value
-from endotsr.splatting.settings import PRESETS, RasterSettings
+from endotsr.method.splatting.settings import PRESETS, RasterSettings
+from endotsr.port.contract import all_operations
+from endotsr.port.judge.compare import judged
+from endotsr.port.judge.format import Case
+from endotsr.port.judge.store import Golden
+from endotsr.port.reference import reference, stored
+from endotsr.port.search.requests import with_value
 
 Place = tuple[str, ...]  # keys of the settings of a case, from the outside in
 

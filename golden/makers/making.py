@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.judge.words import fnv1a, words
+from endotsr.port.judge.words import fnv1a, words
 
 
 class Made(NamedTuple):

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from endotsr.stages.requests import raster_dict
+from endotsr.port.stages.requests import raster_dict
 from makers.images import tissue
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import LENS, TIME, model_settings, moving_inputs

@@ -19,8 +19,8 @@ from endotsr.config import (
     RasterConfig,
     TrainingConfig,
 )
-from endotsr.splatting.settings import LEGACY, PAPER, LegacyDeviations, RasterSettings
-from endotsr.stages.requests import raster_dict
+from endotsr.method.splatting.settings import LEGACY, PAPER, LegacyDeviations, RasterSettings
+from endotsr.port.stages.requests import raster_dict
 from makers.initialisation import LENS as SMALL_LENS
 from makers.initialisation import frames
 from makers.making import Made, Seeds, Spec, changed, given

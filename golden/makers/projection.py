@@ -7,7 +7,7 @@ pixels.
 
 import numpy as np
 
-from endotsr.splatting.settings import PAPER
+from endotsr.method.splatting.settings import PAPER
 from makers.making import Seeds, Spec, given
 from makers.views import PRESETS, lens_settings, pose, seen_at, shape_inputs, spread_points
 

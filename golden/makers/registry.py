@@ -11,11 +11,11 @@ import importlib
 from types import ModuleType
 from typing import NamedTuple
 
-from endotsr.scene.gaussians import Gaussians
-from endotsr.stages.compositing import IMAGES
-from endotsr.stages.laplacian import LEVELS
-from endotsr.stages.optimiser import RESIDUAL_RATES, SQUARES, STATE, TERMS
-from endotsr.stages.scene import TWICE
+from endotsr.port.stages.compositing import IMAGES
+from endotsr.port.stages.laplacian import LEVELS
+from endotsr.port.stages.optimiser import RESIDUAL_RATES, SQUARES, STATE, TERMS
+from endotsr.port.stages.scene import TWICE
+from endotsr.training.scene.gaussians import Gaussians
 from makers.making import Spec
 from makers.wrong import WrongPort, wrong_ports
 

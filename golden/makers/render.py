@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from endotsr.splatting.settings import RasterSettings
-from endotsr.stages.requests import raster_dict
+from endotsr.method.splatting.settings import RasterSettings
+from endotsr.port.stages.requests import raster_dict
 from makers.making import Made, Seeds, given, permutation
 from makers.views import preset_of
 

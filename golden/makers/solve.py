@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 from numpy.typing import NDArray
 
-from endotsr.golden.judge.compare import distances, fingerprint, largest, misses
-from endotsr.golden.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Shown, Truth
-from endotsr.golden.judge.words import signs
-from endotsr.golden.reference import reference, stored
-from endotsr.splatting.render import Compositor
-from endotsr.stages.stage import Inputs, Outputs, Stage
+from endotsr.method.splatting.render import Compositor
+from endotsr.port.judge.compare import distances, fingerprint, largest, misses
+from endotsr.port.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Shown, Truth
+from endotsr.port.judge.words import signs
+from endotsr.port.reference import reference, stored
+from endotsr.port.stages.stage import Inputs, Outputs, Stage
 from makers.making import Spec
 from makers.registry import JUDGED, Judged
 from makers.wrong import Wrong

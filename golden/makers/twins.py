@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.judge.compare import largest
-from endotsr.golden.judge.store import Golden
-from endotsr.gradcheck.registry import one_thread, pair_stream
-from endotsr.stages.definition import definition_stages
-from endotsr.stages.registry import all_stages
-from endotsr.stages.stage import Inputs, Settings, Stage
+from endotsr.port.gradcheck.registry import one_thread, pair_stream
+from endotsr.port.judge.compare import largest
+from endotsr.port.judge.store import Golden
+from endotsr.port.stages.definition import definition_stages
+from endotsr.port.stages.registry import all_stages
+from endotsr.port.stages.stage import Inputs, Settings, Stage
 from makers.registry import JUDGED, Judged
 
 SEEDS = (0, 1, 2)

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.splatting.covariance import covariance_forward
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
-from endotsr.stages.requests import raster_dict
+from endotsr.method.splatting.covariance import covariance_forward
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
+from endotsr.port.stages.requests import raster_dict
 from makers.making import Made, Seeds, changed, given, permutation, single
 
 PRESETS = {"exact": EXACT, "paper": PAPER, "legacy": LEGACY}

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from endotsr.golden.judge.npy import write_npy
-from endotsr.golden.judge.store import Golden, in_precision
-from endotsr.golden.reference import stored
-from endotsr.stages.stage import Inputs, Outputs
+from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.store import Golden, in_precision
+from endotsr.port.reference import stored
+from endotsr.port.stages.stage import Inputs, Outputs
 from makers.copies import Edit, changed_copy, without_compiler
 
 

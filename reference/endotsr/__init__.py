@@ -3,14 +3,18 @@
 Ten lines of Python load a sequence, train on it and render: see `endotsr.api`. The names in `__all__` are stable.
 Importing this package imports nothing heavy; a name is imported when it is first used.
 
-The rooms of the package follow the order of the paper:
+The storeys of the package, from the ground up. Each imports only what stands above it in this list:
 
-    equations              the paper, one equation per module
-    splatting, losses      the rasteriser and the base losses
-    scene, fitting         the Gaussians, and their training
-    sequences, simulator   input: folders, or simulated sequences with known truth
-    evaluation             metrics and baselines
-    untrusted              what every file of another person passes before it is read
+    errors, untrusted   refusals, and what every file of another person passes before it is read
+    config              the settings and their presets
+    definition          the method as text: plain NumPy, one file per equation
+    method              the same functions compiled: kernels, equations, losses, splatting
+    clips               input: sequences, the simulator, tests for effects
+    training            the Gaussians, one iteration, schedules, run folders
+    results             metrics, reports, views, files for other programs
+    port                gradient checks, golden cases and their judge
+    studies             benchmarks, sweeps, windows of long recordings
+    api, cli            the Python interface, and the commands
 
 Every forward pass `<stage>_forward` has its manual reverse pass `<stage>_reverse` directly below it.
 """
@@ -20,11 +24,11 @@ if TYPE_CHECKING:
     from typing import Any
 
     from endotsr.api import LoadedSequence, Run, StopTraining, inspect, load_sequence, make_config, open_run, train
+    from endotsr.clips.sequences.sequence import Sequence
     from endotsr.config import Config
     from endotsr.errors import CalibrationError, InputError
-    from endotsr.sequences.sequence import Sequence
-    from endotsr.splatting.camera import Camera
-    from endotsr.splatting.render import RenderOut
+    from endotsr.method.splatting.camera import Camera
+    from endotsr.method.splatting.render import RenderOut
 
 __version__ = "0.1.0"
 
@@ -48,13 +52,13 @@ __all__ = [
 
 _MODULES = {
     "CalibrationError": "endotsr.errors",
-    "Camera": "endotsr.splatting.camera",
+    "Camera": "endotsr.method.splatting.camera",
     "Config": "endotsr.config",
     "InputError": "endotsr.errors",
     "LoadedSequence": "endotsr.api",
-    "RenderOut": "endotsr.splatting.render",
+    "RenderOut": "endotsr.method.splatting.render",
     "Run": "endotsr.api",
-    "Sequence": "endotsr.sequences.sequence",
+    "Sequence": "endotsr.clips.sequences.sequence",
     "StopTraining": "endotsr.api",
     "inspect": "endotsr.api",
     "load_sequence": "endotsr.api",

@@ -25,6 +25,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
+from endotsr.clips.sequences.record import SequenceRecord, record_of
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.config import (
     PAPER,
     Config,
@@ -37,25 +40,22 @@ from endotsr.config import (
     with_iterations,
 )
 from endotsr.errors import InputError
-from endotsr.fitting.records import LogEntry
-from endotsr.runs import folder as run_folders
-from endotsr.runs import sources
-from endotsr.runs.log import RunLog, log_until
-from endotsr.runs.machine import now, peak_memory_bytes
-from endotsr.runs.model import Model, load_model, load_training, save_training
-from endotsr.runs.records import ResumedEntry, RunRecord
-from endotsr.sequences.record import SequenceRecord, record_of
-from endotsr.sequences.sequence import Sequence
-from endotsr.simulator.settings import SimulatorSettings
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import RenderOut
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import RenderOut
+from endotsr.training.fitting.records import LogEntry
+from endotsr.training.runs import folder as run_folders
+from endotsr.training.runs import sources
+from endotsr.training.runs.log import RunLog, log_until
+from endotsr.training.runs.machine import now, peak_memory_bytes
+from endotsr.training.runs.model import Model, load_model, load_training, save_training
+from endotsr.training.runs.records import ResumedEntry, RunRecord
 from endotsr.untrusted.toml import read_toml
 
 if TYPE_CHECKING:
-    from endotsr.evaluation.records import EvaluationRecord
-    from endotsr.export.scene import MovingScene
-    from endotsr.fitting.state import TrainingState
-    from endotsr.windows.run import WindowedRun
+    from endotsr.results.evaluation.records import EvaluationRecord
+    from endotsr.results.export.scene import MovingScene
+    from endotsr.studies.windows.run import WindowedRun
+    from endotsr.training.fitting.state import TrainingState
 
 Component = Literal["appearance", "spectral_motion"]
 OnIteration = Callable[[LogEntry], object]
@@ -158,8 +158,8 @@ def train(
     Raises: InputError for invalid settings or an unusable sequence; FloatingPointError naming iteration, frame and
             terms if the loss is not finite; CalibrationError if equation (7) has no solution.
     """
-    from endotsr.fitting.state import new_training
-    from endotsr.kernels.threads import use_threads
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.training.fitting.state import new_training
 
     if not isinstance(sequence, Sequence):
         raise InputError(f"train: sequence is {type(sequence).__name__}; allowed: a Sequence, as from load_sequence")
@@ -191,7 +191,7 @@ def _called_for(
         raise InputError(f"train: effects = {effects!r} is not allowed; allowed: everything, auto")
     if effects == "everything":
         return config, {}
-    from endotsr.effects.auto import planned_settings
+    from endotsr.clips.effects.auto import planned_settings
 
     explicit = frozenset(f"{section}.{key}" for section, values in sections.items() for key in values)
     config, lines, effects_found = planned_settings(sequence, config, explicit)
@@ -211,8 +211,8 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
 
     Raises: InputError for a frame rate that is not positive and finite.
     """
-    from endotsr.effects.inspect import inspect_sequence, inspection_record
-    from endotsr.effects.plan import make_plan, plan_record
+    from endotsr.clips.effects.inspect import inspect_sequence, inspection_record
+    from endotsr.clips.effects.plan import make_plan, plan_record
 
     found = inspect_sequence(sequence, frame_rate)
     return inspection_record(found) | {"plan": plan_record(make_plan(found, PAPER if config is None else config))}
@@ -227,8 +227,8 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | Win
 
     Raises: InputError without a run or checkpoint, or if a file is damaged or has other settings.
     """
-    from endotsr.windows.record import is_windowed
-    from endotsr.windows.run import WindowedRun
+    from endotsr.studies.windows.record import is_windowed
+    from endotsr.studies.windows.run import WindowedRun
 
     if is_windowed(Path(path)):
         return WindowedRun(Path(path), None if sequence is None else str(sequence))
@@ -305,9 +305,9 @@ class Run:
 
         Raises: InputError for an invalid name, rate, count or camera.
         """
-        from endotsr.export.times import Times
-        from endotsr.views import film, pictures
-        from endotsr.views.plan import ViewRequest
+        from endotsr.results.export.times import Times
+        from endotsr.results.views import film, pictures
+        from endotsr.results.views.plan import ViewRequest
 
         path, look, scene = Path(path), pictures.Look(), self._scene()
         pictures.check_outputs(None, path, rate, slow)
@@ -321,7 +321,7 @@ class Run:
 
         Raises: InputError if `path` is no .html name.
         """
-        from endotsr.views.page import KEYS, check_page, write_page
+        from endotsr.results.views.page import KEYS, check_page, write_page
 
         path = Path(path)
         check_page(path, KEYS)
@@ -336,8 +336,8 @@ class Run:
 
         Raises: InputError for an invalid name or time.
         """
-        from endotsr.export.files import GAUSSIANS, export
-        from endotsr.export.times import Times
+        from endotsr.results.export.files import GAUSSIANS, export
+        from endotsr.results.export.times import Times
 
         return export(self._scene(), Path(path), Times(tuple(times)), GAUSSIANS)
 
@@ -350,8 +350,8 @@ class Run:
 
         Raises: InputError if the sequence or the weights cannot be used.
         """
-        from endotsr.evaluation.lpips import load_lpips_weights
-        from endotsr.evaluation.run import measure_model
+        from endotsr.results.evaluation.lpips import load_lpips_weights
+        from endotsr.results.evaluation.run import measure_model
 
         weights = load_lpips_weights(lpips)
         sequence, about = self.sequence, self.record.get("input", {})
@@ -366,9 +366,9 @@ class Run:
 
         The result is bitwise equal to an uninterrupted training. Callbacks and errors as in `train`.
         """
-        from endotsr.fitting.compile_ahead import compile_ahead
-        from endotsr.fitting.trainer import train as train_to_the_end
-        from endotsr.kernels.threads import use_threads
+        from endotsr.method.kernels.threads import use_threads
+        from endotsr.training.fitting.compile_ahead import compile_ahead
+        from endotsr.training.fitting.trainer import train as train_to_the_end
 
         state, sequence = self._training(), self.sequence
         threads = use_threads(self.config.training.threads)
@@ -424,7 +424,7 @@ class Run:
 
     def _scene(self) -> "MovingScene":
         """The scene for renders, films and exports."""
-        from endotsr.export.scene import MovingScene
+        from endotsr.results.export.scene import MovingScene
 
         return MovingScene(self.sequence_record, self.model)
 
@@ -448,7 +448,7 @@ class Run:
 
 def _model_of(state: "TrainingState", config: Config, record: SequenceRecord) -> Model:
     """The model of a training state; `record` belongs to the sequence."""
-    from endotsr.fitting.model import spectral_from
+    from endotsr.training.fitting.model import spectral_from
 
     spectral = spectral_from(config.model, record.train_times)
     return Model(state.gaussians, spectral, config, state.iteration, state.frames)

@@ -19,7 +19,7 @@ def threads_as_before():
 
 @pytest.fixture(autouse=True)
 def checkpoints_by_iterations(monkeypatch):
-    monkeypatch.setattr("endotsr.runs.training.seconds_between", lambda *_: float("inf"))
+    monkeypatch.setattr("endotsr.training.runs.training.seconds_between", lambda *_: float("inf"))
 
 
 @pytest.fixture(scope="session")

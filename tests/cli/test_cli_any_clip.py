@@ -5,11 +5,11 @@ import pytest
 from tiny import SETTINGS, assert_refused
 
 from endotsr.cli.main import main
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.common import open_common
+from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.simulator.truth import read_truth
 from endotsr.config import SequenceConfig
-from endotsr.opencv import read_png
-from endotsr.sequences.common import open_common
-from endotsr.sequences.endonerf import read_endonerf
-from endotsr.simulator.truth import read_truth
 from film_reader import read_video
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ from tiny import assert_refused, assert_same_run, log_without_seconds
 
 from endotsr.cli.main import main
 from endotsr.config import load_config
-from endotsr.fitting.schedules import learning_rates
+from endotsr.training.fitting.schedules import learning_rates
 
 
 def extended(finished_run, out, *more):

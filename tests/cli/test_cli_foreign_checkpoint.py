@@ -87,7 +87,7 @@ def test_the_checkpoint_of_another_run_is_refused(run, tmp_path, capsys):
 
 
 def test_a_checkpoint_from_before_the_residuals_is_of_the_run(run, tmp_path, monkeypatch):
-    from endotsr.fitting import state as training_state
+    from endotsr.training.fitting import state as training_state
 
     early = tmp_path / "early"
     save = training_state.save_state

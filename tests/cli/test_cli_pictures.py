@@ -8,11 +8,11 @@ import pytest
 from tiny import assert_refused, written_folder
 
 from endotsr.cli.main import main
+from endotsr.clips.sequences.endonerf import read_endonerf
 from endotsr.config import SequenceConfig
-from endotsr.evaluation.baselines import flow_interpolation
-from endotsr.runs.folder import open_run
-from endotsr.runs.sources import load_run_sequence
-from endotsr.sequences.endonerf import read_endonerf
+from endotsr.results.evaluation.baselines import flow_interpolation
+from endotsr.training.runs.folder import open_run
+from endotsr.training.runs.sources import load_run_sequence
 
 
 @pytest.fixture(scope="module")

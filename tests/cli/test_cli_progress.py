@@ -8,8 +8,8 @@ import pytest
 
 from endotsr.cli.parts import progress
 from endotsr.cli.parts.progress import Progress, unit_seconds
+from endotsr.clips.sequences.checks.cost import iteration_work
 from endotsr.config import PRESETS
-from endotsr.sequences.checks.cost import iteration_work
 
 
 class Clock:

@@ -8,7 +8,7 @@ import pytest
 from tiny import assert_refused
 
 from endotsr.cli.main import main
-from endotsr.opencv import read_png
+from endotsr.clips.opencv import read_png
 from film_reader import read_video
 
 

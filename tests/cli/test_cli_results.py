@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from tiny import SETTINGS, assert_refused
 
-from endotsr.bench.clock import REST, STAGES
 from endotsr.cli.main import main
-from endotsr.kernels.threads import use_threads
-from endotsr.opencv import read_png
-from endotsr.report.run_text import held_out_table
-from endotsr.runs.files import os_error_line, write_json
-from endotsr.views.pictures import depth_bytes, depth_step
+from endotsr.clips.opencv import read_png
+from endotsr.method.kernels.threads import use_threads
+from endotsr.results.report.run_text import held_out_table
+from endotsr.results.views.pictures import depth_bytes, depth_step
+from endotsr.studies.bench.clock import REST, STAGES
+from endotsr.training.runs.files import os_error_line, write_json
 
 CALIBRATE = ("train", "--calibrate-only", "--out")
 
@@ -216,7 +216,7 @@ def test_calibrate_refuses_options_of_a_training(words, finished_run, tmp_path, 
 
 def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
     from endotsr.errors import CalibrationError
-    from endotsr.fitting import objective
+    from endotsr.training.fitting import objective
 
     def no_answer(*_):
         raise CalibrationError("calibration: none of the 2 views is valid\nview a\nview b")

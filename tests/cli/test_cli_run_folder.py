@@ -11,16 +11,16 @@ import pytest
 from tiny import assert_refused
 
 from endotsr.cli.main import main
+from endotsr.clips.sequences.record import SequenceRecord, read_sequence_record, record_of, recorded
+from endotsr.clips.simulator.sections import CameraMotion
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER
 from endotsr.errors import InputError
-from endotsr.runs import files, machine
-from endotsr.runs import folder as runs
-from endotsr.runs.log import RunLog
-from endotsr.sequences.record import SequenceRecord, read_sequence_record, record_of, recorded
-from endotsr.simulator.sections import CameraMotion
-from endotsr.simulator.settings import SimulatorSettings
-from endotsr.simulator.simulate import simulate
-from endotsr.splatting.camera import Camera
+from endotsr.method.splatting.camera import Camera
+from endotsr.training.runs import files, machine
+from endotsr.training.runs import folder as runs
+from endotsr.training.runs.log import RunLog
 from endotsr.untrusted.writing import replace_file
 
 ONE_FRAME = SequenceRecord(

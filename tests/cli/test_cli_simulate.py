@@ -6,9 +6,9 @@ import pytest
 from tiny import SETTINGS, assert_refused
 
 from endotsr.cli.main import main
+from endotsr.clips.simulator.scenes import IN_FILES
+from endotsr.clips.simulator.truth import read_truth
 from endotsr.errors import InputError
-from endotsr.simulator.scenes import IN_FILES
-from endotsr.simulator.truth import read_truth
 
 SMALL = ["--width", "40", "--height", "32", "--frames", "4", "--focal", "1.5"]
 
@@ -72,7 +72,7 @@ def test_a_failure_while_writing_leaves_nothing(tmp_path, capsys, monkeypatch):
         if i == 2:
             raise InputError("simulator: at t = 0.5 the sheet folds over itself")
 
-    monkeypatch.setattr("endotsr.simulator.folder.write_frame", fails)
+    monkeypatch.setattr("endotsr.clips.simulator.folder.write_frame", fails)
     assert_refused(capsys, ["simulate", "still", "--out", str(tmp_path / "out"), *SMALL], "simulator: at t = 0.5")
     assert list(tmp_path.iterdir()) == []
 

@@ -19,11 +19,11 @@ from tiny import assert_refused, assert_same_run, log_without_seconds, run_line,
 from endotsr.cli.main import main
 from endotsr.cli.parts import progress
 from endotsr.config import load_config
-from endotsr.fitting import state as training_state
-from endotsr.fitting import trainer
-from endotsr.fitting.checkpoint import load_checkpoint
-from endotsr.runs import stopping, training
-from endotsr.runs.folder import RunFolder
+from endotsr.training.fitting import state as training_state
+from endotsr.training.fitting import trainer
+from endotsr.training.fitting.checkpoint import load_checkpoint
+from endotsr.training.runs import stopping, training
+from endotsr.training.runs.folder import RunFolder
 
 LAST = 30
 EVERY = 7

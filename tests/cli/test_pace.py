@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from endotsr.cli.parts.options import base_settings
+from endotsr.clips.sequences.checks.cost import at_start, work_left
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PRESETS, QUICK, lengthened, with_settings
 from endotsr.errors import InputError
-from endotsr.fitting.state import new_training
-from endotsr.runs import pace
-from endotsr.runs.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
-from endotsr.sequences.checks.cost import at_start, work_left
-from endotsr.simulator.settings import SimulatorSettings
-from endotsr.simulator.simulate import simulate
+from endotsr.training.fitting.state import new_training
+from endotsr.training.runs import pace
+from endotsr.training.runs.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
 
 SHARP = PRESETS["sharp"]
 

@@ -15,9 +15,9 @@ from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions, of_length
 from endotsr.config import SHARP, Config, config_to_toml, lengthened, load_config, with_iterations
-from endotsr.runs.folder import open_run
-from endotsr.sweeps.jobs import jobs_of
-from endotsr.sweeps.spec import read_spec, spec_of
+from endotsr.studies.sweeps.jobs import jobs_of
+from endotsr.studies.sweeps.spec import read_spec, spec_of
+from endotsr.training.runs.folder import open_run
 
 GIVEN = (2999, 3000, 3001, 3960)
 FRAMES = (20, 42, 55, 100)

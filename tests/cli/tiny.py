@@ -14,10 +14,10 @@ import numpy as np
 
 from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
-from endotsr.simulator.folder import write_sequence
-from endotsr.simulator.scenes import IN_FILES, effects_on
-from endotsr.simulator.settings import SimulatorSettings, with_effects
-from endotsr.simulator.simulate import simulate
+from endotsr.clips.simulator.folder import write_sequence
+from endotsr.clips.simulator.scenes import IN_FILES, effects_on
+from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
+from endotsr.clips.simulator.simulate import simulate
 
 SETTINGS = [
     *("--iterations", "30"),

@@ -16,10 +16,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from endotsr.golden.judge.compare import judged
-from endotsr.golden.judge.format import Case
-from endotsr.golden.judge.store import Golden, golden_folder, read_golden
-from endotsr.stages.definition import definition_stages, twins
+from endotsr.port.judge.compare import judged
+from endotsr.port.judge.format import Case
+from endotsr.port.judge.store import Golden, golden_folder, read_golden
+from endotsr.port.stages.definition import definition_stages, twins
 from notebook_signs import flipped, signs_of
 
 FOLDER = Path(inspect.getfile(importlib.import_module("endotsr.definition"))).parent
@@ -33,7 +33,7 @@ NOTICED_BY_NOBODY = {
     "centres = np.array([-camera": "the extent is made of distances, which keep no sign",
     "return np.sort(squared": "the cases have one point or many; test_training.py compares two and three",
     "if k > first and count > 150": "the first frame of the cases is 0; test_training.py has another",
-    "matrix[row, k if": "both axes change sign; tests/equations/test_laplacian.py compares the matrix with SciPy",
+    "matrix[row, k if": "both axes change sign; test_laplacian.py compares the matrix with SciPy",
     "return np.unique(np.round": "the cases have few frames; test_training.py compares the positions",
 }
 

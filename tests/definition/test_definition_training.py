@@ -6,6 +6,8 @@ import sys
 import numpy as np
 import pytest
 
+from endotsr.clips.opencv import canny_edges
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import (
     Config,
     DensityConfig,
@@ -24,17 +26,15 @@ from endotsr.definition.initialisation import initialise as initialise_by_defini
 from endotsr.definition.scene import spectral_from
 from endotsr.definition.settings import PAPER, PAPER_CONFIG, SMALL
 from endotsr.definition.simulate import simulate
-from endotsr.equations.calibration import calibration_views
-from endotsr.fitting import schedules
-from endotsr.fitting.adam import rate_parts
-from endotsr.fitting.state import fresh_state, training_constants
-from endotsr.fitting.trainer import training_step
-from endotsr.opencv import canny_edges
-from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.scene.initialisation import initialise, squared_neighbour_distance, training_points
-from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.settings import PAPER as FAST_PAPER
+from endotsr.method.equations.calibration import calibration_views
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.settings import PAPER as FAST_PAPER
+from endotsr.training.fitting import schedules
+from endotsr.training.fitting.adam import rate_parts
+from endotsr.training.fitting.state import fresh_state, training_constants
+from endotsr.training.fitting.trainer import training_step
+from endotsr.training.scene.gaussians import Gaussians, arrays
+from endotsr.training.scene.initialisation import initialise, squared_neighbour_distance, training_points
 from makers.twins import scaled
 
 STEPS = 50

@@ -8,7 +8,7 @@ import pytest
 import house
 from definition import signs
 from endotsr.definition import compositing, laplacian, masked_ssim, pose
-from endotsr.gradcheck import check_pair, definition_pairs, one_thread, pair_stream, table
+from endotsr.port.gradcheck import check_pair, definition_pairs, one_thread, pair_stream, table
 from oracle.complex_step import derivative
 
 pytestmark = pytest.mark.slow

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.stages.definition import definition_stages
-from endotsr.stages.registry import all_stages
+from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.stages.definition import definition_stages
+from endotsr.port.stages.registry import all_stages
 from makers.registry import JUDGED
 from makers.twins import BOUNDS, distances, golden_requests, made_up, scaled
 

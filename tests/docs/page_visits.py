@@ -15,7 +15,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, NamedTuple
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "views"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "results" / "views"))
 from browser import FLAGS, found_browser
 
 LEFT_OUT = ("_static", "_modules", "_sources")  # folders of a book that hold no pages of its own

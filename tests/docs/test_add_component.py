@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import endotsr.definition
-import endotsr.losses  # noqa: F401
-from endotsr.gradcheck import check_pair, check_precision, one_thread, pair_of, pair_stream
-from endotsr.stages.definition import twin_of
+import endotsr.method.losses  # noqa: F401
+from endotsr.port.gradcheck import check_pair, check_precision, one_thread, pair_of, pair_stream
+from endotsr.port.stages.definition import twin_of
 from makers.twins import distances, made_up
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add_component.md"
-SQUARED, DEFINITION = "reference/endotsr/losses/squared.py", "reference/endotsr/definition/squared.py"
-STAGES, JUDGED = "reference/endotsr/stages/losses.py", "golden/makers/registry.py"
+SQUARED, DEFINITION = "reference/endotsr/method/losses/squared.py", "reference/endotsr/definition/squared.py"
+STAGES, JUDGED = "reference/endotsr/port/stages/losses.py", "golden/makers/registry.py"
 BLOCKS = re.findall(r"^```python\n# (\S+)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 

@@ -3,12 +3,12 @@
 import json
 import re
 
+import bench
 import bench_start
 import pytest
 from bench_parts import MAIN
 from marks import replaced
 
-import bench
 from endotsr.errors import InputError
 
 MARKED = re.compile(r"<!-- bench:(\w+):start -->")

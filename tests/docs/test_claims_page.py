@@ -16,7 +16,7 @@ from scipy import stats
 
 from endotsr.cli.ablate import AblateOptions
 from endotsr.cli.parts.fields import fields_of
-from endotsr.sweeps.ablation_page import ablation_record
+from endotsr.studies.sweeps.ablation_page import ablation_record
 
 
 @pytest.mark.parametrize("page", [claims.PAGE, claims.GUIDE], ids=lambda page: page.name)

@@ -5,8 +5,8 @@ import pytest
 pytest.importorskip("sphinx", reason="Sphinx, which builds the book, is not installed (pip install '.[docs]')")
 from docstring_layout import INLINE, NOTE, blocks, grouped  # pyright: ignore[reportMissingImports]
 
-from endotsr.equations.matern import matern_weights
-from endotsr.evaluation.metrics import psnr
+from endotsr.method.equations.matern import matern_weights
+from endotsr.results.evaluation.metrics import psnr
 
 TEXT = """Summary of it, first line
 and second.

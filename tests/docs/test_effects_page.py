@@ -3,6 +3,7 @@
 import math
 import re
 
+import effects
 import effects_parts
 import effects_study
 import pytest
@@ -10,9 +11,8 @@ from effects_parts import ANSWERED
 from marks import replaced
 from over_seeds import interval, shown
 
-import effects
-from endotsr.effects.inspect import EFFECTS
-from endotsr.effects.savings import MEASURED
+from endotsr.clips.effects.inspect import EFFECTS
+from endotsr.clips.effects.savings import MEASURED
 from endotsr.errors import InputError
 
 MARKED = re.compile(r"<!-- effects:(\w+):start -->")

@@ -5,7 +5,7 @@ import pytest
 from effects_truth import SCENES, VARIANTS, depth_error, light_courses, light_scores, table
 
 from endotsr.api import train
-from endotsr.simulator import SimulatorSettings, simulate, with_effects
+from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 
 TINY = {
     "training": {"iterations": 12, "residual_activation": 2, "threads": 1},

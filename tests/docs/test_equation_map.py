@@ -6,7 +6,7 @@ import pytest
 from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_derivation, names_of_tests  # pyright: ignore[reportMissingImports]
 from package_names import DEFINITION, NOTEBOOKS, ROOT, definitions, equation_pages, linkable  # pyright: ignore[reportMissingImports]
 
-from endotsr.gradcheck import all_pairs
+from endotsr.port.gradcheck import all_pairs
 
 PAPER = ["1", "1b", *"234567"]
 ROWS = {row.label: row for row in equations()}
@@ -67,6 +67,6 @@ def test_a_golden_case_of_an_equation_stands_in_the_map():
 
 
 def test_short_names_are_linked_only_where_they_are_unique():
-    assert linkable()["matern_weights"] == "endotsr.equations.matern.matern_weights"
+    assert linkable()["matern_weights"] == "endotsr.method.equations.matern.matern_weights"
     short = [dotted.rpartition(".")[2] for dotted in definitions() if not dotted.startswith(DEFINITION)]
     assert all(name not in linkable() for name in short if short.count(name) > 1)

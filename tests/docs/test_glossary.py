@@ -11,6 +11,8 @@ from typing import Any
 import msgspec
 import pytest
 
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import (
     Config,
     DensityConfig,
@@ -19,9 +21,7 @@ from endotsr.config import (
     ModelConfig,
     TrainingConfig,
 )
-from endotsr.fitting.trainer import new_training, train
-from endotsr.simulator.settings import SimulatorSettings
-from endotsr.simulator.simulate import simulate
+from endotsr.training.fitting.trainer import new_training, train
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "reference" / "endotsr"
@@ -204,7 +204,7 @@ def test_every_class_that_the_glossary_names_exists():
 
 def test_moments_of_a_fit_are_those_of_adam():
     named = set()
-    for file in (PACKAGE / "fitting").rglob("*.py"):
+    for file in (PACKAGE / "training" / "fitting").rglob("*.py"):
         found = identifiers(ast.parse(file.read_text(encoding="utf-8")))
         if any({"moment", "moments"} & set(name.lower().split("_")) for name in found):
             named.add(file.name)

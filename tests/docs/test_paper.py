@@ -36,7 +36,7 @@ def test_every_claim_of_the_paper_stands_on_the_page():
 
 def test_a_name_that_is_gone_stops_the_page():
     with pytest.raises(InputError, match="not a public function"):
-        paper.link("endotsr.equations.appearance.gone")
+        paper.link("endotsr.method.equations.appearance.gone")
     with pytest.raises(InputError, match="no row: gone"):
         paper.rulings(("gone",))
     with pytest.raises(InputError, match="no verdict on 'gone'"):

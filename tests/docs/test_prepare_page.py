@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from endotsr.sequences.layouts import layouts
+from endotsr.clips.sequences.layouts import layouts
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"

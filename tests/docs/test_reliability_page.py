@@ -31,7 +31,7 @@ def test_every_file_that_the_page_names_exists():
     for path in re.findall(r"(tests/\S+?\.py)", text):
         assert (reliability.ROOT / path).is_file(), path
     bounds = {"256 MiB": "png.LARGEST_FILE", "64 MiB": "files.LARGEST_TEXT", "64 GiB": "checkpoint.LARGEST"}
-    from endotsr.fitting import checkpoint
+    from endotsr.training.fitting import checkpoint
     from endotsr.untrusted import files, png
 
     places = {"png": png, "files": files, "checkpoint": checkpoint}

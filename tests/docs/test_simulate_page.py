@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from endotsr.simulator.scenes import SCENES
+from endotsr.clips.simulator.scenes import SCENES
 
 made = importlib.import_module("simulate")
 

@@ -4,10 +4,9 @@ import json
 import re
 
 import pytest
+import tradeoff
 from marks import replaced
 from tradeoff_parts import fragments
-
-import tradeoff
 
 MARKED = re.compile(r"<!-- tradeoff:(\w+):start -->")
 

@@ -10,8 +10,8 @@ from page_visits import found_browser, visits
 
 from endotsr.definition.laplacian import support_masks
 from endotsr.definition.matern import matern_weights
-from endotsr.splatting.render import RenderOut
-from endotsr.windows.scene import blended
+from endotsr.method.splatting.render import RenderOut
+from endotsr.studies.windows.scene import blended
 
 pytestmark = pytest.mark.slow  # a browser
 ROOT = Path(__file__).parents[2]

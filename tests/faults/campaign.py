@@ -28,7 +28,7 @@ from file_layer import disk_full, killed, operations, read_only  # noqa: E402
 from tiny import assert_same_run, train_words, written_folder  # noqa: E402
 
 from endotsr.cli.main import main as endotsr  # noqa: E402
-from endotsr.runs.machine import machine  # noqa: E402
+from endotsr.training.runs.machine import machine  # noqa: E402
 
 
 class Bench:
@@ -113,7 +113,7 @@ def kill_at_a_moment(bench: Bench, by_time: bool = False) -> tuple[bool, str]:
     out = bench.fresh()
 
     def work() -> int:
-        from endotsr.runs import training
+        from endotsr.training.runs import training
 
         if by_time:
             training.seconds_between = lambda *_: 0.0
@@ -185,7 +185,7 @@ def clock_jumps(bench: Bench) -> tuple[bool, str]:
     out = bench.fresh()
 
     def work() -> int:
-        from endotsr.runs import records, training
+        from endotsr.training.runs import records, training
 
         jumps = iter(range(10**6))
         times = lambda: f"{2026 + (10 if next(jumps) % 2 else -1)}-01-01T00:00:00+00:00"
@@ -198,7 +198,7 @@ def clock_jumps(bench: Bench) -> tuple[bool, str]:
 
 def sequence_changes(bench: Bench) -> tuple[bool, str]:
     """A picture of the sequence is replaced while the run trains, and the run is then resumed."""
-    from endotsr.opencv import read_png, write_png
+    from endotsr.clips.opencv import read_png, write_png
 
     out, said = bench.fresh(), bench.said
     shutil.rmtree(bench.scratch / "sequence", ignore_errors=True)

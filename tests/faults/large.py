@@ -87,7 +87,7 @@ def main() -> int:
     )
     print(f"{threads['threads']} threads on {threads['cores']} cores: bitwise equal, {threads['seconds']} s")
     if asked.json:
-        from endotsr.runs.machine import machine
+        from endotsr.training.runs.machine import machine
 
         about = {"date": datetime.date.today().isoformat(), "machine": machine(), "many": many, "threads": threads}
         asked.json.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")

@@ -74,7 +74,7 @@ def soak(iterations: int, scratch: Path) -> dict[str, Any]:
 
 def guard_seconds(count: int, repeats: int = 200) -> float:
     """Median time of the check of the gradients of `count` Gaussians in float32, seconds."""
-    from endotsr.fitting.divergence import not_finite
+    from endotsr.training.fitting.divergence import not_finite
 
     rng = np.random.default_rng(0)
     shapes = {"d_position": (3,), "d_log_scale": (3,), "d_quaternion": (4,), "d_opacity_logit": ()}
@@ -112,7 +112,7 @@ def main() -> int:
     print(f"memory {found['median_bytes'] / 1e6:.1f} MB, within {found['largest_deviation']:.2%} of the median")
     print(f"guard of {asked.guard} Gaussians: {1e3 * guard['seconds']:.3f} ms an iteration")
     if asked.json:
-        from endotsr.runs.machine import machine
+        from endotsr.training.runs.machine import machine
 
         about = {"date": datetime.date.today().isoformat(), "machine": machine(), "guard": guard, "soak": found}
         asked.json.write_text(json.dumps(about, indent=1) + "\n")

@@ -10,8 +10,8 @@ from tiny import assert_refused, assert_same_run, run_line, scene, train_words
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError
-from endotsr.fitting import checkpoint as checkpoints
-from endotsr.fitting.checkpoint import DamagedCheckpoint, digest, load_checkpoint, load_latest, previous_of
+from endotsr.training.fitting import checkpoint as checkpoints
+from endotsr.training.fitting.checkpoint import DamagedCheckpoint, digest, load_checkpoint, load_latest, previous_of
 
 RESUME = ["--resume", "--no-evaluate"]
 
@@ -77,7 +77,7 @@ def test_a_kill_between_the_renames_leaves_a_whole_checkpoint(links, trained, ru
     if not links:
         monkeypatch.setattr(os, "link", lambda *_: (_ for _ in ()).throw(OSError("no hard links")))
     from endotsr.config import load_config
-    from endotsr.fitting.state import save_state, state_from_checkpoint
+    from endotsr.training.fitting.state import save_state, state_from_checkpoint
 
     config = load_config(run / "config.toml")
     state = state_from_checkpoint(load_checkpoint(run / "checkpoint.npz"), config)

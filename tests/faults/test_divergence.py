@@ -7,10 +7,10 @@ import pytest
 from tiny import log_without_seconds, run_line, train_words
 
 from endotsr.cli.main import main
-from endotsr.fitting import trainer
-from endotsr.fitting.divergence import Diverged, DivergenceWatch, not_finite
-from endotsr.runs.diverged import repeat_iteration
-from endotsr.scene.gaussians import Gaussians
+from endotsr.training.fitting import trainer
+from endotsr.training.fitting.divergence import Diverged, DivergenceWatch, not_finite
+from endotsr.training.runs.diverged import repeat_iteration
+from endotsr.training.scene.gaussians import Gaussians
 
 SLOW = pytest.mark.faults  # not by default
 

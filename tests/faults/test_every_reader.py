@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tiny import SETTINGS, assert_refused
 
-from endotsr.evaluation.lpips import CHANNELS, KERNELS
+from endotsr.results.evaluation.lpips import CHANNELS, KERNELS
 from endotsr.untrusted.arrays import LONGEST_HEADER
 from special_files import DAMAGE, NO_FILES
 

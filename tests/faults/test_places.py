@@ -5,8 +5,8 @@ import sys
 import pytest
 from tiny import SETTINGS, assert_refused, run_line, train_words
 
-from endotsr.runs import folder as runs
-from endotsr.runs import sources
+from endotsr.training.runs import folder as runs
+from endotsr.training.runs import sources
 from endotsr.untrusted.writing import replace_file
 
 
@@ -85,7 +85,7 @@ def test_a_message_cannot_steer_the_terminal(tmp_path, capsys):
 
 
 def test_a_processor_without_known_features_has_the_common_registers(monkeypatch):
-    from endotsr.kernels import vectors
+    from endotsr.method.kernels import vectors
 
     def unknown():
         raise RuntimeError("no features of this processor")

@@ -111,7 +111,7 @@ def main() -> int:
     asked = parser.parse_args()
     rows = [fuzz(name, asked.inputs, asked.seed, asked.seconds) for name in asked.reader or READERS]
     if asked.json:
-        from endotsr.runs.machine import machine
+        from endotsr.training.runs.machine import machine
 
         about = {"date": datetime.date.today().isoformat(), "seed": asked.seed, "machine": machine(), "memory": MEMORY}
         asked.json.write_text(json.dumps(about | {"readers": rows}, indent=1) + "\n")

@@ -230,7 +230,7 @@ def change_array(rng: random.Random, entries: dict[str, np.ndarray]) -> None:
 
 def checkpoint(rng: random.Random, data: bytes) -> bytes:
     """A checkpoint whose arrays or header are changed, mostly with the checksums that then fit."""
-    from endotsr.fitting.checkpoint import digest
+    from endotsr.training.fitting.checkpoint import digest
 
     entries = _entries(data)
     header = json.loads(entries.pop("header").tobytes())

@@ -74,7 +74,7 @@ def pose_seeds() -> list[bytes]:
 
 def read_poses(path: Path) -> object:
     """As `read_endonerf` does."""
-    from endotsr.sequences.poses import cameras_from_rows, read_pose_rows
+    from endotsr.clips.sequences.poses import cameras_from_rows, read_pose_rows
 
     return cameras_from_rows(read_pose_rows(path, 9), 48, 32, path, range(9))
 
@@ -101,7 +101,7 @@ def ply_seeds() -> list[bytes]:
 
 
 def read_splats(path: Path) -> object:
-    from endotsr.tradeoff.scenes import read_splats as read
+    from endotsr.studies.tradeoff.scenes import read_splats as read
 
     return read(path)
 
@@ -139,16 +139,16 @@ configurations."A from base".density.until = 0
 
 
 def read_sweep(path: Path) -> object:
-    from endotsr.sweeps.spec import read_spec
+    from endotsr.studies.sweeps.spec import read_spec
 
     return read_spec(path)
 
 
 @cache
 def _tiny():
+    from endotsr.clips.simulator.settings import SimulatorSettings
+    from endotsr.clips.simulator.simulate import simulate
     from endotsr.config import config_from_dict
-    from endotsr.simulator.settings import SimulatorSettings
-    from endotsr.simulator.simulate import simulate
 
     settings = SimulatorSettings(width=32, height=24, frames=9)
     points = {"first_frame_points": 6, "other_frame_points": 2}
@@ -161,7 +161,7 @@ def checkpoint_seeds() -> list[bytes]:
     """The checkpoint of an untrained scene of eight Gaussians."""
     import tempfile
 
-    from endotsr.fitting.state import new_training, save_state
+    from endotsr.training.fitting.state import new_training, save_state
 
     _, sequence, config = _tiny()
     with tempfile.TemporaryDirectory() as scratch:
@@ -173,8 +173,8 @@ def checkpoint_seeds() -> list[bytes]:
 def read_checkpoint(path: Path) -> object:
     """As a resumed training does."""
     from endotsr.config import PAPER
-    from endotsr.fitting.checkpoint import load_latest
-    from endotsr.fitting.state import state_from_checkpoint
+    from endotsr.training.fitting.checkpoint import load_latest
+    from endotsr.training.fitting.state import state_from_checkpoint
 
     return state_from_checkpoint(load_latest(path)[0], PAPER)
 
@@ -182,7 +182,7 @@ def read_checkpoint(path: Path) -> object:
 @cache
 def sequence_seeds() -> list[bytes]:
     """sequence.json of a static camera, and of one that moves."""
-    from endotsr.sequences.record import record_of
+    from endotsr.clips.sequences.record import record_of
 
     _, sequence, _ = _tiny()
     record = msgspec.to_builtins(record_of(sequence))
@@ -192,9 +192,9 @@ def sequence_seeds() -> list[bytes]:
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
-    from endotsr.export.times import Times, chosen_times
-    from endotsr.runs.folder import RunFolder
-    from endotsr.views.plan import ViewRequest, check_request, views_of
+    from endotsr.results.export.times import Times, chosen_times
+    from endotsr.results.views.plan import ViewRequest, check_request, views_of
+    from endotsr.training.runs.folder import RunFolder
 
     folder = RunFolder(path.parent)
     record = folder.sequence_record()
@@ -213,8 +213,8 @@ def read_sequence(path: Path) -> object:
 def record_seeds() -> list[bytes]:
     """run.json."""
     from endotsr.config import DEMO
-    from endotsr.runs.files import finite
-    from endotsr.runs.sources import start_record
+    from endotsr.training.runs.files import finite
+    from endotsr.training.runs.sources import start_record
 
     settings, sequence, _ = _tiny()
     return [json.dumps(finite(start_record(["endotsr"], "simulated", sequence, DEMO, settings, 2))).encode()]
@@ -223,12 +223,12 @@ def record_seeds() -> list[bytes]:
 def read_record(path: Path) -> object:
     """As `endotsr evaluate` does."""
     from endotsr.config import DEMO
-    from endotsr.evaluation.run import about_run
-    from endotsr.report.run_text import facts
-    from endotsr.runs.folder import RunFolder
-    from endotsr.runs.model import Model, sequence_fingerprint
-    from endotsr.runs.records import REPORTED
-    from endotsr.runs.sources import run_source
+    from endotsr.results.evaluation.run import about_run
+    from endotsr.results.report.run_text import facts
+    from endotsr.training.runs.folder import RunFolder
+    from endotsr.training.runs.model import Model, sequence_fingerprint
+    from endotsr.training.runs.records import REPORTED
+    from endotsr.training.runs.sources import run_source
 
     folder = RunFolder(path.parent)
     record = folder.record(*REPORTED)
@@ -246,8 +246,8 @@ def log_seeds() -> list[bytes]:
 
 def read_log(path: Path) -> object:
     """As the report and a resumed training do."""
-    from endotsr.report.curves import series
-    from endotsr.runs.log import RunLog, log_until
+    from endotsr.results.report.curves import series
+    from endotsr.training.runs.log import RunLog, log_until
 
     log = log_until(path, 5)
     found = [series(log, key) for key in ("loss", "l1", "psnr", "seconds")]
@@ -257,7 +257,7 @@ def read_log(path: Path) -> object:
 
 def golden_json(kind: str) -> Callable[[Path], object]:
     def read(path: Path) -> object:
-        from endotsr.golden.judge.format import SCHEMAS, read_struct
+        from endotsr.port.judge.format import SCHEMAS, read_struct
 
         return read_struct(path, SCHEMAS[kind])
 
@@ -288,19 +288,19 @@ def request_seeds() -> list[bytes]:
 
 def read_port_output(path: Path) -> object:
     """As the judge reads the outputs of a port."""
-    from endotsr.golden.judge.npy import read_plain
+    from endotsr.port.judge.npy import read_plain
 
     return read_plain(path, path.parent)
 
 
 def read_png(path: Path) -> object:
-    from endotsr.opencv import read_png as read
+    from endotsr.clips.opencv import read_png as read
 
     return read(path)
 
 
 def _refused() -> type[Exception]:
-    from endotsr.golden.judge.npy import Refused
+    from endotsr.port.judge.npy import Refused
 
     return Refused
 

@@ -67,7 +67,7 @@ def video_seeds() -> list[bytes]:
     """Three pictures as .mp4, without loss and with."""
     import tempfile
 
-    from endotsr.sequences.film_file import write_video
+    from endotsr.clips.sequences.film_file import write_video
 
     pictures = list(np.random.default_rng(0).integers(0, 255, (3, 16, 24, 3), np.uint8))
     with tempfile.TemporaryDirectory() as scratch:
@@ -79,19 +79,19 @@ def video_seeds() -> list[bytes]:
 
 def read_video(path: Path) -> object:
     """As `prepare` does, of at most three pictures."""
-    from endotsr.sequences.video_file import video_facts, video_pictures
+    from endotsr.clips.sequences.video_file import video_facts, video_pictures
 
     return list(video_pictures(path, list(range(min(video_facts(path).count, 3)))))
 
 
 def read_depth(path: Path) -> object:
-    from endotsr.sequences.depth_files import depth_plane, read_plane
+    from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 
     return depth_plane(read_plane(path), 0.1, path)
 
 
 def read_picture(path: Path) -> object:
-    from endotsr.opencv.pictures import read_picture as read
+    from endotsr.clips.opencv.pictures import read_picture as read
 
     return read(path)
 
@@ -135,8 +135,8 @@ matrices = [{row}, {row}]
 
 
 def read_sequence_file(path: Path) -> object:
-    from endotsr.sequences.sequence_file import read_poses
-    from endotsr.sequences.sequence_file import read_sequence_file as read
+    from endotsr.clips.sequences.sequence_file import read_poses
+    from endotsr.clips.sequences.sequence_file import read_sequence_file as read
 
     found = read(path.parent)
     return found.camera.lens(path), read_poses(found, path)
@@ -150,7 +150,7 @@ def rig_seeds() -> list[bytes]:
 
 
 def read_rig(path: Path) -> object:
-    from endotsr.sequences.calibrations import lens_or_rig
+    from endotsr.clips.sequences.calibrations import lens_or_rig
 
     return lens_or_rig(path, 64, 48)
 
@@ -162,8 +162,8 @@ def trajectory_seeds() -> list[bytes]:
 
 
 def read_trajectory(path: Path) -> object:
-    from endotsr.sequences.trajectory import filled, poses_of_frames
-    from endotsr.sequences.trajectory import read_trajectory as read
+    from endotsr.clips.sequences.trajectory import filled, poses_of_frames
+    from endotsr.clips.sequences.trajectory import read_trajectory as read
 
     poses = poses_of_frames(read(path, "m", axes="opengl"), 4, 25.0)[0]
     return filled(poses) if any(pose is not None for pose in poses) else poses
@@ -174,7 +174,7 @@ def list_seeds() -> list[bytes]:
 
 
 def read_list(path: Path) -> object:
-    from endotsr.sequences.layouts.tum import read_list as read
+    from endotsr.clips.sequences.layouts.tum import read_list as read
 
     found = read(path)
     assert all(file.resolve().is_relative_to(path.parent.resolve()) for file in found[1])
@@ -195,7 +195,7 @@ def colmap_seeds() -> list[bytes]:
 
 def read_colmap(path: Path) -> object:
     """The three files apart; what is missing is empty."""
-    from endotsr.sequences.colmap_model import read_model
+    from endotsr.clips.sequences.colmap_model import read_model
 
     parts = path.read_bytes().split(b"----\n")[:3]
     for name, part in zip(("cameras", "images", "points3D"), [*parts, b"", b""]):
@@ -214,7 +214,7 @@ def colmap_binary_seeds() -> list[bytes]:
 
 
 def read_colmap_binary(path: Path) -> object:
-    from endotsr.sequences.colmap_model import read_model
+    from endotsr.clips.sequences.colmap_model import read_model
 
     data = path.read_bytes()
     for name in ("cameras", "images", "points3D"):
@@ -234,6 +234,6 @@ def points_seeds() -> list[bytes]:
 
 
 def read_points(path: Path) -> object:
-    from endotsr.sequences.layouts.points import read_cameras
+    from endotsr.clips.sequences.layouts.points import read_cameras
 
     return read_cameras(path, [path.parent / "0.png", path.parent / "1.png"])

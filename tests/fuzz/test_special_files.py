@@ -10,8 +10,8 @@ from campaign_of_inputs import bounded_memory
 from readers import READERS
 from recordings import COLMAP_TEXT
 
+from endotsr.clips.sequences.colmap_model import read_model
 from endotsr.errors import InputError
-from endotsr.sequences.colmap_model import read_model
 from special_files import DAMAGE, NO_FILES
 
 pytestmark = [

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from made_up_scenes import Y00, run, screen_scene
 
-from endotsr.equations.appearance import appearance_forward, appearance_reverse
-from endotsr.equations.calibration import calibrate
-from endotsr.equations.dictionary import DEAD_RMS, atom_statistics, normalise_forward, normalise_reverse
-from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
-from endotsr.equations.matern import matern_weights
-from endotsr.losses.depth import FEWEST_VALID, depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.covariance import Shape, covariance_forward, covariance_reverse
-from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
-from endotsr.splatting.projection import projection_forward, projection_reverse
-from endotsr.splatting.settings import PAPER
+from endotsr.method.equations.appearance import appearance_forward, appearance_reverse
+from endotsr.method.equations.calibration import calibrate
+from endotsr.method.equations.dictionary import DEAD_RMS, atom_statistics, normalise_forward, normalise_reverse
+from endotsr.method.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.method.equations.matern import matern_weights
+from endotsr.method.losses.depth import FEWEST_VALID, depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.covariance import Shape, covariance_forward, covariance_reverse
+from endotsr.method.splatting.harmonics import harmonics_forward, harmonics_reverse
+from endotsr.method.splatting.projection import projection_forward, projection_reverse
+from endotsr.method.splatting.settings import PAPER
 
 PIXEL = Camera(np.eye(3), np.zeros(3), 10.0, 10.0, 0.5, 0.5, 1, 1)
 RGB = np.array([[0.9, 0.1, 0.6], [0.2, 0.8, 0.3], [0.5, 0.4, 0.7]])  # one column a splat

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from made_up_scenes import as_dtype, assert_close_l2, plain_camera, random_scene, run, threads
 
-from endotsr.gradcheck import all_pairs, pair_stream
-from endotsr.kernels.jit import jit
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.method.kernels.jit import jit
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.port.gradcheck import all_pairs, pair_stream
 
 __all__ = ["threads"]
 PACKAGE = Path(__file__).parents[2] / "reference" / "endotsr"
@@ -61,9 +61,9 @@ def test_hard_N2_sums_keep_their_order_and_nan_stays_visible(contract):
 
 
 # Corners of pixel boxes: whole numbers, which Numba unifies (int64 with float32) to double. Exact.
-WHOLE_NUMBERS = {"endotsr.splatting.binning._boxes_kernel"}
+WHOLE_NUMBERS = {"endotsr.method.splatting.binning._boxes_kernel"}
 
-# Computed in double and rounded once (`kernels/elementary.py`), as the C library does.
+# Computed in double and rounded once (`method/kernels/elementary.py`), as the C library does.
 ROUNDED_ONCE = ("_exponential_float32_v", "_logarithm_float32_v")
 
 
@@ -86,7 +86,7 @@ def test_hard_N3_the_float32_rasteriser_holds_no_double():
     kernels = {
         f"{module}.{name}": value
         for module, content in sorted(sys.modules.items())
-        if module.startswith("endotsr.splatting.")
+        if module.startswith("endotsr.method.splatting.")
         for name, value in vars(content).items()
         if getattr(value, "overloads", None) and f"{module}.{name}" not in WHOLE_NUMBERS
     }

@@ -5,13 +5,13 @@ import pytest
 from made_up_scenes import Y00, as_dtype, assert_finite, run
 
 from data_folder import data_folder
-from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
-from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import Scene
-from endotsr.splatting.settings import PRESETS
+from endotsr.method.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.method.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.method.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import Scene
+from endotsr.method.splatting.settings import PRESETS
 
 WIDTH, HEIGHT = 80, 60
 

@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import pytest  # noqa: E402
 
-from endotsr.golden.judge.store import golden_folder, read_golden  # noqa: E402
+from endotsr.port.judge.store import golden_folder, read_golden  # noqa: E402
 from mutation.checks import COLLECTING, SLOW, SUITES, Check, of_case, of_item, run  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 from _pytest.runner import runtestprotocol
 
-from endotsr.golden.contract import all_operations
-from endotsr.golden.judge.compare import judged
-from endotsr.golden.judge.format import Case
-from endotsr.golden.judge.store import Golden
-from endotsr.golden.reference import reference, stored
-from endotsr.gradcheck import Pair
+from endotsr.port.contract import all_operations
+from endotsr.port.gradcheck import Pair
+from endotsr.port.judge.compare import judged
+from endotsr.port.judge.format import Case
+from endotsr.port.judge.store import Golden
+from endotsr.port.reference import reference, stored
 from mutation.gradients import Recorded, live, replay
 
 SUITES: tuple[str, ...] = ("gradcheck", "oracle", "golden", "hard", "properties")

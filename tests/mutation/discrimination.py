@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import pytest  # noqa: E402
 
-from endotsr.runs.machine import machine, now, versions  # noqa: E402
+from endotsr.training.runs.machine import machine, now, versions  # noqa: E402
 from mutation.checks import COLLECTING, SLOW, SUITES, Check, run  # noqa: E402
 from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402

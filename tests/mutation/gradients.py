@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.gradcheck import Pair, pair_stream
-from endotsr.gradcheck.checker import judge
-from endotsr.gradcheck.differences import Difference, plateau_difference
-from endotsr.gradcheck.probes import Probe, block_probes, joint_probes, make_blocks
-from endotsr.gradcheck.session import LINEAR, Session, norm
+from endotsr.port.gradcheck import Pair, pair_stream
+from endotsr.port.gradcheck.checker import judge
+from endotsr.port.gradcheck.differences import Difference, plateau_difference
+from endotsr.port.gradcheck.probes import Probe, block_probes, joint_probes, make_blocks
+from endotsr.port.gradcheck.session import LINEAR, Session, norm
 
 SEED = 0
 CHANGED = 1e-6  # a gradient that changes by more than this, relative, must be detected

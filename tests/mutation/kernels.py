@@ -6,25 +6,25 @@ import inspect
 from collections.abc import Callable
 
 MODULES = (
-    "kernels.exponential",
-    "kernels.gather",
+    "method.kernels.exponential",
+    "method.kernels.gather",
     *(f"equations.{name}" for name in ("dictionary", "atom_sums", "appearance", "motion", "matern")),
     *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation", "exposure", "pose")),
     *(f"splatting.{name}" for name in ("camera", "camera_model", "covariance", "projection")),
     *(f"splatting.{name}" for name in ("projection_formulas", "projection_kernels", "harmonics", "harmonics_formulas")),
-    "kernels.sums",
+    "method.kernels.sums",
     *(f"splatting.{name}" for name in ("records", "binning", "compositing", "fast.blocks", "fast.tiles", "render")),
     *(f"losses.{name}" for name in ("rows", "masked_l1", "masked_ssim", "depth", "smoothness")),
-    "scene.density_control",
+    "training.scene.density_control",
     *(f"fitting.{name}" for name in ("adam", "fused.coefficients", "fused.deformation", "model", "objective")),
-    "fitting.schedules",
+    "training.fitting.schedules",
 )
 # functions in which only a named defect is planted
-MORE = ("fitting.state.training_constants",)
+MORE = ("training.fitting.state.training_constants",)
 
 
 def kernels() -> dict[str, Callable]:
-    """Plain Python functions by name, such as `losses.rows._row_total`."""
+    """Plain Python functions by name, such as `method.losses.rows._row_total`."""
     found: dict[str, Callable] = {}
     for name in MODULES:
         module = importlib.import_module(f"endotsr.{name}")

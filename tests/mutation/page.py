@@ -228,7 +228,7 @@ def page(result: dict[str, Any]) -> str:
 
 def draw(result: dict[str, Any]) -> None:
     """The chart: what each suite detects alone, and all of them together."""
-    from endotsr.report.style import BLUE, GREY, INK, NORMAL, name_axes, new_figure, plain_axes, save
+    from endotsr.results.report.style import BLUE, GREY, INK, NORMAL, name_axes, new_figure, plain_axes, save
 
     real = counted(rows(result))
     shares = detected(real, result["suites"])

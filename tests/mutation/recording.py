@@ -6,7 +6,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from endotsr.gradcheck import all_pairs, one_thread
+from endotsr.port.gradcheck import all_pairs, one_thread
 from mutation.gradients import record
 
 if __name__ == "__main__":

@@ -28,10 +28,13 @@ def _rotation_transposed() -> tuple[tuple[str, str], ...]:
 
 
 D_Z = ("inverse_z2 * (through_x + through_y)", "zero")
-CAMERA, CAMERA_REVERSE = "splatting.camera_model.pinhole", "splatting.camera_model.pinhole_reverse"
-SCREEN = "splatting.projection_formulas.screen_covariance"
-COMPOSITE, COMPOSITE_REVERSE = "splatting.compositing._composite", "splatting.compositing._composite_reverse"
-BLOCK_REVERSE = "splatting.fast.blocks._blend_block_reverse"
+CAMERA, CAMERA_REVERSE = "method.splatting.camera_model.pinhole", "method.splatting.camera_model.pinhole_reverse"
+SCREEN = "method.splatting.projection_formulas.screen_covariance"
+COMPOSITE, COMPOSITE_REVERSE = (
+    "method.splatting.compositing._composite",
+    "method.splatting.compositing._composite_reverse",
+)
+BLOCK_REVERSE = "method.splatting.fast.blocks._blend_block_reverse"
 
 DEFECTS: tuple[Defect, ...] = (
     Defect(
@@ -51,12 +54,12 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "off-diagonal gradient halved",
-        "splatting.records._gather",
+        "method.splatting.records._gather",
         (("factor * (a * total[SUM_SEY])", "half * factor * (a * total[SUM_SEY])"),),
     ),
     Defect(
         "gradient of depth by z dropped",
-        "splatting.records._gather",
+        "method.splatting.records._gather",
         (("total[SUM_DEPTH] if keep_depth else zero", "zero"),),
     ),
     Defect("background dropped", COMPOSITE, tuple((f" + t * background[{k}]", "") for k in range(3))),
@@ -67,7 +70,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "quaternion gradient without its normalisation",
-        "splatting.covariance.unit_quaternion_reverse",
+        "method.splatting.covariance.unit_quaternion_reverse",
         tuple((f"(d_{k} - along * {k})", f"d_{k}") for k in "wxyz"),
     ),
     Defect(
@@ -82,14 +85,14 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "final T in place of T_i",
-        "splatting.compositing._pixel_reverse",
+        "method.splatting.compositing._pixel_reverse",
         (("alpha, t, e, dy = kept[j, 0], kept[j, 1]", "alpha, t, e, dy = kept[j, 0], kept[hit.size - 1, 1]"),),
     ),
-    Defect("sign of dy", "splatting.compositing._alpha", (("dy = y - record[V]", "dy = record[V] - y"),)),
+    Defect("sign of dy", "method.splatting.compositing._alpha", (("dy = y - record[V]", "dy = record[V] - y"),)),
     Defect(
         "sign of dy in the fast reverse pass", BLOCK_REVERSE, (("se, sy = s * e, s * dy", "se, sy = s * e, -s * dy"),)
     ),
-    Defect("rotation transposed", "splatting.covariance.rotation_of", _rotation_transposed()),
+    Defect("rotation transposed", "method.splatting.covariance.rotation_of", _rotation_transposed()),
     Defect(
         "fx and fy exchanged",
         CAMERA,
@@ -108,23 +111,27 @@ DEFECTS: tuple[Defect, ...] = (
     Defect("determinant as a c - b b", SCREEN, (("low_pass * low_pass + low_pass * spread + areas", "a * c - b * b"),)),
     Defect(
         "atom statistics from all time stamps",
-        "fitting.state.training_constants",
+        "training.fitting.state.training_constants",
         (("sequence.times[sequence.train_index]", "sequence.times"),),
     ),
     Defect(
-        "beta missing", "equations.appearance.appearance_forward", (("dtype.type(beta / Y00)", "dtype.type(1 / Y00)"),)
+        "beta missing",
+        "method.equations.appearance.appearance_forward",
+        (("dtype.type(beta / Y00)", "dtype.type(1 / Y00)"),),
     ),
     Defect(
-        "1/Y00 missing", "equations.appearance.appearance_forward", (("dtype.type(beta / Y00)", "dtype.type(beta)"),)
+        "1/Y00 missing",
+        "method.equations.appearance.appearance_forward",
+        (("dtype.type(beta / Y00)", "dtype.type(beta)"),),
     ),
     Defect(
         "rho not normalised to mean 1",
-        "equations.matern.matern_weights",
+        "method.equations.matern.matern_weights",
         (("density / (math.fsum(density) / density.size)", "density"),),
     ),
     Defect(
         "mask applied before the pyramid only",
-        "equations.laplacian.support_masks",
+        "method.equations.laplacian.support_masks",
         (
             ("valid & _expand_support(coarse, valid.shape, upsampling)", "valid"),
             ("_reduce_support(valid)", "valid[::2, ::2]"),
@@ -132,7 +139,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "zero padding of the pyramid",
-        "equations.pyramid._reduce_row",
+        "method.equations.pyramid._reduce_row",
         (
             ("inside[reflect(-2, w)]", "real(0.0)"),
             ("inside[reflect(-1, w)]", "real(0.0)"),
@@ -141,27 +148,27 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "half-pixel up-sampling whatever is asked for",
-        "equations.pyramid.expand_weights",
+        "method.equations.pyramid.expand_weights",
         (("return EXPAND_WEIGHTS[upsampling]", 'return EXPAND_WEIGHTS["half_pixel"]'),),
     ),
     Defect(
         "L1 averaged over all pixels",
-        "losses.masked_l1.masked_l1_forward",
+        "method.losses.masked_l1.masked_l1_forward",
         (("rendered.shape[0] * int(np.count_nonzero(mask))", "rendered.size"),),
     ),
     Defect(
         "SSIM averaged over all pixels",
-        "losses.masked_ssim.ssim_target",
+        "method.losses.masked_ssim.ssim_target",
         (("observed.shape[0] * int(np.count_nonzero(mask))", "observed.size"),),
     ),
     Defect(
         "place in the list taken for the index of the Gaussian",
-        "splatting.records._gather",
+        "method.splatting.records._gather",
         (("i = order[k]", "i = k"),),
     ),
     Defect(
         "sum depends on the ranges of the threads",
-        "losses.masked_l1._absolute_difference",
+        "method.losses.masked_l1._absolute_difference",
         (
             ("for index in range(first, stop):", "totals[first:stop] = 0\n    for index in range(first, stop):"),
             ("totals[index] = row_total(line)", "totals[first] += row_total(line)"),
@@ -169,7 +176,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "equal depths in reverse index order",
-        "splatting.binning._radix_order",
+        "method.splatting.binning._radix_order",
         (
             (
                 "for i in range(key.size):\n        if visible[i]:\n            keys[m]",

@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.gradcheck import all_pairs
-from endotsr.kernels.jit import kernel_source_hash
+from endotsr.method.kernels.jit import kernel_source_hash
+from endotsr.port.gradcheck import all_pairs
+from endotsr.port.judge.store import golden_folder, read_golden
 from mutation.checks import BLOCKS, Check, forward_only, of_case, of_item, of_pair, surveyed
 from mutation.kernels import clear_caches, kernels, planted
 from mutation.processes import Outcome

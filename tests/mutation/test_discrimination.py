@@ -78,7 +78,7 @@ def test_a_later_run_of_survivors_is_added_by_name():
 @pytest.mark.slow
 def test_what_the_source_no_longer_has_leaves_the_report(result):
     functions = kernels() | planted()
-    kernel = "equations.matern.matern_weights"
+    kernel = "method.equations.matern.matern_weights"
     old = {"kernels": {"gone.away": {}, kernel: {f"{kernel}: gone": ["sign", [0], None]}}, "defects": {"gone": []}}
     assert of_today(old, functions) == {"kernels": {kernel: {}}, "defects": {}}
     today = of_today(result, functions)
@@ -86,7 +86,7 @@ def test_what_the_source_no_longer_has_leaves_the_report(result):
 
 
 def test_a_report_is_whole_when_no_mutant_is_missing():
-    kernel = "equations.matern.matern_weights"
+    kernel = "method.equations.matern.matern_weights"
     functions = {kernel: kernels()[kernel]}
     rows_of_all = {m.name: ["sign", [0], None] for m in mutants(kernel, functions[kernel])}
     assert whole({"kernels": {kernel: rows_of_all}, "defects": {}}, functions)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from made_up_scenes import random_scene, turned_camera
 
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import render_forward, render_reverse
-from endotsr.splatting.settings import EXACT, PAPER, LegacyDeviations
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import render_forward, render_reverse
+from endotsr.method.splatting.settings import EXACT, PAPER, LegacyDeviations
 
 REASON = peer_gsplat.available()
 needs_gsplat = pytest.mark.skipif(REASON is not None, reason=f"torch and gsplat (extra `peers`): {REASON}")

@@ -3,10 +3,10 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from endotsr.kernels.constants import Y00
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import Scene
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.method.kernels.constants import Y00
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import Scene
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
 
 DTYPES = st.sampled_from([np.float32, np.float64])
 SEEDS = st.integers(0, 2**32 - 1)

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from endotsr.definition import laplacian as laplacian_definition
 from endotsr.definition import masked_l1 as l1_definition
 from endotsr.definition import masked_ssim as ssim_definition
-from endotsr.equations import laplacian
-from endotsr.losses import masked_l1, masked_ssim
+from endotsr.method.equations import laplacian
+from endotsr.method.losses import masked_l1, masked_ssim
 from properties.strategies import SEEDS, masks, shapes
 
 RULES = st.sampled_from(["co_sited", "half_pixel"])

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
-from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
-from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
+from endotsr.method.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.method.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.method.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
 from properties.strategies import SEEDS, image_pairs, masks, poisons, shapes
 
 RULES = st.sampled_from(["co_sited", "half_pixel"])

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from made_up_scenes import FIELDS, as_dtype, assert_bitwise, assert_close, assert_finite, run, select
 from scipy.spatial.transform import Rotation
 
-from endotsr.splatting.render import Scene
-from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.method.splatting.render import Scene
+from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
 from properties.strategies import CAMERA, HIDDEN, RASTER, SEEDS, Y00, scenes
 
 BACKGROUND = np.array([0.3, 0.6, 0.1])

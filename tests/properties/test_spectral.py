@@ -5,13 +5,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from endotsr.equations.appearance import appearance_forward, appearance_reverse
-from endotsr.equations.calibration import calibrate
-from endotsr.equations.deformation import deformation_forward, deformation_reverse
-from endotsr.equations.dictionary import atom_statistics, dictionary_forward, frequencies, normalised_atoms
-from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
-from endotsr.equations.motion import motion_forward, motion_reverse
-from endotsr.kernels.constants import Y00
+from endotsr.method.equations.appearance import appearance_forward, appearance_reverse
+from endotsr.method.equations.calibration import calibrate
+from endotsr.method.equations.deformation import deformation_forward, deformation_reverse
+from endotsr.method.equations.dictionary import atom_statistics, dictionary_forward, frequencies, normalised_atoms
+from endotsr.method.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
+from endotsr.method.equations.motion import motion_forward, motion_reverse
+from endotsr.method.kernels.constants import Y00
 from properties.strategies import DTYPES, SEEDS
 
 COUNTS = st.integers(1, 9)

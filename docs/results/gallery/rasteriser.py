@@ -3,14 +3,14 @@
 import mpmath
 import numpy as np
 
-from endotsr.splatting.binning import depth_order
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.covariance import Shape, covariance_forward
-from endotsr.splatting.harmonics import Y00, harmonics_forward
-from endotsr.splatting.projection import footprint, projection_forward
-from endotsr.splatting.records import log_opacity
-from endotsr.splatting.render import Scene, render_forward, render_reverse
-from endotsr.splatting.settings import EXACT
+from endotsr.method.splatting.binning import depth_order
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.covariance import Shape, covariance_forward
+from endotsr.method.splatting.harmonics import Y00, harmonics_forward
+from endotsr.method.splatting.projection import footprint, projection_forward
+from endotsr.method.splatting.records import log_opacity
+from endotsr.method.splatting.render import Scene, render_forward, render_reverse
+from endotsr.method.splatting.settings import EXACT
 from gallery.registry import case
 
 PIXEL = Camera(np.eye(3), np.zeros(3), 10.0, 10.0, 0.5, 0.5, 1, 1)

@@ -12,8 +12,8 @@ from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:
-    from endotsr.sweeps.ablation_page import AblationRecord
-    from endotsr.sweeps.sweep import Rows
+    from endotsr.studies.sweeps.ablation_page import AblationRecord
+    from endotsr.studies.sweeps.sweep import Rows
 
 
 @dataclass
@@ -65,10 +65,10 @@ class AblateOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.runs.files import refuse_folder, write_json
-    from endotsr.sweeps.ablation_page import ablation_markdown, write_ablation
-    from endotsr.sweeps.place import Place, check_place
-    from endotsr.sweeps.spec import spec_of
+    from endotsr.studies.sweeps.ablation_page import ablation_markdown, write_ablation
+    from endotsr.studies.sweeps.place import Place, check_place
+    from endotsr.studies.sweeps.spec import spec_of
+    from endotsr.training.runs.files import refuse_folder, write_json
 
     options = parse(AblateOptions, words, "ablate")
     place = Place(options.workers, options.threads, options.scheduler)
@@ -83,7 +83,7 @@ def run(words: list[str]) -> int:
             write_json(options.json, records[0])
 
     if options.collect:
-        from endotsr.sweeps.sweep import Inputs, planned
+        from endotsr.studies.sweeps.sweep import Inputs, planned
 
         refuse_folder(options.out)
         options.out.mkdir(parents=True, exist_ok=True)
@@ -105,7 +105,7 @@ def without_folders(word: str) -> str:
 
 def spec_data(options: AblateOptions) -> dict[str, Any]:
     """The sweep for the options, in the form of a SPEC.toml. Raises InputError for invalid options."""
-    from endotsr.sweeps.ablation import CONFIGURATIONS, ablation_spec
+    from endotsr.studies.sweeps.ablation import CONFIGURATIONS, ablation_spec
 
     if options.seeds < 1:
         raise InputError(f"ablate: --seeds {options.seeds} is not allowed; allowed: an integer >= 1")

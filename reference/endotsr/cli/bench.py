@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-from endotsr.bench.case import BenchCase, Precision
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.errors import InputError
-from endotsr.runs.files import write_json
+from endotsr.studies.bench.case import BenchCase, Precision
+from endotsr.training.runs.files import write_json
 
 LEAST = {"gaussians": 4, "repeats": 1, "width": 16, "height": 16, "threads": 1}
 
@@ -45,8 +45,8 @@ def run(words: list[str]) -> int:
     options = parse(BenchOptions, words, "bench")
     _refuse(options)
 
-    from endotsr.bench import stages
-    from endotsr.runs.machine import dated
+    from endotsr.studies.bench import stages
+    from endotsr.training.runs.machine import dated
 
     result = stages.measure_stages(cases_of(options), print)
     for case in result["cases"]:

@@ -33,9 +33,9 @@ def run(words: list[str]) -> int:
     options = parse(CheckOptions, words, "check", CheckOptions(settings=base))
     if not options.sequence:
         raise InputError("check: SEQUENCE is missing: a sequence folder")
-    from endotsr.report.check_page import check_page
-    from endotsr.runs.files import write_json
-    from endotsr.sequences.checks.check import check_sequence
+    from endotsr.clips.sequences.checks.check import check_sequence
+    from endotsr.results.report.check_page import check_page
+    from endotsr.training.runs.files import write_json
     from endotsr.untrusted.writing import replace_text
 
     checked = check_sequence(Path(options.sequence), options.settings)

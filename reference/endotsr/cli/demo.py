@@ -9,7 +9,7 @@ from endotsr.cli.parts.parser import HELP_ALL, parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.config import DEMO
 from endotsr.errors import InputError
-from endotsr.runs.sources import SIMULATED
+from endotsr.training.runs.sources import SIMULATED
 
 
 @dataclass

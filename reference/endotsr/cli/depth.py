@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.clips.sequences.stereo_depth import StereoSettings
 from endotsr.errors import InputError
-from endotsr.sequences.stereo_depth import StereoSettings
 
 STEREO = StereoSettings()
 LARGEST_RATIO = 100.0  # farthest to nearest tissue
 
 if TYPE_CHECKING:
-    from endotsr.sequences.make_depth import DepthReport
+    from endotsr.clips.sequences.make_depth import DepthReport
 
 
 @dataclass
@@ -59,7 +59,7 @@ def run(words: list[str]) -> int:
     if not 0 < options.unit_scale < float("inf"):
         raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
     _refuse_contradictions(options)
-    from endotsr.sequences.checks.kinds import KINDS
+    from endotsr.clips.sequences.checks.kinds import KINDS
 
     report = _made(options)
     assert report.file.depth is not None
@@ -93,9 +93,9 @@ def _refuse_contradictions(options: DepthOptions) -> None:
 
 def _made(options: DepthOptions) -> "DepthReport":
     """Compute or read the depth and write it."""
-    from endotsr.sequences.common import list_contents
-    from endotsr.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
-    from endotsr.sequences.relative_depth import flat_depth
+    from endotsr.clips.sequences.common import list_contents
+    from endotsr.clips.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
+    from endotsr.clips.sequences.relative_depth import flat_depth
 
     folder, given = options.sequence, options.given
     if options.flat:

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, cast
 from endotsr.cli.parts.comparison import SHOWN, EvaluateOptions, compare_methods, shown_sequence
 from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
-from endotsr.runs.files import write_json
-from endotsr.runs.folder import RunFolder, open_run
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
-    from endotsr.evaluation.records import EvaluationRecord, RunEvaluation
-    from endotsr.sequences.sequence import Sequence
+    from endotsr.clips.sequences.sequence import Sequence
+    from endotsr.results.evaluation.records import EvaluationRecord, RunEvaluation
 
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.kernels.threads import use_threads
-    from endotsr.report.comparison import frames_csv
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.results.report.comparison import frames_csv
 
     options = parse(EvaluateOptions, words, "evaluate")
     use_threads(options.threads)
@@ -47,9 +47,9 @@ def _compare(options: EvaluateOptions) -> int:
 
 def _run(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of the run, written to its folder."""
-    from endotsr.runs.model import load_model
-    from endotsr.runs.sources import load_run_sequence
-    from endotsr.windows.record import is_windowed
+    from endotsr.studies.windows.record import is_windowed
+    from endotsr.training.runs.model import load_model
+    from endotsr.training.runs.sources import load_run_sequence
 
     if options.run is None:
         raise InputError("evaluate: RUN is missing: a run folder, or --pictures FOLDER with --sequence SEQUENCE")
@@ -76,9 +76,9 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
 
 def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of a folder of pictures."""
-    from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.evaluation.pictures import find_pictures, measure_pictures
-    from endotsr.report.run_text import held_out_table
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+    from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
+    from endotsr.results.report.run_text import held_out_table
 
     assert options.pictures is not None
     weights = load_lpips_weights(options.lpips)
@@ -105,15 +105,15 @@ def evaluate_run(
     measures   names of `evaluation.measures.MEASURES`
     source     current location of the sequence; default: the recorded one
     """
-    from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.evaluation.measures import check_measures, measure_lines
-    from endotsr.evaluation.run import measure_folder
-    from endotsr.export.scene import MovingScene
-    from endotsr.report.run_files import write_evaluation
-    from endotsr.report.run_text import held_out_table
-    from endotsr.runs.sources import run_source
-    from endotsr.views.page import RUN_PAGE, write_run_page
-    from endotsr.views.preview import preview
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+    from endotsr.results.evaluation.measures import check_measures, measure_lines
+    from endotsr.results.evaluation.run import measure_folder
+    from endotsr.results.export.scene import MovingScene
+    from endotsr.results.report.run_files import write_evaluation
+    from endotsr.results.report.run_text import held_out_table
+    from endotsr.results.views.page import RUN_PAGE, write_run_page
+    from endotsr.results.views.preview import preview
+    from endotsr.training.runs.sources import run_source
 
     check_measures(measures, "--measures")
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]

@@ -58,10 +58,10 @@ class ExportOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.export.files import GAUSSIANS, Content, export
-    from endotsr.export.times import Times
-    from endotsr.kernels.threads import use_threads
-    from endotsr.windows.scene import open_any, refuse_one_set
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.results.export.files import GAUSSIANS, Content, export
+    from endotsr.results.export.times import Times
+    from endotsr.studies.windows.scene import open_any, refuse_one_set
 
     options = parse(ExportOptions, words, "export")
     use_threads(options.threads)
@@ -86,12 +86,12 @@ def run(words: list[str]) -> int:
 
 def _write_page(options: ExportOptions) -> None:
     """Write the interactive page."""
-    from endotsr.export.scene import open_scene
-    from endotsr.runs.files import refuse_unwritable
-    from endotsr.runs.sources import load_run_sequence
-    from endotsr.views.page import KEYS, check_page, write_page
-    from endotsr.windows.page import WINDOW_KEYS
-    from endotsr.windows.record import is_windowed
+    from endotsr.results.export.scene import open_scene
+    from endotsr.results.views.page import KEYS, check_page, write_page
+    from endotsr.studies.windows.page import WINDOW_KEYS
+    from endotsr.studies.windows.record import is_windowed
+    from endotsr.training.runs.files import refuse_unwritable
+    from endotsr.training.runs.sources import load_run_sequence
 
     usual = WINDOW_KEYS if is_windowed(options.scene) else KEYS
     keys = usual if options.keys is None else options.keys
@@ -111,8 +111,8 @@ def _write_page(options: ExportOptions) -> None:
 
 def _write_windows_page(options: ExportOptions, title: str, keys: int) -> None:
     """Write the page of a run of windows, and the folder of its windows."""
-    from endotsr.windows.page import window_files, write_windows_page
-    from endotsr.windows.scene import WindowFrames, open_windows
+    from endotsr.studies.windows.page import window_files, write_windows_page
+    from endotsr.studies.windows.scene import WindowFrames, open_windows
 
     scene, folder = open_windows(options.scene), window_files(options.out)
     frames = WindowFrames(scene, options.sequence) if options.held_out else None

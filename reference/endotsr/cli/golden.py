@@ -90,8 +90,8 @@ def run(words: list[str]) -> int:
 
 
 def _judge(words: list[str]) -> int:
-    from endotsr.golden.judge.store import golden_folder, read_golden
-    from endotsr.golden.judge.verdict import judge
+    from endotsr.port.judge.store import golden_folder, read_golden
+    from endotsr.port.judge.verdict import judge
 
     options = parse(JudgeOptions, words, "golden judge")
     if options.outdir == Path():
@@ -106,9 +106,9 @@ def _judge(words: list[str]) -> int:
 
 
 def _run(words: list[str]) -> int:
-    from endotsr.golden.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
-    from endotsr.golden.judge.store import golden_folder, read_golden
-    from endotsr.golden.judge.verdict import judge, only_of, without_claim
+    from endotsr.port.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
+    from endotsr.port.judge.store import golden_folder, read_golden
+    from endotsr.port.judge.verdict import judge, only_of, without_claim
 
     options = parse(RunOptions, words, "golden run")
     refuse_command(options.port)
@@ -128,10 +128,10 @@ def _run(words: list[str]) -> int:
 
 
 def _report(report, golden, outdir: Path, options: _Reported) -> int:
-    from endotsr.golden.judge.report import as_html, as_json, as_table
+    from endotsr.port.judge.report import as_html, as_json, as_table
 
     if report.first_wrong and options.search > 0:
-        from endotsr.golden.search.find import explain
+        from endotsr.port.search.find import explain
 
         explain(golden, report, outdir, options.search)
     print(as_table(report, everything=options.all))
@@ -144,8 +144,8 @@ def _report(report, golden, outdir: Path, options: _Reported) -> int:
 
 
 def _reference(words: list[str]) -> int:
-    from endotsr.golden.judge.store import golden_folder, read_golden
-    from endotsr.golden.reference import answer_all, answer_requests
+    from endotsr.port.judge.store import golden_folder, read_golden
+    from endotsr.port.reference import answer_all, answer_requests
 
     options = parse(ReferenceOptions, words, "golden reference")
     if options.requests is not None:

@@ -24,7 +24,7 @@ class GradcheckOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.gradcheck.command import run_gradcheck
+    from endotsr.port.gradcheck.command import run_gradcheck
 
     options = parse(GradcheckOptions, words, "gradcheck")
     return run_gradcheck(list(options.names) or None, options.seed, options.json, options.definition)

@@ -10,7 +10,7 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
-from endotsr.runs.files import write_json
+from endotsr.training.runs.files import write_json
 from endotsr.untrusted.writing import replace_text
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks")
@@ -39,11 +39,11 @@ class InspectOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.effects.inspect import inspect_sequence, inspection_record
-    from endotsr.effects.plan import make_plan, plan_record
-    from endotsr.report.inspection import inspection_html, inspection_text
-    from endotsr.runs.sources import load_sequence
-    from endotsr.simulator.settings import SimulatorSettings
+    from endotsr.clips.effects.inspect import inspect_sequence, inspection_record
+    from endotsr.clips.effects.plan import make_plan, plan_record
+    from endotsr.clips.simulator.settings import SimulatorSettings
+    from endotsr.results.report.inspection import inspection_html, inspection_text
+    from endotsr.training.runs.sources import load_sequence
 
     base, _ = base_settings(words)
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))

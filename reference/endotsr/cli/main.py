@@ -14,7 +14,7 @@ from endotsr import __version__
 from endotsr.cli.parts.commands import COMMANDS, FORMER
 from endotsr.cli.parts.output import redirected, split_output
 from endotsr.errors import CalibrationError, InputError
-from endotsr.runs.stopping import signals_stop
+from endotsr.training.runs.stopping import signals_stop
 from endotsr.untrusted.names import plain_line
 
 OTHER_PROGRAMS = "close other programs"
@@ -62,7 +62,7 @@ def _main(words: list[str]) -> int:
         if _is_closed_pipe(error):  # for example `endotsr ... | head`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 141
-        from endotsr.runs.files import os_error_line
+        from endotsr.training.runs.files import os_error_line
 
         return _fail(os_error_line(error))
     except FloatingPointError as error:

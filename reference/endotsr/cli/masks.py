@@ -33,10 +33,10 @@ class MasksOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(MasksOptions, words, "masks")
-    from endotsr.sequences.files import shortened
-    from endotsr.sequences.layouts import open_recording
-    from endotsr.sequences.make_masks import OVERLAY, enter_masks, write_proposal
-    from endotsr.sequences.source_options import SourceOptions
+    from endotsr.clips.sequences.files import shortened
+    from endotsr.clips.sequences.layouts import open_recording
+    from endotsr.clips.sequences.make_masks import OVERLAY, enter_masks, write_proposal
+    from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.untrusted.writing import refuse_existing
 
     if options.out is None:

@@ -10,7 +10,7 @@ from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:
-    from endotsr.sequences.source_options import SourceOptions
+    from endotsr.clips.sequences.source_options import SourceOptions
 
 
 @dataclass
@@ -91,10 +91,10 @@ class PrepareOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(PrepareOptions, words, "prepare")
-    from endotsr.sequences.editing import cropped, united
-    from endotsr.sequences.layouts import open_recording
-    from endotsr.sequences.prepare import PrepareSettings, prepare
-    from endotsr.sequences.sequence_file import RIGHT
+    from endotsr.clips.sequences.editing import cropped, united
+    from endotsr.clips.sequences.layouts import open_recording
+    from endotsr.clips.sequences.prepare import PrepareSettings, prepare
+    from endotsr.clips.sequences.sequence_file import RIGHT
     from endotsr.untrusted.writing import refuse_existing
 
     if not options.replace:
@@ -111,7 +111,7 @@ def run(words: list[str]) -> int:
     print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
     found, notes = prepare(recording, options.out, settings, replace=options.replace)
     if options.also:
-        from endotsr.sequences.for_others import describe_for
+        from endotsr.clips.sequences.for_others import describe_for
 
         notes += describe_for(options.out, options.also)
     for note in notes:
@@ -140,7 +140,7 @@ def _check_numbers(options: PrepareOptions) -> None:
 
 def _stated(options: PrepareOptions) -> "SourceOptions":
     """The options on the source."""
-    from endotsr.sequences.source_options import SourceOptions
+    from endotsr.clips.sequences.source_options import SourceOptions
 
     same = (
         "layout", "stereo", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
@@ -159,7 +159,7 @@ def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
     if depth:
         return f"next: endotsr train {out} --out RUN"
     if pair and not stereo:
-        from endotsr.sequences.sequence_file import FILE_NAME
+        from endotsr.clips.sequences.sequence_file import FILE_NAME
 
         return (
             "next: set the baseline of the two cameras, [camera] baseline in"

@@ -60,13 +60,13 @@ class RenderOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.export.times import Times
-    from endotsr.kernels.threads import use_threads
-    from endotsr.runs.sources import refuse_inside_data
-    from endotsr.views import pictures
-    from endotsr.views.film import film_rate, speed_in_words, write_film
-    from endotsr.views.plan import ViewRequest
-    from endotsr.windows.scene import open_any, shown_frames
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.results.export.times import Times
+    from endotsr.results.views import pictures
+    from endotsr.results.views.film import film_rate, speed_in_words, write_film
+    from endotsr.results.views.plan import ViewRequest
+    from endotsr.studies.windows.scene import open_any, shown_frames
+    from endotsr.training.runs.sources import refuse_inside_data
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)

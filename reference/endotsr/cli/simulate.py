@@ -11,11 +11,11 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.clips.simulator.scenes import SCENES, effects_on, named_scene, scene_of
+from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.errors import InputError
-from endotsr.runs.files import os_error_line
-from endotsr.runs.folder import refuse_existing
-from endotsr.simulator.scenes import SCENES, effects_on, named_scene, scene_of
-from endotsr.simulator.settings import SimulatorSettings
+from endotsr.training.runs.files import os_error_line
+from endotsr.training.runs.folder import refuse_existing
 from endotsr.untrusted.writing import replacing_folder
 
 STILL = named_scene("still")
@@ -71,7 +71,7 @@ def run(words: list[str]) -> int:
 
 def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> None:
     """Check the options and the output path, then write the folder atomically."""
-    from endotsr.simulator import folder, stereomis
+    from endotsr.clips.simulator import folder, stereomis
 
     out, raw = options.out, options.layout == "stereomis"
     assert out is not None

@@ -9,9 +9,9 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 
 if TYPE_CHECKING:
-    from endotsr.sweeps.place import Place
-    from endotsr.sweeps.spec import Spec
-    from endotsr.sweeps.sweep import Rows
+    from endotsr.studies.sweeps.place import Place
+    from endotsr.studies.sweeps.spec import Spec
+    from endotsr.studies.sweeps.sweep import Rows
 
 
 @dataclass
@@ -40,8 +40,8 @@ class SweepOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.sweeps.place import Place, check_place
-    from endotsr.sweeps.spec import read_spec
+    from endotsr.studies.sweeps.place import Place, check_place
+    from endotsr.studies.sweeps.spec import read_spec
 
     options = parse(SweepOptions, words, "sweep")
     place = Place(options.workers, options.threads, options.scheduler)
@@ -54,9 +54,9 @@ def run(words: list[str]) -> int:
 
 def run_spec(spec: "Spec", out: Path, place: "Place", retry: bool, on_rows=lambda rows: None) -> "Rows":
     """Execute a sweep at `place` with a progress bar; returns its rows."""
-    from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.sweeps.place import outcomes_at
-    from endotsr.sweeps.sweep import Inputs, run_sweep
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+    from endotsr.studies.sweeps.place import outcomes_at
+    from endotsr.studies.sweeps.sweep import Inputs, run_sweep
 
     load_lpips_weights(spec.lpips)  # raises for unusable weights before the first run
     inputs = Inputs(keep=place.scheduler is not None)
@@ -67,8 +67,8 @@ def run_spec(spec: "Spec", out: Path, place: "Place", retry: bool, on_rows=lambd
 
 def ended(rows: "Rows", out: Path) -> int:
     """Print the table and advice on failed runs; returns 0, or 1 if a run failed."""
-    from endotsr.sweeps.execute import FAILED
-    from endotsr.sweeps.results import FILES, results_markdown
+    from endotsr.studies.sweeps.execute import FAILED
+    from endotsr.studies.sweeps.results import FILES, results_markdown
 
     print(results_markdown(rows))
     print(f"table: {', '.join(str(out / name) for name in FILES)}")
@@ -79,7 +79,7 @@ def ended(rows: "Rows", out: Path) -> int:
 
 
 def _list(spec: "Spec", out: Path) -> int:
-    from endotsr.sweeps.sweep import Inputs, planned
+    from endotsr.studies.sweeps.sweep import Inputs, planned
 
     plan = planned(spec, out, Inputs(keep=False), retry=False)
     for job in plan.jobs:

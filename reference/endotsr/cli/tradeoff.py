@@ -9,10 +9,10 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_folder, write_json
+from endotsr.training.runs.files import refuse_folder, write_json
 
 if TYPE_CHECKING:
-    from endotsr.tradeoff.scenes import StudyScene
+    from endotsr.studies.tradeoff.scenes import StudyScene
 
 RESULT = "tradeoff.json"  # in the folder of the measurement
 
@@ -46,8 +46,8 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
-    from endotsr.tradeoff.budget import frame_advice, parse_budget
-    from endotsr.tradeoff.results import Measurement, read_result
+    from endotsr.studies.tradeoff.budget import frame_advice, parse_budget
+    from endotsr.studies.tradeoff.results import Measurement, read_result
 
     budget = None if options.budget is None else parse_budget(options.budget)
     file = options.out / RESULT
@@ -71,10 +71,10 @@ def _refuse(options: TradeoffOptions) -> None:
 
 
 def _measure(options: TradeoffOptions) -> dict[str, Any]:
-    from endotsr.kernels.threads import use_threads
-    from endotsr.report.tables import plain
-    from endotsr.tradeoff.study import described, run_study
-    from endotsr.tradeoff.text import COLUMNS, front_rows, made
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.results.report.tables import plain
+    from endotsr.studies.tradeoff.study import described, run_study
+    from endotsr.studies.tradeoff.text import COLUMNS, front_rows, made
 
     use_threads(options.threads)
     out = options.out
@@ -90,7 +90,7 @@ def _measure(options: TradeoffOptions) -> dict[str, Any]:
 
 def chosen_scene(options: TradeoffOptions) -> "StudyScene":
     """The scene selected by the options."""
-    from endotsr.tradeoff import scenes
+    from endotsr.studies.tradeoff import scenes
 
     if options.splats is not None:
         return scenes.splat_scene(options.splats, max(1, round(scenes.SIDE * options.scale)))

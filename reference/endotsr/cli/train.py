@@ -17,12 +17,12 @@ from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
-from endotsr.runs.folder import RunFolder, open_run, refuse_existing
-from endotsr.runs.records import RunRecord
-from endotsr.windows.record import is_windowed
+from endotsr.studies.windows.record import is_windowed
+from endotsr.training.runs.folder import RunFolder, open_run, refuse_existing
+from endotsr.training.runs.records import RunRecord
 
 if TYPE_CHECKING:
-    from endotsr.sequences.sequence import Sequence
+    from endotsr.clips.sequences.sequence import Sequence
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
 RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run: they do not affect results
@@ -76,7 +76,7 @@ class TrainOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.results.evaluation.lpips import load_lpips_weights
 
     base, schedule_note = base_settings(words)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
@@ -105,8 +105,8 @@ def run(words: list[str]) -> int:
 def _train_windows(options: TrainOptions, words: list[str]) -> int:
     """Train the missing windows of a recording, and evaluate it."""
     from endotsr.cli.parts.windows import evaluate_windows, plan_windows, train_windows
-    from endotsr.sweeps.place import Place, check_place
-    from endotsr.windows.make import recording_settings, with_visits
+    from endotsr.studies.sweeps.place import Place, check_place
+    from endotsr.studies.windows.make import recording_settings, with_visits
 
     assert options.out is not None
     if options.effects != "everything":
@@ -159,13 +159,13 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
 
 def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
     """Check everything, print the settings and the sequence, and train to the end."""
-    from endotsr.effects.auto import planned_settings
-    from endotsr.kernels.threads import use_threads
-    from endotsr.runs.files import refuse_inside
-    from endotsr.runs.sources import SIMULATED, load_sequence, start_record
-    from endotsr.runs.training import train_new_run
-    from endotsr.simulator.recorded import recorded_positions
-    from endotsr.simulator.settings import SimulatorSettings
+    from endotsr.clips.effects.auto import planned_settings
+    from endotsr.clips.simulator.recorded import recorded_positions
+    from endotsr.clips.simulator.settings import SimulatorSettings
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.training.runs.files import refuse_inside
+    from endotsr.training.runs.sources import SIMULATED, load_sequence, start_record
+    from endotsr.training.runs.training import train_new_run
 
     if not options.sequence:
         raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
@@ -200,8 +200,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 
 def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> tuple[Config, str]:
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
-    from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.runs.pace import paced_for, seconds_of_unit
+    from endotsr.training.fitting.compile_ahead import compile_ahead
+    from endotsr.training.runs.pace import paced_for, seconds_of_unit
 
     assert options.minutes is not None
     compile_ahead(config, print)
@@ -215,9 +215,9 @@ def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> 
 
 def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence"]:
     """Check the settings, and train a run from its last checkpoint to the end."""
-    from endotsr.kernels.threads import use_threads
-    from endotsr.runs.sources import check_same_input, load_sequence, run_source
-    from endotsr.runs.training import extend_run, resume_run
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.training.runs.sources import check_same_input, load_sequence, run_source
+    from endotsr.training.runs.training import extend_run, resume_run
 
     assert options.out is not None
     folder = open_run(options.out)
@@ -239,7 +239,7 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
 
 def _progress(folder: RunFolder, sequence: "Sequence", config: Config) -> Progress:
     """The progress of a training, on standard error and as a page in its folder."""
-    from endotsr.report.live_page import LIVE_PAGE, LivePage
+    from endotsr.results.report.live_page import LIVE_PAGE, LivePage
 
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(config, sequence.width * sequence.height, LivePage(folder, sequence, config))

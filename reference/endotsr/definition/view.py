@@ -1,4 +1,4 @@
-"""One training view, equation (6), composed of forward and reverse pairs: the twin of `endotsr.fitting.view`.
+"""One training view, equation (6), composed of forward and reverse pairs: the twin of `endotsr.training.fitting.view`.
 
 Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
                         camera --(B16)--^

@@ -5,8 +5,8 @@ from pathlib import Path
 from endotsr.cli.parts.options import differences
 from endotsr.config import Config
 from endotsr.errors import InputError
-from endotsr.runs.files import write_json
-from endotsr.runs.folder import RunFolder
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.folder import RunFolder
 
 # Settings that affect equation (7).
 REPLACEABLE = (
@@ -27,10 +27,10 @@ def calibrate_run(folder: RunFolder, config: Config, source: str | None, json: P
 
     Raises:  InputError for a change of another setting; CalibrationError if no view gives a ratio.
     """
-    from endotsr.fitting.objective import calibrate_on
-    from endotsr.kernels.threads import use_threads
-    from endotsr.runs.model import load_model
-    from endotsr.runs.sources import load_run_sequence
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.training.fitting.objective import calibrate_on
+    from endotsr.training.runs.model import load_model
+    from endotsr.training.runs.sources import load_run_sequence
 
     replaced = differences(config, folder.config(), "run")
     _refuse_fixed(replaced, folder.path)

@@ -10,14 +10,14 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.result import JsonFile
 from endotsr.config import PAPER, Section, SequenceConfig
 from endotsr.errors import InputError
-from endotsr.runs.files import read_json, write_json
-from endotsr.runs.folder import open_run
+from endotsr.studies.windows.record import is_windowed
+from endotsr.training.runs.files import read_json, write_json
+from endotsr.training.runs.folder import open_run
 from endotsr.untrusted.writing import replace_text
-from endotsr.windows.record import is_windowed
 
 if TYPE_CHECKING:
-    from endotsr.evaluation.records import EvaluationRecord
-    from endotsr.sequences.sequence import Sequence
+    from endotsr.clips.sequences.sequence import Sequence
+    from endotsr.results.evaluation.records import EvaluationRecord
 
 
 class ShownSettings(Section, frozen=True, kw_only=True):
@@ -82,8 +82,8 @@ def shown_sequence(command: str, run: Path | None, source: str | None, settings:
 
     Raises: InputError if neither is given, or for settings together with a run.
     """
-    from endotsr.runs.sources import load_run_sequence, load_sequence
-    from endotsr.simulator.settings import SimulatorSettings
+    from endotsr.clips.simulator.settings import SimulatorSettings
+    from endotsr.training.runs.sources import load_run_sequence, load_sequence
 
     if run is not None:
         if settings != SHOWN:
@@ -99,8 +99,8 @@ def compare_methods(asked: EvaluateOptions) -> None:
 
     A method is a run folder, a JSON file, a folder of pictures or a video, as PATH or NAME=PATH.
     """
-    from endotsr.evaluation.compare import compare, methods_of
-    from endotsr.report.comparison import METRICS, comparison_csv, comparison_table
+    from endotsr.results.evaluation.compare import compare, methods_of
+    from endotsr.results.report.comparison import METRICS, comparison_csv, comparison_table
 
     if asked.seed < 0:
         raise InputError(f"evaluate: --seed {asked.seed} is not allowed; allowed: an integer >= 0")
@@ -134,8 +134,8 @@ def _metrics(
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
         return cast("EvaluationRecord", read_json(path / "metrics.json")), sequence
-    from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.evaluation.pictures import find_pictures, is_video, measure_pictures
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+    from endotsr.results.evaluation.pictures import find_pictures, is_video, measure_pictures
 
     if not path.is_dir() and not is_video(path):
         return cast("EvaluationRecord", read_json(path)), sequence

@@ -14,7 +14,7 @@ from typing import Any
 from endotsr.cli.parts.commands import COMMANDS
 from endotsr.cli.parts.fields import fields_of
 from endotsr.cli.parts.mistakes import option_names
-from endotsr.simulator.scenes import SCENES
+from endotsr.clips.simulator.scenes import SCENES
 
 ALWAYS = ("--help", "--help-all", "--quiet", "--log-file")
 SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # command with the options of another command

@@ -17,7 +17,7 @@ from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
 from endotsr.config import allowed_values, checked, merged
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable
+from endotsr.training.runs.files import refuse_unwritable
 
 T = TypeVar("T")
 HELP_ALL = "--help-all"

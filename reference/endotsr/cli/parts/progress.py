@@ -8,14 +8,14 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from endotsr.clips.sequences.checks.cost import Standing, gaussians_at_end, iteration_work, work_left
 from endotsr.config import Config
-from endotsr.fitting.records import LogEntry
-from endotsr.report.tables import duration
-from endotsr.sequences.checks.cost import Standing, gaussians_at_end, iteration_work, work_left
+from endotsr.results.report.tables import duration
+from endotsr.training.fitting.records import LogEntry
 
 if TYPE_CHECKING:
-    from endotsr.fitting.state import TrainingState
-    from endotsr.report.live_page import LivePage
+    from endotsr.results.report.live_page import LivePage
+    from endotsr.training.fitting.state import TrainingState
 
 QUIET_SECONDS = 30.0  # between lines if standard error is no terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the postfix contains the time left

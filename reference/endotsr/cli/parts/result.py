@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from endotsr.cli.parts.fields import Option
-from endotsr.runs.files import write_json
+from endotsr.training.runs.files import write_json
 
 JsonFile = Annotated[Path | None, Option("FILE", written=True)]
 

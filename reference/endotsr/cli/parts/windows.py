@@ -6,23 +6,23 @@ from typing import TYPE_CHECKING, Any, cast
 from endotsr.cli.parts.progress import StepBar
 from endotsr.config import Config
 from endotsr.errors import InputError
-from endotsr.report.tables import duration
-from endotsr.runs.files import refuse_inside, write_json
-from endotsr.runs.sources import SIMULATED
+from endotsr.results.report.tables import duration
+from endotsr.training.runs.files import refuse_inside, write_json
+from endotsr.training.runs.sources import SIMULATED
 
 if TYPE_CHECKING:
-    from endotsr.evaluation.records import EvaluationRecord
-    from endotsr.sweeps.place import Place
+    from endotsr.results.evaluation.records import EvaluationRecord
+    from endotsr.studies.sweeps.place import Place
 
 AUTO = "auto"
 
 
 def train_windows(out: Path, place: "Place") -> int:
     """Train the windows of a plan; returns 0, or 1 if a window failed."""
-    from endotsr.sweeps.execute import FINISHED
-    from endotsr.sweeps.place import outcomes_at
-    from endotsr.windows.make import make_windows, size_of
-    from endotsr.windows.record import read_record
+    from endotsr.studies.sweeps.execute import FINISHED
+    from endotsr.studies.sweeps.place import outcomes_at
+    from endotsr.studies.windows.make import make_windows, size_of
+    from endotsr.studies.windows.record import read_record
 
     record = read_record(out)
     for gap in record.left_out:
@@ -37,8 +37,8 @@ def train_windows(out: Path, place: "Place") -> int:
 
 def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: int, chain: int) -> None:
     """Survey a recording and write its window plan; `windows` is a number of frames or `auto`."""
-    from endotsr.windows.make import plan_recording
-    from endotsr.windows.plan import Wanted
+    from endotsr.studies.windows.make import plan_recording
+    from endotsr.studies.windows.plan import Wanted
 
     if source in ("", SIMULATED):
         raise InputError("train: --windows needs a sequence folder; allowed: a folder of `prepare` or `simulate`")
@@ -52,10 +52,10 @@ def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: 
 
 def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> dict[str, Any]:
     """Evaluate a run of windows, write metrics.json to its folder, and print the tables; returns the metrics."""
-    from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.report.run_text import held_out_table
-    from endotsr.windows.measure import measure_windows
-    from endotsr.windows.scene import WindowFrames, open_windows
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+    from endotsr.results.report.run_text import held_out_table
+    from endotsr.studies.windows.measure import measure_windows
+    from endotsr.studies.windows.scene import WindowFrames, open_windows
 
     scene = open_windows(run)
     metrics = measure_windows(scene, WindowFrames(scene, source), load_lpips_weights(lpips))

@@ -1,0 +1,161 @@
+"""Picture files of a recording: PNG, JPEG, TIFF, WebP, BMP, and OpenEXR if OpenCV supports it.
+
+In: a path. Out: RGB or grey pixels as stored. Every reader refuses files that OpenCV would silently repair: a truncated
+JPEG decodes to a picture whose lower part is grey. Sizes are checked before decoding.
+"""
+
+import importlib
+import io
+import struct
+import warnings
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endotsr.clips.opencv import decoded, opaque, read_png, write_encoded
+from endotsr.clips.opencv.library import cv2_library
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import Array
+from endotsr.untrusted.files import MOST_PIXELS, read_bytes
+from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.png import LARGEST_FILE
+
+JPEG_ENDINGS = (".jpg", ".jpeg")
+TIFF_ENDINGS = (".tif", ".tiff")
+EXR_ENDINGS = (".exr",)
+PICTURE_ENDINGS = (".png", *JPEG_ENDINGS, *TIFF_ENDINGS, ".webp", ".bmp")  # of colour pictures and masks
+JPEG_END = b"\xff\xd9"
+STARTS = {  # extension -> file type, and its first bytes
+    **dict.fromkeys(JPEG_ENDINGS, ("JPEG", (b"\xff\xd8\xff",))),
+    **dict.fromkeys(TIFF_ENDINGS, ("TIFF", (b"II*\0", b"MM\0*"))),
+    ".webp": ("WebP", (b"RIFF",)),
+    ".bmp": ("BMP", (b"BM",)),
+    ".exr": ("EXR", (b"v/1\x01",)),
+}
+PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
+GAMMA = 1 / 2.2  # of sRGB, as stated in a PNG
+ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
+GREY = ("1", "L")  # modes of Pillow
+NOT_DECODED = ("LA", "La", "PA", "LAB")  # OpenCV drops their transparency or reads them as RGB
+
+
+def read_picture(path: Path) -> Array:
+    """Pixels of a PNG, JPEG, TIFF, WebP, BMP or EXR file: (H, W) grey or (H, W, 3) RGB, in the stored type.
+
+    Raises:  InputError naming the file if it is missing, of another type, truncated, damaged, not opaque or rotated by
+             its EXIF data, if it contains several pictures, or if it has more than 2^26 pixels.
+    """
+    ending = Path(path).suffix.lower()
+    if ending == ".png":
+        return read_png(path)
+    if ending not in STARTS:
+        raise InputError(f"{path}: no picture by its name; allowed: {', '.join((*PICTURE_ENDINGS, *EXR_ENDINGS))}")
+    data = read_bytes(Path(path), LARGEST_FILE)
+    kind = _check_start_and_end(data, ending, path)
+    pixels = None if kind == "EXR" else _by_pillow(data, kind, path)
+    if pixels is not None:
+        return pixels
+    return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
+
+
+def other_profile(path: Path) -> bool:
+    """Whether a picture states a colour profile (ICC) or a gamma (PNG) other than sRGB.
+
+    False for an unreadable file.
+    """
+    kind = "PNG" if path.suffix.lower() == ".png" else STARTS.get(path.suffix.lower(), ("", ()))[0]
+    if kind not in PLUGINS:
+        return False
+    try:
+        data = read_bytes(path, LARGEST_FILE)
+        if kind == "WebP":
+            _check_size(_webp_size(data), path)
+        with _plugin(kind)(io.BytesIO(data)) as picture:
+            profile, stated = picture.info.get("icc_profile") or b"", picture.info
+    except Exception:  # reading the pixels reports the fault
+        return False
+    if not profile and "srgb" not in stated and abs(stated.get("gamma", GAMMA) - GAMMA) > GAMMA / 10:
+        return True
+    return bool(profile) and not any("sRGB".encode(code) in profile for code in ("ascii", "utf-16-be"))
+
+
+def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
+    """Pixels. For a TIFF, only the header is checked and None is returned.
+
+    Pillow returns the same pixels as OpenCV. OpenCV prints warnings about a damaged JPEG, reads the first of several
+    pictures, and reads the unused fourth byte of a BMP as transparency. For TIFF, Pillow truncates 16 bits and its
+    library prints warnings.
+    """
+    try:
+        if kind == "WebP":
+            _check_size(_webp_size(data), path)  # Pillow allocates the picture when it opens the file
+        with _plugin(kind)(io.BytesIO(data)) as picture:
+            _check_size(picture.size, path)
+            _check_one_upright(picture, path)
+            if kind == "TIFF":
+                if picture.mode in NOT_DECODED:
+                    raise InputError(f"{path}: a TIFF of the mode {picture.mode}; allowed: grey, palette, RGB, CMYK")
+                return None
+            if picture.mode in GREY:
+                return np.array(picture.convert("L"))
+            alpha = "A" in picture.getbands() or "transparency" in picture.info
+            return np.ascontiguousarray(opaque(np.array(picture.convert("RGBA" if alpha else "RGB")), path))
+    except InputError:
+        raise
+    except Exception as error:  # Pillow passes on any error of its metadata parsers
+        raise InputError(f"{path}: damaged {kind}: {plain_line(str(error))}") from None
+
+
+@cache
+def _plugin(kind: str) -> Any:
+    """Pillow's class for a file type, without the limit of `Image.open`, which prints a warning."""
+    name = PLUGINS[kind]
+    warnings.filterwarnings("ignore", module=r"PIL\.")  # about metadata, without a file name
+    return getattr(importlib.import_module(f"PIL.{name}Plugin"), f"{name}File")
+
+
+def _check_one_upright(picture: Any, path: Path) -> None:
+    turn = picture.getexif().get(ORIENTATION, 1)
+    if turn not in (0, 1):
+        raise InputError(
+            f"{path}: its EXIF data rotate the picture (orientation {turn}), but a calibration may not;"
+            " allowed: pictures stored in the orientation in which they are shown"
+        )
+    if getattr(picture, "n_frames", 1) != 1:
+        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture per file")
+
+
+def _check_size(size: tuple[int, int], path: Path) -> None:
+    if not 0 < size[0] * size[1] <= MOST_PIXELS:
+        raise InputError(f"{path}: {size[0]}x{size[1]} pixels; allowed: at most {MOST_PIXELS}")
+
+
+def _webp_size(data: bytes) -> tuple[int, int]:
+    """Width and height in the header of a WebP file, in any of its three forms."""
+    form, start = data[12:16], data[20:30].ljust(10, b"\0")
+    if form == b"VP8X":  # 24 bits each, less one
+        return 1 + int.from_bytes(start[4:7], "little"), 1 + int.from_bytes(start[7:10], "little")
+    if form == b"VP8L":  # 14 bits each, less one
+        (packed,) = struct.unpack_from("<I", start, 1)
+        return 1 + (packed & 0x3FFF), 1 + (packed >> 14 & 0x3FFF)
+    width, height = struct.unpack_from("<HH", start, 6)
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _check_start_and_end(data: bytes, ending: str, path: Path) -> str:
+    """The file type by its extension, confirmed by its first bytes."""
+    kind, starts = STARTS[ending]
+    if not data:
+        raise InputError(f"{path}: the file is empty")
+    if not data.startswith(starts):
+        raise InputError(f"{path}: not a {kind} file by its first bytes")
+    if kind == "JPEG" and JPEG_END not in data[-64:]:  # some cameras append a few bytes
+        raise InputError(f"{path}: truncated JPEG: the file ends after {len(data)} bytes, without its end marker")
+    return kind
+
+
+def write_jpeg(path: Path, pixels: Array, quality: int = 95) -> None:
+    """Write (H, W, 3) RGB uint8 as JPEG. Raises InputError if the file cannot be written."""
+    write_encoded(path, pixels, ".jpeg", (cv2_library().IMWRITE_JPEG_QUALITY, quality))

@@ -1,0 +1,140 @@
+"""A picture between two training frames, interpolated along dense optical flow (specification B14).
+
+With the flows f from the earlier frame to the later and g back, the motion field at the time fraction a in [0, 1]
+solves
+
+    v_0(x) = f(x - a v_0(x)),    v_1(x) = -g(x + (1 - a) v_1(x)),    v = (1 - a) v_0 + a v_1.
+
+A pixel x blends the warped pair I_0(x - a v(x)) and I_1(x + (1 - a) v(x)) in time, and likewise the unwarped pair
+I_0(x) and I_1(x). The two blends are mixed with weights inverse to the local squared difference within each pair: where
+the flow is wrong, the warped pictures disagree. A pixel is tissue if at least one frame is tissue at its warped
+position, and is blended from those frames only.
+
+In: a sequence and the indices of two training frames. Out: a `Frame`. No held-out picture is read.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.sequence import Frame, Sequence
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.method.splatting.camera import Camera
+
+STEPS = 3  # fixed-point steps for v_0 and v_1; for smooth flow, a fourth step changes under 0.05 px
+WHOLE = 0.999  # bilinear weight above which all four neighbours are tissue, or have a prior depth
+NEARBY = 2.0  # px, standard deviation of the Gaussian window of the differences; 1 to 4 give the same within 0.1 dB
+ONE_STEP = (1 / 255) ** 2  # squared difference of one grey level, the rounding of 8-bit pictures
+
+
+class Flows(NamedTuple):
+    """Dense flow between two frames, in both directions."""
+
+    forward: FloatArray  # (2, H, W) px, x first: earlier -> later
+    backward: FloatArray  # (2, H, W) px: later -> earlier
+
+
+def flows_between(sequence: Sequence, earlier: int, later: int) -> Flows:
+    """Dense flow between two frames of a sequence, in both directions."""
+    from endotsr.clips.opencv import dense_flow
+
+    a, b = sequence.images[earlier], sequence.images[later]
+    return Flows(dense_flow(a, b), dense_flow(b, a))
+
+
+def motion_between(flows: Flows, fraction: float) -> FloatArray:
+    """The motion field v at the time fraction `fraction` (B14).
+
+    fraction  a in [0, 1]: 0 is the earlier frame, 1 the later
+    returns   (2, H, W) px from the earlier frame to the later, at the position of a point at that time
+
+    Edges:   constant opposite flows give that flow at every time. Swapping the frames and a -> 1 - a only changes the
+             sign of the field.
+    """
+    from endotsr.clips.opencv import warp_bilinear
+
+    a, b = np.float32(fraction), np.float32(1.0 - fraction)
+    from_earlier, from_later = flows.forward, -flows.backward
+    for _ in range(STEPS):
+        from_earlier = warp_bilinear(flows.forward, -a * from_earlier)  # (18.2), (18.4)
+        from_later = -warp_bilinear(flows.backward, b * from_later)  # (18.3)
+    return b * from_earlier + a * from_later  # (18.5)
+
+
+def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
+    """The picture, tissue mask and prior depth at a time between two frames, as a `Frame` (B14).
+
+    earlier, later  frame indices, any distance apart
+    fraction        a in [0, 1]
+    flows           from `flows_between` for these frames
+    returns         Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior;
+                    time and camera interpolated
+
+    Reverse: none; the result is held fixed during training.
+    """
+    from endotsr.clips.opencv import warp_bilinear, warp_cubic
+
+    pair, a = [earlier, later], np.float32(fraction)
+    weights = np.array([1.0 - fraction, fraction], np.float32)
+    field = motion_between(flows, fraction)
+    places = (-a * field, (1 - a) * field)  # (18.1)
+
+    def moved(planes: NDArray, warp) -> FloatArray:
+        return np.stack([warp(plane.astype(np.float32), place) for plane, place in zip(planes, places, strict=True)])
+
+    images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
+    seen = moved(tissue, warp_bilinear) > WHOLE
+    both = seen[0] & seen[1] & tissue[0] & tissue[1]
+    image = _mixed(moved(images, warp_cubic), images, seen, both, weights)
+    known = moved(tissue & (sequence.depth[pair] > 0), warp_bilinear) > WHOLE
+    depth = _blended(moved(sequence.depth[pair], warp_bilinear), known, weights)
+    mask = np.tensordot(weights, seen, 1) > 0
+    time = (1.0 - fraction) * float(sequence.times[earlier]) + fraction * float(sequence.times[later])
+    camera = camera_between(sequence.cameras[earlier], sequence.cameras[later], fraction)
+    return Frame(np.ascontiguousarray(np.clip(image, 0, 1)), mask, depth, time, camera)
+
+
+def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArray, weights: FloatArray) -> FloatArray:
+    """(3, H, W) the warped and the unwarped pair, mixed with weights inverse to the local difference within each.
+
+    moved, still  (2, 3, H, W) warped, unwarped
+    seen          (2, H, W) the warped pictures are tissue
+    both          (H, W) both pairs are tissue in both frames; elsewhere only the warped pictures are used
+    weights       (2,) of the two frames
+    """
+    of_moved, of_still = _difference(moved), _difference(still)
+    fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the unwarped pair: (18.7), (18.9)
+    return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)  # (18.6)
+
+
+def _difference(pair: FloatArray) -> FloatArray:
+    """(H, W) local mean squared difference of two pictures (2, 3, H, W), at least `ONE_STEP`."""
+    from endotsr.clips.opencv import gaussian_blur
+
+    return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)  # (18.8)
+
+
+def _blended(pair: FloatArray, usable: BoolArray, weights: FloatArray) -> FloatArray:
+    """The planes (2, ..., H, W) of two frames, blended where both are usable; else the usable one, else 0."""
+    part = weights[:, None, None] * usable
+    part = part / np.maximum(part.sum(axis=0), np.finfo(np.float32).tiny)
+    return (part.reshape(2, *(1,) * (pair.ndim - 3), *usable.shape[1:]) * pair).sum(axis=0)
+
+
+def camera_between(earlier: Camera, later: Camera, fraction: float) -> Camera:
+    """The camera at a time between two cameras: linear centre, rotation at constant angular speed, linear intrinsics.
+
+    Edges:   the same object twice is returned unchanged.
+    """
+    if earlier is later:
+        return earlier
+    from scipy.spatial.transform import Rotation
+
+    from endotsr.method.splatting.camera import camera_centre
+
+    turn = Rotation.from_matrix(later.rotation @ earlier.rotation.T).as_rotvec()
+    rotation = Rotation.from_rotvec(fraction * turn).as_matrix() @ earlier.rotation
+    centre = (1.0 - fraction) * camera_centre(earlier) + fraction * camera_centre(later)
+    lens = {k: (1.0 - fraction) * getattr(earlier, k) + fraction * getattr(later, k) for k in ("fx", "fy", "cx", "cy")}
+    return earlier._replace(rotation=rotation, translation=-rotation @ centre, **lens)

@@ -1,0 +1,63 @@
+"""Checks of poses and calibration: jumps, units, field of view, principal point."""
+
+import numpy as np
+
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.recording import Lens
+from endotsr.clips.sequences.world import FAR_FROM_ORIGIN
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
+
+JUMP = 20.0  # times the median step
+TURN = 20.0  # degrees between neighbouring frames
+STILL = 1e-4  # of the depth; a shorter camera path is most likely in metres, with depth in millimetres
+FARTHEST_STEP = 2.0  # of the depth; with a larger step, neighbouring frames would not overlap
+WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
+OFF_CENTRE = 0.25  # of the picture
+
+
+def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Finding]:
+    """Findings on the cameras of a sequence; `depth` is its median depth, 0 if unknown."""
+    centres = np.array([camera_centre(camera) for camera in cameras])
+    found = lens_findings(cameras[0], where) + _step_findings(cameras, centres, where)
+    way, distance = float(np.ptp(centres, axis=0).max()), float(np.abs(centres).max())
+    if depth and 0 < way < STILL * depth:
+        found.append(finding("pose-unit", where, f"the camera moves {way:.3g} in all, the depth is {depth:.4g}"))
+    step = float(np.median(np.linalg.norm(np.diff(centres, axis=0), axis=1))) if len(centres) > 1 else 0.0
+    if depth and step > FARTHEST_STEP * depth:
+        found.append(finding("pose-unit", where, f"the camera moves {step:.4g} a frame, the depth is {depth:.4g}"))
+    if depth and distance > FAR_FROM_ORIGIN * depth:
+        found.append(finding("far-from-origin", where, f"the cameras are {distance:.3g} from the origin"))
+    return found
+
+
+def _step_findings(cameras: list[Camera], centres: FloatArray, where: str) -> list[Finding]:
+    """Jumps and turns between neighbouring frames."""
+    found = []
+    steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
+    moved = steps[steps > 0]
+    usual = float(np.median(moved)) if moved.size > 2 else np.inf
+    for i in np.flatnonzero(steps > JUMP * usual):
+        found.append(finding("pose-jump", where, f"the camera moves {steps[i]:.4g}, usually {usual:.4g}", int(i) + 1))
+    for i in range(1, len(cameras)):
+        angle = degrees_between(cameras[i].rotation, cameras[i - 1].rotation)
+        if angle > TURN:
+            found.append(finding("pose-turn", where, f"the camera turns by {angle:.0f} degrees", i))
+    return found
+
+
+def lens_findings(camera: Camera | Lens, where: str) -> list[Finding]:
+    """Field of view, principal point, shape of the pixels."""
+    found = []
+    angle = float(np.degrees(2 * np.arctan(camera.width / (2 * camera.fx))))
+    if not NARROWEST < angle < WIDEST:
+        found.append(finding("field-of-view", where, f"the horizontal field of view is {angle:.1f} degrees"))
+    across, down = abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)
+    if max(across, down) > OFF_CENTRE:
+        size = f"{camera.width}x{camera.height}"
+        what = f"the principal point is at ({camera.cx:g}, {camera.cy:g}) of {size}"
+        found.append(finding("principal-point", where, what))
+    ratio = camera.fy / camera.fx
+    if not 0.8 < ratio < 1.25:
+        found.append(finding("pixel-shape", where, f"fy / fx is {ratio:.2f}"))
+    return found

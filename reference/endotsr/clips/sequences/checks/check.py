@@ -1,0 +1,256 @@
+"""`endotsr check`: one pass over a sequence that collects every finding.
+
+In: a folder in the common format or in the EndoNeRF layout, and the settings. Out: `Checked`. Frames are read one at a
+time. An unreadable file becomes a finding, and the pass continues.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.checks.cameras import camera_findings
+from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
+from endotsr.clips.sequences.checks.depth import (
+    DepthFacts,
+    depth_facts,
+    depth_findings,
+    light_correlation,
+    light_finding,
+    usual_depth,
+)
+from endotsr.clips.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
+from endotsr.clips.sequences.checks.frames import (
+    FrameFacts,
+    frame_facts,
+    frame_findings,
+    gap_findings,
+    profile_findings,
+    time_findings,
+)
+from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
+from endotsr.clips.sequences.checks.parts import Parts, parts_of
+from endotsr.clips.sequences.depth_files import depth_plane, read_plane
+from endotsr.clips.sequences.files import check_pairing
+from endotsr.clips.sequences.frame_store import FrameStore
+from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
+from endotsr.clips.sequences.recording import colour_picture, grey_plane
+from endotsr.clips.sequences.sources import matching_files
+from endotsr.clips.sequences.splits import parse_frame_range, split_frames
+from endotsr.config import Config, lengthened
+from endotsr.errors import InputError
+from endotsr.method.kernels.machine import memory_of_machine
+from endotsr.method.kernels.memory import ASSUMED, unknown_memory
+
+T = TypeVar("T")
+Size = tuple[int, ...]  # height, width
+SAMPLED = 16  # frames whose masks are checked against pictures and depth
+STEP = 4  # pixels between their sampled rows and columns
+
+
+class Checked(NamedTuple):
+    """The result of a check."""
+
+    source: str
+    findings: list[Finding]  # refusals first
+    facts: dict[str, Any]  # frames, width, height, and the cost
+    pictures: list[tuple[str, NDArray[np.uint8]]]  # caption and small picture (h, w, 3), for a report
+
+    @property
+    def refused(self) -> bool:
+        """Whether a training would refuse the sequence."""
+        return any(finding.level == "refusal" for finding in self.findings)
+
+
+class _Pass:
+    """Findings, and facts kept from the frames."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+        self.frames: list[FrameFacts] = []
+        self.depth: list[DepthFacts] = []
+        self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
+        self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
+        self.light: list[float] = []  # rank correlation of brightness with depth, for the sampled frames
+        self.shading: list[Fit] = []  # for the sampled frames where it can be determined
+
+    def tried(self, make: Callable[[], T], code: str, where: object, frame: int | None = None) -> T | None:
+        """The value, or None with a refusal among the findings."""
+        try:
+            return make()
+        except InputError as error:
+            self.findings.append(finding(code, where, " ".join(str(error).split()), frame))
+            return None
+
+    def sized(self, make: Callable[[], NDArray], code: str, file: Path, i: int, size: Size | None) -> NDArray | None:
+        """As `tried`, for the array of a file, which another size than `size` refuses as well."""
+        found = self.tried(make, code, file, i)
+        if found is None or size is None or found.shape[:2] == size:
+            return found
+        what = f"{found.shape[1]}x{found.shape[0]} pixels, the first picture has {size[1]}x{size[0]}"
+        self.findings.append(finding("size", file, what, i))
+        return None
+
+
+def check_sequence(path: Path, config: Config) -> Checked:
+    """Every finding on the sequence at `path`.
+
+    Raises:  InputError only if there is nothing to check: no folder, or a layout that needs `endotsr prepare`.
+    """
+    run = _Pass()
+    parts = parts_of(Path(path), config.sequence, run.findings)
+    if not parts.images:
+        return Checked(str(path), worst_first(run.findings), {}, [])
+    _pairing(parts, run)
+    run.findings += (
+        profile_findings(parts.images[0]) + gap_findings(parts.images) + time_findings(parts.seconds, str(parts.folder))
+    )
+    size = _read_frames(parts, run)
+    facts: dict[str, Any] = {"frames": len(parts.images)}
+    if run.frames:
+        run.findings += frame_findings(run.frames, str(parts.images[0].parent))
+    if run.depth:
+        where, near = str(parts.depth[0].parent), config.raster.near
+        run.findings += depth_findings(run.depth, where, parts.arbitrary, near, parts.assumed)
+        run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
+    if run.samples:
+        _check_masks(parts, run, config)
+    config = _of_length(parts, config, run)
+    if size:
+        facts |= {"width": size[1], "height": size[0]}
+        cameras = run.tried(lambda: parts.cameras(size[1], size[0]), "cameras", parts.camera_file)
+        if cameras:
+            run.findings += camera_findings(cameras, usual_depth(run.depth), str(parts.camera_file))
+        facts["cost"] = _cost(parts, size, config, run)._asdict()
+    return Checked(str(path), worst_first(run.findings), facts, run.pictures)
+
+
+def _pairing(parts: Parts, run: _Pass) -> None:
+    for other in (parts.masks, parts.depth, parts.right):
+        if other:
+            run.tried(lambda other=other: check_pairing(parts.images, other), "pairing", other[0].parent)
+
+
+def _read_frames(parts: Parts, run: _Pass) -> Size | None:
+    """Read every frame once. Returns the size of the first readable picture."""
+    masks, depth = (_paired(parts.images, files) for files in (parts.masks, parts.depth))
+    sampled = set(np.linspace(0, len(parts.images) - 1, min(SAMPLED, len(parts.images))).astype(int).tolist())
+    size = None
+    for i, file in enumerate(parts.images):
+        picture = run.sized(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i, size)
+        if picture is None:
+            continue
+        size = size or picture.shape[:2]
+        run.frames.append(frame_facts(file.name, picture))
+        tissue = _mask(parts, run, masks[i], i, size)
+        found = _depth(parts, run, depth[i], i, size, tissue)
+        if i in sampled:
+            if found is not None:
+                run.light.append(light_correlation(picture, found, tissue))
+                run.shading += filter(None, [shading_fit(picture, found, tissue)])
+            _sample(run, file, picture, tissue, found)
+            if i == 0 and parts.right and found is not None:
+                _against_stereo(parts, run, picture, found, depth[i])
+    return size
+
+
+def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
+    try:
+        return matching_files(images, files) if files else [None] * len(images)
+    except InputError:
+        return [None] * len(images)  # reported by the check of the pairing
+
+
+def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: Size) -> NDArray[np.bool_] | None:
+    if file is None:
+        return None
+    plane = run.sized(lambda: grey_plane(read_picture(file), file), "mask", file, i, size)
+    if plane is None:
+        return None
+    read = lambda: tissue_masks([plane], [str(file)], parts.excluded_value)[0]
+    tissue = run.tried(read, "mask-values", file, i)
+    if tissue is not None and not tissue.any():
+        run.findings.append(finding("frame-without-tissue", file, "the mask excludes every pixel", i))
+    return tissue
+
+
+def _depth(
+    parts: Parts, run: _Pass, file: Path | None, i: int, size: Size, tissue: NDArray[np.bool_] | None
+) -> NDArray[np.float32] | None:
+    if file is None:
+        return None
+    stored = run.sized(lambda: read_plane(file), "depth-file", file, i, size)
+    if stored is None:
+        return None
+    depth = run.tried(lambda: depth_plane(stored, parts.depth_scale, file), "depth-values", file, i)
+    if depth is None:
+        return None
+    run.depth.append(depth_facts(file.name, depth, stored, tissue))
+    return depth
+
+
+def _sample(run: _Pass, file: Path, picture: NDArray, tissue: NDArray | None, depth: NDArray | None) -> None:
+    small = np.ascontiguousarray(picture[::STEP, ::STEP])
+    if len(run.pictures) < 4:
+        run.pictures.append((file.name, small))
+    if tissue is not None and depth is not None:
+        run.samples.append((file.name, small, tissue[::STEP, ::STEP], depth[::STEP, ::STEP]))
+
+
+def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:
+    """The depth of the first frame against the disparity of its stereo pair."""
+    right = run.tried(lambda: read_picture(parts.right[0]), "picture", parts.right[0], 0)
+    if right is None or right.shape != picture.shape:
+        return
+    disparity = agreed_disparity(picture, right)
+    if disparity is not None:
+        run.findings += stereo_finding(depth, disparity, str(file), 0)
+
+
+def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
+    """Polarity and tissue fraction on sampled frames, with the rules of training."""
+    names = [name for name, *_ in run.samples]
+    images = np.stack([small.transpose(2, 0, 1) for _, small, _, _ in run.samples])
+    masks, depth = (np.stack([sample[k] for sample in run.samples]) for k in (2, 3))
+    where, allow = str(parts.masks[0].parent), config.sequence.allow_tissue_fraction
+    excluded = parts.excluded_value
+    if run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where) is None:
+        return
+    if (
+        run.tried(
+            lambda: check_polarity(masks, depth, images, where, excluded, allow, parts.stated_in), "polarity", where
+        )
+        is None
+    ):
+        return
+    run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where)
+
+
+def _cost(parts: Parts, size: Size, config: Config, run: _Pass) -> Cost:
+    """Memory, disk and time of a training, with findings if they are insufficient."""
+    height, width, count, where = *size[:2], len(parts.images), str(parts.folder)
+    cost = estimated_cost(count, width, height, config)
+    run.tried(lambda: FrameStore(count, width, height, config.sequence.memory, where), "disk", where)
+    if cost.file_bytes:
+        what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and are stored in a file during training"
+        run.findings.append(finding("frames-in-file", where, what))
+    memory = memory_of_machine() or ASSUMED
+    if cost.total_bytes > memory:
+        has = unknown_memory() or f"this machine has {memory / 1e9:.1f} GB"
+        what = f"a training needs about {cost.total_bytes / 1e9:.1f} GB, {has}"
+        run.findings.append(finding("memory", where, what))
+    return cost
+
+
+def _of_length(parts: Parts, config: Config, run: _Pass) -> Config:
+    """The settings with the length of a training on these frames. An impossible split becomes a finding."""
+
+    def training_frames() -> int:
+        frames = parse_frame_range(config.sequence.frames, len(parts.images))
+        return len(split_frames(len(frames), config.sequence.split, config.sequence.block_length)[0])
+
+    count = run.tried(training_frames, "frames", parts.folder)
+    return config if count is None else lengthened(config, count)

@@ -1,0 +1,166 @@
+"""Checks of the prior depth: unit, scale, constancy, quantisation, coverage, and renderings of depth instead of depth.
+
+In: one `DepthFacts` per frame. Out: findings. Plausible lengths are those of endoscopy: tissue at 5 to 500 mm.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+
+NEAREST, FARTHEST = 5.0, 500.0  # mm; a median outside indicates another unit
+FEW_LEVELS = 6  # whole millimetres, as in published clips, give a dozen or more
+LITTLE = 0.2  # of the tissue
+FAR_OFF = 4.0
+FULL_SCALE = (255.0, 65535.0)
+MARK, MARKED = 8.0, 0.005  # a mark of missing depth: times the median, fraction of the pixels
+AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
+LIT, FEWEST = (20, 250), 300  # grey levels that are neither black nor overexposed; pixels of a correlation
+
+
+class DepthFacts(NamedTuple):
+    """Facts on the depth of a frame."""
+
+    name: str
+    median: float  # 0 without any
+    lowest: float
+    highest: float
+    levels: int  # distinct values; of many, among every eighth value
+    tissue_coverage: float  # fraction of the tissue that has depth
+    stored_highest: float  # largest stored value
+    integers: bool  # the file stores integers
+    at_highest: float = 0.0  # fraction of the pixels with depth that have the largest value
+
+
+def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: NDArray[np.bool_] | None) -> DepthFacts:
+    """The facts on a frame; `stored` are the values of the file, `tissue` is the mask or None."""
+    known = depth > 0
+    values = depth[known]
+    inside = known if tissue is None or tissue.shape != depth.shape else known[tissue]
+    return DepthFacts(
+        name,
+        float(np.median(values)) if values.size else 0.0,
+        float(values.min()) if values.size else 0.0,
+        float(values.max()) if values.size else 0.0,
+        _levels(values),
+        float(inside.mean()) if inside.size else 1.0,
+        float(np.nanmax(stored)) if stored.size else 0.0,
+        stored.dtype.kind in "iu",
+        float((values == values.max()).mean()) if values.size else 0.0,
+    )
+
+
+def _levels(values: NDArray[np.float32]) -> int:
+    """The number of distinct values, exact if it is small."""
+    some = len(np.unique(values[::8]))
+    return some if some >= FEW_LEVELS else len(np.unique(values))
+
+
+def depth_findings(
+    facts: list[DepthFacts], where: str, arbitrary: bool, near: float, assumed: str = ""
+) -> list[Finding]:
+    """Findings on the depth of a sequence. `assumed`: unmeasured properties as stated in sequence.toml."""
+    with_depth = [fact for fact in facts if fact.median > 0]
+    if not with_depth:
+        return [finding("no-depth", where, "no pixel of any frame has depth")]
+    usual = usual_depth(facts)
+    found = _numbers(with_depth, where)
+    if assumed:
+        found = [finding("assumed-depth", where, f"not measured of the depth: its {assumed}")]
+    if not arbitrary and not found:
+        found += unit_finding(usual, where)
+    if usual <= near:
+        found.append(finding("near-plane", where, f"median depth {usual:.4g} is before the near plane"))
+    found += [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, usual, where, i)]
+    coverage = float(np.mean([fact.tissue_coverage for fact in facts]))
+    if coverage < LITTLE:
+        found.append(finding("little-depth", where, f"{coverage:.1%} of the tissue has depth"))
+    return found
+
+
+def usual_depth(facts: list[DepthFacts]) -> float:
+    """The median over the frames with depth of their median depth; 0 without depth."""
+    return float(np.median([fact.median for fact in facts if fact.median] or [0.0]))
+
+
+def _of_frame(fact: DepthFacts, usual: float, where: str, i: int) -> list[Finding]:
+    """A frame without depth, or with depth at another scale; `usual` is the median over the frames."""
+    if fact.median == 0:
+        return [finding("frame-without-depth", where, f"{fact.name} has no depth", i)]
+    ratio = fact.median / usual
+    if not 1 / FAR_OFF <= ratio <= FAR_OFF:
+        return [finding("depth-far-off", where, f"median of {fact.name} is {ratio:.3g} times the usual", i)]
+    return []
+
+
+def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
+    """Depth that is a rendering of depth, or was truncated to a few values."""
+    highest = {fact.stored_highest for fact in facts}
+    integers = all(fact.integers for fact in facts)
+    if integers and max(highest) <= 3:
+        return [finding("metres-cut", where, f"the stored numbers are at most {max(highest):g}")]
+    if all(fact.lowest == fact.highest for fact in facts):
+        return [finding("constant-depth", where, "every frame has one and the same depth everywhere")]
+    if marked := mark_finding(facts, where):
+        return marked
+    if len(facts) > 2 and len(highest) == 1 and highest & set(FULL_SCALE) and integers:
+        return [finding("normalised-depth", where, f"the largest number of every frame is {max(highest):g}")]
+    levels = int(np.median([fact.levels for fact in facts]))
+    if levels < FEW_LEVELS:
+        return [finding("coarse-depth", where, f"a frame holds {levels} different depths")]
+    return []
+
+
+def mark_finding(facts: list[DepthFacts], where: str) -> list[Finding]:
+    """A warning if many pixels of most frames have one far too large value, such as 65535 or 1e6."""
+    found = [fact for fact in facts if fact.at_highest > MARKED and fact.highest > MARK * fact.median]
+    if not found or len(found) <= len(facts) / 2:
+        return []
+    fraction = float(np.mean([fact.at_highest for fact in found]))
+    times = float(np.mean([fact.highest / fact.median for fact in found]))
+    stored = f"{fraction:.1%} of the pixels hold {found[0].stored_highest:g}"
+    return [finding("marked-depth", where, f"{stored}, {times:.3g} times the median depth")]
+
+
+def unit_finding(usual: float, where: str) -> list[Finding]:
+    """A warning on a median depth, in millimetres, outside the range of an endoscope."""
+    if NEAREST <= usual <= FARTHEST:
+        return []
+    guesses = ((256.0, "millimetres times 256"), (1e-3, "metres"), (0.1, "centimetres"), (1000.0, "micrometres"))
+    likely = [text for factor, text in guesses if 20 <= usual / factor <= 200]
+    guess = f"; it looks like {' or '.join(likely)}" if likely else ""
+    return [finding("depth-unit", where, f"the median depth is {usual:.4g} mm{guess}")]
+
+
+def light_correlation(
+    picture: NDArray[np.uint8], depth: NDArray[np.float32], tissue: NDArray[np.bool_] | None
+) -> float:
+    """The rank correlation of brightness with depth over the tissue of a frame; NaN for too few pixels.
+
+    picture (H, W, 3), depth (H, W), 0 = none; tissue (H, W) or None. Black and overexposed pixels are ignored.
+    """
+    from scipy.stats import rankdata
+
+    step = max(1, min(depth.shape) // 96)
+    small, values = picture[::step, ::step], depth[::step, ::step]
+    brightest = small.max(axis=2)
+    usable = (values > 0) & (brightest > LIT[0]) & (brightest < LIT[1])
+    if tissue is not None:
+        usable &= tissue[::step, ::step]
+    if usable.sum() < FEWEST or np.ptp(values[usable]) == 0:
+        return float("nan")
+    light = small[usable].sum(axis=1, dtype=np.float64)
+    if np.ptp(light) == 0:
+        return float("nan")
+    return float(np.corrcoef(rankdata(light), rankdata(values[usable]))[0, 1])
+
+
+def light_finding(correlations: list[float], where: str) -> list[Finding]:
+    """A warning if brightness increases with depth in every checked frame."""
+    known = [value for value in correlations if np.isfinite(value)]
+    if not known or np.median(known) < AGAINST_LIGHT or min(known) < AGAINST_LIGHT / 2:
+        return []
+    what = f"brightness increases with depth (rank correlation {np.median(known):.2f}; a true depth has a negative one)"
+    return [finding("depth-against-light", where, what)]

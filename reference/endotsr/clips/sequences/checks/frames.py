@@ -1,0 +1,153 @@
+"""Checks of the pictures: black, white, grey and repeated frames, exposure jumps, gaps in the frame numbers.
+
+In: one small `FrameFacts` per frame, for clips of any length. Out: findings.
+"""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv.pictures import other_profile
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
+from endotsr.clips.sequences.files import frame_numbers, shortened
+
+SMALL = 8  # pixels between the sampled rows and columns
+BLACK, WHITE = 6.0, 249.0  # mean grey level
+SAME = 0.05  # mean difference in grey levels; sensor noise makes recorded frames differ by 0.5 or more
+FROZEN = 0.5  # as SAME, from the first frame of a clip to any other; encoders refine a still picture
+WOVEN = 1.15  # median of `FrameFacts.comb`, above which pictures are interlaced
+LEAST_ROWS = 16
+JUMP = 2.0  # ratio of the mean brightness of neighbouring frames; published clips stay within 1.15
+FLAT = 4  # grey levels between the darkest and the brightest pixel of a channel: a frame of one colour
+NOTHING = 0.5  # of the frames; a clip with more black, white or one-coloured frames shows nothing
+BLUE = 20.0  # grey levels of blue above red; in two public clips red is 30 and 47 above blue
+CLIPPED = 0.3  # of the pixels of a frame at 255 in all channels
+
+
+class FrameFacts(NamedTuple):
+    """Facts on a picture."""
+
+    name: str
+    small: NDArray[np.int16]  # (h, w, 3) every eighth pixel
+    clipped: float  # fraction at full white
+    comb: float  # difference of neighbouring rows relative to rows two apart
+
+
+def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
+    """The facts on a picture (H, W, 3)."""
+    step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
+    small = picture[::step, ::step].astype(np.int16)
+    return FrameFacts(name, small, float((small == 255).all(axis=2).mean()), _comb(picture))
+
+
+def _comb(picture: NDArray[np.uint8]) -> float:
+    """The mean difference between a row and its two neighbours, relative to rows two apart.
+
+    Progressive pictures have 0.5 to 0.8, pure noise 1, and interlaced pictures 1.1 to 2.3: their even and odd rows show
+    different times. 0 for a picture with few rows or without detail.
+    """
+    if picture.shape[0] < LEAST_ROWS:
+        return 0.0
+    rows = picture[:, ::2].sum(axis=2, dtype=np.float32)
+    near = np.abs(rows[2:-2] - (rows[1:-3] + rows[3:-1]) / 2).mean()
+    far = np.abs(rows[2:-2] - (rows[:-4] + rows[4:]) / 2).mean()
+    return float(near / far) if far > 0 else 0.0
+
+
+def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
+    """Findings on the pictures of a sequence, in time order."""
+    means = np.array([float(fact.small.mean()) for fact in facts])
+    found = [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, float(means[i]), where, i)]
+    readable = (means >= BLACK) & (means <= WHITE)
+    for i in range(1, len(facts)):
+        if readable[i - 1] and readable[i] and facts[i].small.shape == facts[i - 1].small.shape:
+            found += _of_neighbours(facts[i - 1], facts[i], float(means[i] / means[i - 1]), where, i)
+    found += _of_clip(facts, means, where)
+    grey = [fact.small.mean(axis=2) for fact in facts]
+    found += cut_findings(grey, [fact.name for fact in facts], readable, where) + halves_finding(grey, where)
+    found += alternating_finding(grey, where) + _blue_finding(facts, where)
+    comb = float(np.median([fact.comb for fact in facts])) if facts else 0.0
+    if comb > WOVEN:
+        what = f"neighbouring rows differ {comb:.2f} times as much as rows two apart"
+        found.append(finding("interlaced-pictures", where, what))
+    if facts and all((fact.small == fact.small[:, :, :1]).all() for fact in facts):
+        found.append(finding("grey-pictures", where, "every picture is grey"))
+    return found
+
+
+def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -> list[Finding]:
+    """A clip without content, or with one constant picture."""
+    flat = [float(np.ptp(fact.small, axis=(0, 1)).max()) <= FLAT for fact in facts]
+    empty = [k for k, mean in enumerate(means) if flat[k] or not BLACK <= mean <= WHITE]
+    if len(empty) > NOTHING * len(facts):
+        named = shortened([facts[k].name for k in empty])
+        what = f"{len(empty)} of {len(facts)} frames are black, white or of one colour: {named}"
+        return [finding("no-picture", where, what, empty[0])]
+    names, frames = [fact.name for fact in facts], [fact.small for fact in facts]
+    if len({frame.shape for frame in frames}) != 1 or len(frames) < 2:
+        return []
+    repeated = all(np.abs(b - a).mean() < SAME for a, b in pairwise(frames))
+    if repeated and all(np.abs(frame - frames[0]).mean() < FROZEN for frame in frames):
+        return [finding("constant-clip", where, f"all {len(facts)} frames are one picture: {shortened(names)}", 0)]
+    return []
+
+
+def _blue_finding(facts: list[FrameFacts], where: str) -> list[Finding]:
+    """A warning on a clip whose pictures are more blue than red."""
+    blueness = float(np.median([fact.small[:, :, 2].mean() - fact.small[:, :, 0].mean() for fact in facts] or [0.0]))
+    if blueness < BLUE:
+        return []
+    return [finding("blue-pictures", where, f"blue is {blueness:.0f} grey levels above red on average")]
+
+
+def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:
+    """A frame without content, or overexposed in large parts."""
+    if mean < BLACK:
+        return [finding("black-frame", where, f"{fact.name} is black (mean {mean:.1f} of 255)", i)]
+    if mean > WHITE:
+        return [finding("white-frame", where, f"{fact.name} is white (mean {mean:.1f} of 255)", i)]
+    if fact.clipped > CLIPPED:
+        return [finding("clipped-frame", where, f"{fact.name}: {fact.clipped:.0%} of it is fully white", i)]
+    return []
+
+
+def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: str, i: int) -> list[Finding]:
+    """A repeated frame or a brightness jump; `ratio` is the ratio of mean brightness."""
+    found = []
+    if np.abs(fact.small - before.small).mean() < SAME:
+        found.append(finding("duplicated-frame", where, f"{fact.name} repeats {before.name}", i))
+    if not 1 / JUMP < ratio < JUMP:
+        found.append(finding("exposure-jump", where, f"brightness changes by {ratio:.2f} times", i))
+    return found
+
+
+def time_findings(seconds: NDArray[np.float64] | None, where: str) -> list[Finding]:
+    """A note on stated, uneven frame times."""
+    if seconds is None or len(seconds) < 2:
+        return []
+    steps = np.diff(seconds)
+    return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
+
+
+def profile_findings(file: Path) -> list[Finding]:
+    """A note on a picture with a colour profile (ICC) other than sRGB; one file represents the clip."""
+    return [finding("colour-profile", file, "states a colour profile other than sRGB")] if other_profile(file) else []
+
+
+def gap_findings(files: list[Path]) -> list[Finding]:
+    """Missing frame numbers, for example of deleted or undecodable frames."""
+    numbers = frame_numbers(files)
+    if numbers is None or len(files) < 3 or len(numbers[0]) != 1:
+        return []
+    steps = np.diff([number[0] for number in numbers])
+    usual = int(np.median(steps))
+    wide = np.flatnonzero(steps != usual)
+    if not wide.size:
+        return []
+    i = int(wide[0])
+    what = f"{wide.size} gaps in the numbers; the first is between {files[i].name} and {files[i + 1].name}"
+    return [finding("number-gap", files[0].parent, what, i + 1)]

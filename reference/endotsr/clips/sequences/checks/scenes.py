@@ -1,0 +1,89 @@
+"""Checks that the pictures show one view of one scene.
+
+In: small grey pictures of the frames. Out: findings. Two joined takes, or a stereo pair read as one picture, train
+without an error and give a meaningless scene.
+"""
+
+import numpy as np
+
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+
+ALIKE = 0.6  # correlation of picture halves that indicates two views; published clips of one view have at most 0.3
+OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # correlation of neighbouring frames: at a cut, and usually elsewhere
+ALTERNATING = 0.2  # correlation of pictures two apart minus that of neighbours; motion makes it negative
+FARTHEST = 6  # the largest shift between two views is 1 / FARTHEST of the width of a half
+
+
+def cut_findings(grey: list[FloatArray], names: list[str], readable: BoolArray, where: str) -> list[Finding]:
+    """Frames at which another scene begins, in a clip whose neighbouring frames are otherwise similar.
+
+    grey       (h, w) of every frame, reduced
+    readable   frames that are neither black nor white
+    """
+    pairs = [i for i in range(1, len(grey)) if readable[i - 1] and readable[i] and grey[i].shape == grey[i - 1].shape]
+    alike = {i: _correlation(grey[i - 1], grey[i]) for i in pairs}
+    usual = float(np.median(list(alike.values()) or [0.0]))
+    if usual < SAME_SCENE:
+        return []
+    found = []
+    for i, value in alike.items():
+        if value < OTHER_SCENE:
+            what = f"{names[i]} does not resemble {names[i - 1]} (correlation {value:.2f}, usually {usual:.2f})"
+            found.append(finding("another-scene", where, what, i))
+    return found
+
+
+def alternating_finding(grey: list[FloatArray], where: str) -> list[Finding]:
+    """Alternating pictures of two cameras, or of two kinds of light.
+
+    grey   (h, w) of every frame, reduced
+    """
+    if len(grey) < 6 or len({picture.shape for picture in grey}) != 1:
+        return []
+    one, two = (float(np.median([_correlation(a, b) for a, b in zip(grey, grey[k:])])) for k in (1, 2))
+    if two < SAME_SCENE or two - one < ALTERNATING:
+        return []
+    what = f"every picture resembles the next but one (correlation {two:.2f}) more than the next ({one:.2f})"
+    return [finding("alternating-views", where, what)]
+
+
+def halves_finding(grey: list[FloatArray], where: str) -> list[Finding]:
+    """Pictures that seem to contain two simultaneous views.
+
+    grey   (h, w) of every frame, reduced
+    """
+    large = [picture for picture in grey if min(picture.shape) >= 2 * FARTHEST]
+    for layout, halves in (("side by side", _beside), ("stacked", _stacked)):
+        alike = float(np.median([_shifted_correlation(*halves(picture)) for picture in large] or [0.0]))
+        if alike > ALIKE:
+            what = f"the halves of the pictures, {layout}, resemble each other (correlation {alike:.2f})"
+            return [finding("two-views", where, what)]
+    return []
+
+
+def _beside(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
+    width = picture.shape[1] // 2
+    return picture[:, :width], picture[:, -width:]
+
+
+def _stacked(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
+    height = picture.shape[0] // 2
+    return picture[:height], picture[-height:]
+
+
+def _shifted_correlation(one: FloatArray, other: FloatArray) -> float:
+    """The largest correlation of two pictures over horizontal shifts of up to a sixth of the width."""
+    width = one.shape[1]
+    most = width // FARTHEST
+    return max(
+        _correlation(one[:, max(0, k) : width + min(0, k)], other[:, max(0, -k) : width + min(0, -k)])
+        for k in range(-most, most + 1)
+    )
+
+
+def _correlation(one: FloatArray, other: FloatArray) -> float:
+    """The correlation of two pictures of one size; 0 if one is constant."""
+    one, other = one - one.mean(), other - other.mean()
+    size = float(np.sqrt((one * one).sum() * (other * other).sum()))
+    return float((one * other).sum()) / size if size > 0 else 0.0

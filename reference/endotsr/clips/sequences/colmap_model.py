@@ -1,0 +1,207 @@
+"""COLMAP models, text or binary: cameras, images with their poses, and points.
+
+In: a folder with cameras, images and points3D (.txt or .bin). Out: a `ColmapModel`. COLMAP has the conventions of this
+project: world-to-camera, OpenCV axes, first pixel centre at (0.5, 0.5). Quaternions are w x y z.
+"""
+
+import struct
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.recording import CameraPose, Lens, checked_lens
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.files import read_bytes, read_text
+
+LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations
+
+# Name -> (number in binary files, parameter indices of fx fy cx cy and of the distortion k1 k2 p1 p2 ...).
+MODELS: dict[str, tuple[int, tuple[int, int, int, int], tuple[int | None, ...]]] = {
+    "SIMPLE_PINHOLE": (0, (0, 0, 1, 2), ()),
+    "PINHOLE": (1, (0, 1, 2, 3), ()),
+    "SIMPLE_RADIAL": (2, (0, 0, 1, 2), (3, None, None, None)),
+    "RADIAL": (3, (0, 0, 1, 2), (3, 4, None, None)),
+    "OPENCV": (4, (0, 1, 2, 3), (4, 5, 6, 7)),
+    "FULL_OPENCV": (6, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
+}
+NUMBERS = {number: name for name, (number, _, _) in MODELS.items()}
+PARAMETERS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8, "FULL_OPENCV": 12}
+
+
+class ModelImage(NamedTuple):
+    """One registered picture."""
+
+    name: str
+    camera: int
+    pose: CameraPose
+    points: NDArray[np.int64]  # ids of the visible points
+
+
+class ColmapModel(NamedTuple):
+    """A whole model."""
+
+    cameras: dict[int, Lens]
+    images: list[ModelImage]  # by name
+    points: dict[int, FloatArray]  # id -> (3,)
+
+
+def find_model(path: Path) -> Path | None:
+    """The folder of the model: the path or its sparse/0, sparse or colmap/sparse/0; None without a model."""
+    for folder in (path, path / "sparse" / "0", path / "sparse", path / "colmap" / "sparse" / "0"):
+        if any((folder / f"cameras{ending}").is_file() for ending in (".txt", ".bin")):
+            return folder
+    return None
+
+
+def read_model(folder: Path) -> ColmapModel:
+    """The model in a folder. Text files take precedence over binary files.
+
+    Raises:  InputError naming the file, and the line or entry that violates the format.
+    """
+    text = (folder / "cameras.txt").exists()
+    ending = ".txt" if text else ".bin"
+    for name in ("images", "points3D"):
+        if not (folder / f"{name}{ending}").is_file():
+            raise InputError(f"{folder / (name + ending)}: file not found")
+    if text:
+        cameras, images = _cameras_text(folder / "cameras.txt"), _images_text(folder / "images.txt")
+        points = _points_text(folder / "points3D.txt")
+    else:
+        cameras, images = _cameras_binary(folder / "cameras.bin"), _images_binary(folder / "images.bin")
+        points = _points_binary(folder / "points3D.bin")
+    for image in images:
+        if image.camera not in cameras:
+            raise InputError(f"{folder}: image {image.name}: camera {image.camera} is not in cameras{ending}")
+    return ColmapModel(cameras, sorted(images, key=lambda image: image.name), points)
+
+
+def _lens(name: str, width: int, height: int, values: list[float], where: str) -> Lens:
+    if name not in MODELS:
+        raise InputError(f"{where}: camera model {name}: allowed: {', '.join(MODELS)}")
+    if len(values) != PARAMETERS[name]:
+        raise InputError(f"{where}: {len(values)} parameters; {name} has {PARAMETERS[name]}")
+    _, (fx, fy, cx, cy), places = MODELS[name]
+    distortion = tuple(0.0 if place is None else values[place] for place in places)
+    lens = Lens(values[fx], values[fy], values[cx], values[cy], width, height, distortion if any(distortion) else ())
+    return checked_lens(lens, where)
+
+
+def _pose(values: list[float] | FloatArray, where: str) -> CameraPose:
+    from scipy.spatial.transform import Rotation
+
+    numbers = np.array(values, np.float64)
+    if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[:4]) - 1) > 1e-2:
+        raise InputError(f"{where}: no pose: allowed: a unit quaternion w x y z and three finite numbers")
+    return CameraPose(Rotation.from_quat(numbers[[1, 2, 3, 0]]).as_matrix(), numbers[4:7])
+
+
+def _lines(path: Path) -> list[tuple[int, str]]:
+    lines = read_text(path, LARGEST_FILE).splitlines()
+    return [(number, line) for number, line in enumerate(lines, 1) if not line.startswith("#")]
+
+
+def _cameras_text(path: Path) -> dict[int, Lens]:
+    found = {}
+    for number, line in _lines(path):
+        if line.strip():
+            words, where = line.split(), f"{path}: line {number}"
+            try:
+                key, width, height = int(words[0]), int(words[2]), int(words[3])
+                values = [float(word) for word in words[4:]]
+            except (ValueError, IndexError):
+                raise InputError(f"{where}: allowed: CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS") from None
+            found[key] = _lens(words[1], width, height, values, where)
+    return found
+
+
+def _images_text(path: Path) -> list[ModelImage]:
+    lines, found = _lines(path), []
+    while lines and not lines[-1][1].strip() and len(lines) % 2:
+        lines.pop()  # trailing empty line; elsewhere, an empty line means no points
+    for (number, line), (_, seen) in zip(lines[::2], [*lines[1::2], (0, "")]):
+        words, where = line.split(maxsplit=9), f"{path}: line {number}"
+        try:
+            values, camera, name = [float(word) for word in words[1:8]], int(words[8]), words[9].strip()
+            points = np.array(seen.split()[2::3], np.float64).astype(np.int64)
+        except (ValueError, IndexError):
+            raise InputError(f"{where}: allowed: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then points") from None
+        found.append(ModelImage(name, camera, _pose(values, where), points[points >= 0]))
+    return found
+
+
+def _points_text(path: Path) -> dict[int, FloatArray]:
+    found = {}
+    for number, line in _lines(path):
+        if line.strip():
+            words = line.split()
+            try:
+                found[int(words[0])] = np.array([float(word) for word in words[1:4]])
+            except (ValueError, IndexError):
+                raise InputError(f"{path}: line {number}: allowed: POINT3D_ID X Y Z R G B ERROR TRACK") from None
+    return found
+
+
+class _Bytes:
+    """Sequential reader of a binary file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.place, self.data = path, 0, read_bytes(path, LARGEST_FILE)
+
+    def take(self, form: str) -> tuple:
+        """The next values of a `struct` format, little-endian. Raises InputError at the end of the file."""
+        size = struct.calcsize("<" + form)
+        if self.place + size > len(self.data):
+            raise InputError(f"{self.path}: ends after {len(self.data)} bytes; {self.place + size} are needed")
+        values = struct.unpack_from("<" + form, self.data, self.place)
+        self.place += size
+        return values
+
+    def count(self, least: int) -> int:
+        """A count of entries of at least `least` bytes each, checked against the size of the file."""
+        (number,) = self.take("Q")
+        if number * least > len(self.data) - self.place:
+            raise InputError(f"{self.path}: states {number} entries; the file has {len(self.data)} bytes")
+        return number
+
+    def name(self) -> str:
+        """A zero-terminated string."""
+        end = self.data.find(b"\0", self.place)
+        if end < 0:
+            raise InputError(f"{self.path}: a name has no end")
+        text = self.data[self.place : end].decode("utf-8", "replace")
+        self.place = end + 1
+        return text
+
+
+def _cameras_binary(path: Path) -> dict[int, Lens]:
+    stream, found = _Bytes(path), {}
+    for _ in range(stream.count(24)):
+        key, model, width, height = stream.take("iiQQ")
+        where = f"{path}: camera {key}"
+        if model not in NUMBERS:
+            raise InputError(f"{where}: camera model number {model}: allowed: {', '.join(MODELS)}")
+        values = list(stream.take(f"{PARAMETERS[NUMBERS[model]]}d"))
+        found[key] = _lens(NUMBERS[model], width, height, values, where)
+    return found
+
+
+def _images_binary(path: Path) -> list[ModelImage]:
+    stream, found = _Bytes(path), []
+    for _ in range(stream.count(64)):
+        key, *values, camera = stream.take("i7di")
+        name, seen = stream.name(), stream.count(24)
+        points = np.array([stream.take("ddq")[2] for _ in range(seen)], np.int64)
+        found.append(ModelImage(name, camera, _pose(values, f"{path}: image {key}"), points[points >= 0]))
+    return found
+
+
+def _points_binary(path: Path) -> dict[int, FloatArray]:
+    stream, found = _Bytes(path), {}
+    for _ in range(stream.count(43)):
+        key, x, y, z, *_ = stream.take("QdddBBBd")
+        stream.take(f"{2 * stream.count(8)}i")
+        found[key] = np.array([x, y, z])
+    return found

@@ -1,0 +1,143 @@
+"""Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .pfm, and OpenEXR if OpenCV supports it."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv import area_resize, write_png
+from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
+from endotsr.clips.sequences.masks import sparse_step
+from endotsr.clips.sequences.recording import grey_plane
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.untrusted import arrays as untrusted
+from endotsr.untrusted.files import read_bytes
+
+CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
+ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
+LEAST_DEPTH_FRACTION = 0.05  # of a frame; the median of fewer pixels may be an outlier
+DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
+DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
+LARGEST_FILE = 1 << 32  # bytes
+PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
+ALLOWED = "allowed: an .npy file of numbers"
+
+
+def read_plane(path: Path) -> NDArray:
+    """The values (H, W) of a file as stored. Axes of length 1 are dropped.
+
+    Raises:  InputError naming the file and the reason.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in DEPTH_ENDINGS:
+        raise InputError(f"{path}: no depth by its name; allowed: {', '.join(DEPTH_ENDINGS)}")
+    array = read_npy(path) if ending == ".npy" else read_pfm(path) if ending == ".pfm" else read_picture(path)
+    plane = grey_plane(array, path) if ending not in (".npy", ".pfm") else np.squeeze(array)
+    if plane.ndim != 2:
+        raise InputError(f"{path}: array of shape {array.shape}; allowed: one plane (height, width)")
+    return plane
+
+
+def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) -> NDArray:
+    """The array of real numbers in an .npy file. Pickled objects are never loaded.
+
+    largest  size limit, bytes
+    allowed  allowed files, for the message
+
+    Raises:  InputError for a missing, invalid or truncated file, and for anything but real numbers.
+    """
+    try:
+        array = untrusted.read_npy(Path(path), largest)
+    except InputError as error:
+        raise InputError(f"{error}; {allowed}") from None
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{path}: not one array of real numbers")
+    return array
+
+
+def read_pfm(path: Path) -> NDArray[np.float32]:
+    """The plane (H, W) of a greyscale PFM file, top row first. Raises InputError for any other file."""
+    data = read_bytes(Path(path), LARGEST_FILE)
+    header = PFM_HEADER.match(data)
+    if not header or header[1] != b"Pf":
+        raise InputError(f"{path}: not a grey PFM file (its first bytes are not `Pf width height scale`)")
+    width, height, scale = int(header[2]), int(header[3]), float(header[4])
+    if len(data) - header.end() != 4 * width * height:
+        raise InputError(
+            f"{path}: {len(data) - header.end()} bytes of pixels, {width}x{height} need {4 * width * height}"
+        )
+    plane = np.frombuffer(data, "<f4" if scale < 0 else ">f4", offset=header.end()).reshape(height, width)
+    return np.ascontiguousarray(plane[::-1], np.float32)  # the format stores the bottom row first
+
+
+def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32]:
+    """Depth (H, W) in scene units, from stored values times `scale`. Invalid values (0, negative, not finite) become 0.
+
+    Raises:  InputError if no value of a floating-point file is finite, or if a value exceeds the range of float32.
+    """
+    if raw.dtype.kind == "f" and raw.size and not np.isfinite(raw).any():
+        raise InputError(f"{where}: no value is finite; allowed: lengths, and 0 where there is no depth")
+    with np.errstate(over="ignore"):
+        depth = raw.astype(np.float64) * scale
+    depth[~np.isfinite(depth) | (depth <= 0)] = 0.0
+    if depth.size and depth.max() > np.finfo(np.float32).max:
+        raise InputError(f"{where}: depth {depth.max():g} is too large")
+    return depth.astype(np.float32)
+
+
+def clip_depth(depth: NDArray, percentiles: tuple[float, float]) -> NDArray[np.float32]:
+    """Depth (H, W) clipped to two percentiles of its non-zero values, as float32. 0 (no depth) stays 0."""
+    result = depth.astype(np.float32)
+    valid = result > 0
+    if valid.any():
+        low, high = np.percentile(result[valid], percentiles)
+        result[valid] = np.clip(result[valid], low, high)
+    return result
+
+
+def reduced_depth(depth: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
+    """Depth (H, W) at a smaller size: the mean of the depths that a new pixel covers, or 0 if it covers none."""
+    fraction = area_resize((depth > 0).astype(np.float32), width, height)
+    found = np.zeros(fraction.shape, np.float32)
+    return np.divide(area_resize(depth, width, height), fraction, out=found, where=fraction > 0)
+
+
+def check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list[np.dtype], unit: str) -> None:
+    """Refuse a depth picture that is stretched to 16 bits among pictures with lengths in 8 bits.
+
+    Mixed bit depths are valid and occur in published sequences: one large value makes a picture 16-bit.
+    """
+    for i, ratio in far_off(depth, ANOTHER_SCALE) if len(set(types)) > 1 else []:
+        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_FRACTION * depth[i].size:
+            bits = 8 * types[i].itemsize
+            other = next(j for j, kind in enumerate(types) if kind != types[i])
+            raise InputError(
+                f"{files[i]}: {bits}-bit picture, its median depth is {ratio:.3g} times the usual one, while"
+                f" {files[other].name} has {8 * types[other].itemsize} bits; allowed: {unit} in every picture"
+            )
+
+
+def far_off(depth: NDArray[np.float32], factor: float) -> list[tuple[int, float]]:
+    """Frames whose median depth differs from the usual one by more than `factor`, each with its ratio."""
+    step = sparse_step(depth.shape[1])
+    sparse = depth[:, ::step, ::step]
+    medians = {i: float(np.median(frame[frame > 0])) for i, frame in enumerate(sparse) if (frame > 0).any()}
+    usual = float(np.median(list(medians.values()) or [1.0]))
+    ratios = [(i, median / usual) for i, median in medians.items()]
+    return [(i, ratio) for i, ratio in ratios if not 1 / factor <= ratio <= factor]
+
+
+def step_of_depth(largest: float) -> float:
+    """The step of 16-bit depth: the smallest 1, 2 or 5 times a power of ten for which eight times `largest` fits."""
+    least = largest / DEPTH_LEVELS
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(f"{next(factor for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)) * power:.1g}")
+
+
+def write_levels(path: Path, depth: NDArray[np.float32], step: float) -> int:
+    """Write depth in 16-bit steps, at least 1 where there is depth. Returns the number of pixels clipped at 65535."""
+    levels = np.rint(depth / step)
+    write_png(path, np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16))
+    return int(np.count_nonzero(levels > 65535))

@@ -1,0 +1,66 @@
+"""Hamlyn, rectified by Endo-Depth-and-Motion: one folder per clip, `rectified01` and so on.
+
+color/ or image01/   left pictures, jpg or png
+image02/             right pictures (optional); the folder does not state the baseline
+depth/ or depth01/   16 bits, millimetres (optional)
+intrinsics.txt       K of the rectified pictures, three lines of three or four numbers, OpenCV's convention
+"""
+
+from pathlib import Path
+
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
+from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL, read_matrix
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
+from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.recording import Recording, lens_of_matrix
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
+from endotsr.errors import InputError
+
+CAMERA = "intrinsics.txt"
+LEFT, RIGHT, DEPTH = ("color", "image01"), ("image02",), ("depth", "depth01")
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder with a camera matrix and one of the folders of left pictures."""
+    return (path / CAMERA).is_file() and _first(path, LEFT) is not None
+
+
+def _first(path: Path, names: tuple[str, ...]) -> Path | None:
+    return next((path / name for name in names if (path / name).is_dir()), None)
+
+
+def open_hamlyn(path: Path, options: SourceOptions) -> Recording:
+    """The folder as a recording. Raises InputError."""
+    left_folder, right_folder, depth_folder = (_first(path, names) for names in (LEFT, RIGHT, DEPTH))
+    if left_folder is None or not (path / CAMERA).is_file():
+        raise InputError(f"{path}: allowed: a folder with {CAMERA} and {' or '.join(LEFT)}")
+    left = list_pictures(left_folder, PICTURE_ENDINGS)
+    right = list_pictures(right_folder, PICTURE_ENDINGS) if right_folder else []
+    if right:
+        check_pairing(left, right)
+    width, height = size_of(left)
+    depth = list_pictures(depth_folder, DEPTH_ENDINGS) if depth_folder else []
+    recording = Recording(
+        layout="hamlyn",
+        where=path,
+        names=[file.stem for file in left],
+        pictures=pictures_from_files(left, right),
+        depth=depth_reader(matching_files(left, depth), 1.0) if depth else None,
+        lens=lens_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
+        baseline=options.baseline,
+        rate=options.rate,
+        notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout has no poses: the camera counts as static"],
+    )
+    return with_stated(recording, options)
+
+
+LAYOUT = Layout(
+    name="hamlyn",
+    about=f"a folder of Hamlyn with {CAMERA} and color/ or image01/",
+    rank=2,
+    recognises=recognises,
+    open=open_hamlyn,
+    takes=("masks", "depth", "baseline"),
+)

@@ -1,0 +1,111 @@
+"""A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one per frame, alone or as stereo pairs.
+
+A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
+or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording. All other properties
+are stated on the command line.
+"""
+
+import re
+from pathlib import Path
+
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
+from endotsr.clips.sequences.checks.frames import gap_findings, profile_findings
+from endotsr.clips.sequences.files import check_pairing, frame_numbers
+from endotsr.clips.sequences.layouts import STATEMENTS, Layout
+from endotsr.clips.sequences.recording import Recording
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import (
+    files_of,
+    halves,
+    pictures_from_files,
+    size_of,
+    stated_camera,
+    stated_depth,
+    stated_masks,
+    stated_poses,
+    unit_of,
+)
+from endotsr.errors import InputError
+
+PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
+         ("Left", "Right"), ("cam0", "cam1"), ("image01", "image02"))  # fmt: skip
+SIDE = re.compile(r"(?:^|[-_. ])(left|right|l|r)(?:[-_. ]|$)|(?<=\d)(l|r)$", re.IGNORECASE)  # in the stem of a name
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a picture, or a folder with pictures directly or in a known pair of folders."""
+    if path.is_file():
+        return path.suffix.lower() in PICTURE_ENDINGS
+    return path.is_dir() and any(_holds_pictures(folder) for folder in (path, *(path / left for left, _ in PAIRS)))
+
+
+def _holds_pictures(folder: Path) -> bool:
+    return folder.is_dir() and any(file.suffix.lower() in PICTURE_ENDINGS for file in folder.iterdir())
+
+
+def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
+    """Left and right picture files; right is empty for monocular pictures. Raises InputError."""
+    for left, right in PAIRS:
+        if path.is_dir() and _holds_pictures(path / left):
+            both = files_of(path / left, PICTURE_ENDINGS), []
+            if _holds_pictures(path / right):
+                both = both[0], files_of(path / right, PICTURE_ENDINGS)
+                check_pairing(*both)
+            return both
+    sides = _sides(path) if path.is_dir() else None
+    return sides if sides else (files_of(path, PICTURE_ENDINGS), [])
+
+
+def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
+    """The left and the right files of one folder by their names; None unless every name states its side."""
+    shown = (file for file in path.iterdir() if not file.name.startswith("."))
+    files = sorted(file for file in shown if file.suffix.lower() in PICTURE_ENDINGS)
+    found: dict[str, list[Path]] = {"l": [], "r": []}
+    for file in files:
+        side = SIDE.search(file.stem)
+        if side is None:
+            return None
+        found[(side[1] or side[2])[0].lower()].append(file)
+    if not (found["l"] and found["r"]):
+        return None
+    for one in found.values():
+        order = dict(zip(one, frame_numbers(one) or []))
+        one.sort(key=lambda file, order=order: order.get(file, ()))
+    check_pairing(found["l"], found["r"])
+    return found["l"], found["r"]
+
+
+def open_pictures(path: Path, options: SourceOptions) -> Recording:
+    """The pictures as a recording. Raises InputError."""
+    left, right = find_pictures(path)
+    stereo = "none" if options.stereo == "auto" else options.stereo
+    if right and stereo != "none":
+        raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
+    width, height = halves(*size_of(left), stereo)
+    lens, rig = stated_camera(options, width, height, path)
+    poses, notes = stated_poses(options, len(left), options.rate)
+    return Recording(
+        layout="pictures",
+        where=path,
+        names=[file.stem for file in left],
+        pictures=pictures_from_files(left, right, stereo),
+        masks=stated_masks(options, left, width, height),
+        depth=stated_depth(options, left),
+        unit=unit_of(options, "m"),
+        lens=lens,
+        rig=rig,
+        baseline=options.baseline,
+        poses=poses,
+        rate=options.rate,
+        notes=[found.line for found in profile_findings(left[0]) + gap_findings(left)] + notes,
+    )
+
+
+LAYOUT = Layout(
+    name="pictures",
+    about="a folder of pictures, or left/ and right/",
+    rank=9,
+    recognises=recognises,
+    open=open_pictures,
+    takes=tuple(name for name in STATEMENTS if name != "orientation"),
+)

@@ -1,0 +1,101 @@
+"""SCARED: the folder of a keyframe, with stereo video, calibration and kinematics.
+
+endoscope_calibration.yaml        OpenCV: M1 D1 M2 D2 R T, millimetres (camera_calibration.yaml in some copies)
+data/rgb.mp4                      left over right
+data/frame_data.tar.gz            or data/frame_data/: one JSON per frame, camera-pose (4x4), world-to-camera, mm
+
+Structured-light depth belongs to unrectified pictures and is not read; `endotsr depth` matches the pairs.
+"""
+
+import tarfile
+from dataclasses import replace
+from pathlib import Path
+
+from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.layouts.video import open_video
+from endotsr.clips.sequences.recording import CameraPose, Recording
+from endotsr.clips.sequences.sequence_file import checked_rotation
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.errors import InputError
+from endotsr.untrusted.files import read_text
+from endotsr.untrusted.json import parsed
+from endotsr.untrusted.yaml import matrix
+
+CALIBRATIONS = ("endoscope_calibration.yaml", "camera_calibration.yaml")
+VIDEO, FOLDER, ARCHIVE = "data/rgb.mp4", "data/frame_data", "data/frame_data.tar.gz"
+LARGEST_FILE, MOST_FILES = 1 << 20, 1 << 17  # bytes of the JSON of a frame; frames
+
+
+def _calibration(path: Path) -> Path | None:
+    return next((path / name for name in CALIBRATIONS if (path / name).is_file()), None)
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is the folder of a keyframe."""
+    return (path / VIDEO).is_file() and _calibration(path) is not None
+
+
+def open_scared(path: Path, options: SourceOptions) -> Recording:
+    """The keyframe as a recording. Raises InputError."""
+    calibration = options.calibration or _calibration(path)
+    if calibration is None or not (path / VIDEO).is_file():
+        raise InputError(f"{path}: allowed: a folder with {VIDEO} and {CALIBRATIONS[0]}")
+    stated = replace(options, stereo="stacked", calibration=calibration)
+    recording = open_video(path / VIDEO, stated)
+    notes, poses = [*recording.notes], recording.poses
+    if options.calibration is None:
+        notes.append(f"{calibration.name}: {HALF_A_PIXEL}; T in millimetres")
+    if poses is None:
+        poses = _poses(path, recording.count)
+        kinematics = (
+            "camera-pose of the kinematics: read as world-to-camera, millimetres; its authors report errors in it"
+        )
+        notes.append(kinematics if poses else f"{FOLDER} is missing: the camera counts as static")
+    return replace(recording, layout="scared", where=path, poses=poses, unit="mm", notes=notes)
+
+
+def _poses(path: Path, count: int) -> list[CameraPose | None] | None:
+    """World-to-camera poses of the frames; None without files."""
+    texts = _texts(path)
+    if not texts:
+        return None
+    found: list[CameraPose | None] = []
+    for name, content in texts[:count]:
+        where = f"{path / FOLDER / name}: camera-pose"
+        data = parsed(content, where)
+        stored = matrix(data.get("camera-pose") if isinstance(data, dict) else None, where, (4, 4))
+        rotation, translation = checked_rotation(stored[:3, :3], where), stored[:3, 3]
+        found.append(CameraPose(rotation, translation))
+    return found + [None] * (count - len(found))
+
+
+def _texts(path: Path) -> list[tuple[str, str | bytes]]:
+    """Names and contents of the JSON files, ordered by name."""
+    if (path / FOLDER).is_dir():
+        files = sorted((path / FOLDER).glob("*.json"))[:MOST_FILES]
+        return [(file.name, read_text(file, LARGEST_FILE)) for file in files]
+    if not (path / ARCHIVE).is_file():
+        return []
+    found = {}
+    try:
+        with tarfile.open(path / ARCHIVE, "r:gz") as archive:
+            for member in archive:
+                if member.isfile() and member.name.endswith(".json") and member.size <= LARGEST_FILE:
+                    stream = archive.extractfile(member)
+                    found[Path(member.name).name] = stream.read(LARGEST_FILE) if stream else b""
+                if len(found) > MOST_FILES:
+                    raise InputError(f"{path / ARCHIVE}: more than {MOST_FILES} files")
+    except (tarfile.TarError, OSError, EOFError) as error:
+        raise InputError(f"{path / ARCHIVE}: cannot be read: {error}") from None
+    return sorted(found.items())
+
+
+LAYOUT = Layout(
+    name="scared",
+    about=f"a keyframe of SCARED with {VIDEO} and {CALIBRATIONS[0]}",
+    rank=2,
+    recognises=recognises,
+    open=open_scared,
+    takes=("calibration", "trajectory", "masks"),
+)

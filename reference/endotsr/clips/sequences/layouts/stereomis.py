@@ -1,0 +1,70 @@
+"""StereoMIS as distributed: one stacked video (left on top), calibration, trajectory and tissue masks.
+
+*.mp4                      left over right; pictures are numbered from 0
+StereoCalibration.ini      see `calibration_formats`; for one picture of the pair, millimetres
+groundtruth.txt            frame tx ty tz qx qy qz qw, camera-to-world, metres (optional)
+masks/000123l.png          of the left picture, any value above 0 = tissue, perhaps at half size (optional)
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
+from endotsr.clips.sequences.files import list_pictures
+from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.layouts.video import open_video
+from endotsr.clips.sequences.recording import Recording
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import mask_reader, matching_files
+from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
+from endotsr.errors import InputError
+
+CALIBRATION = "StereoCalibration.ini"
+TRAJECTORY = "groundtruth.txt"
+MASKS = "masks"
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder with a stereo calibration and a video."""
+    return (path / CALIBRATION).is_file() and bool(_videos(path))
+
+
+def _videos(path: Path) -> list[Path]:
+    return sorted(file for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
+
+
+def open_stereomis(path: Path, options: SourceOptions) -> Recording:
+    """The folder as a recording. Raises InputError for more than one video, and for invalid files."""
+    videos = _videos(path)
+    if len(videos) != 1:
+        raise InputError(f"{path}: {len(videos)} videos ({', '.join(v.name for v in videos)}); allowed: one")
+    trajectory = path / TRAJECTORY
+    stated = replace(
+        options,
+        stereo="stacked" if options.stereo == "auto" else options.stereo,
+        calibration=options.calibration or path / CALIBRATION,
+        trajectory=options.trajectory or (trajectory if trajectory.is_file() else None),
+        trajectory_unit=options.trajectory_unit or "m",
+    )
+    recording = open_video(videos[0], stated)
+    notes = list(recording.notes)
+    if stated.trajectory is None:
+        notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
+    masks = recording.masks
+    if options.masks is None and (path / MASKS).is_dir():
+        assert recording.rig is not None
+        files = matching_files(recording.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
+        masks = mask_reader(files, "black", recording.rig.left.width, recording.rig.left.height)
+    elif masks is None:
+        notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
+    return replace(recording, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes)
+
+
+LAYOUT = Layout(
+    name="stereomis",
+    about="a folder with a stacked video and StereoCalibration.ini",
+    rank=2,
+    recognises=recognises,
+    open=open_stereomis,
+    takes=("stereo", "calibration", "trajectory", "masks", "depth", "orientation"),
+)

@@ -1,0 +1,102 @@
+"""TUM RGB-D folders: `rgb.txt`, `rgb/`, and optionally `depth.txt`, `depth/` and `groundtruth.txt`.
+
+`rgb.txt` and `depth.txt` have one line per picture, `time file`. `groundtruth.txt` is a camera-to-world trajectory in
+seconds and metres. Depth has 5000 steps per metre. Pictures, depth and poses are matched within 0.02 s.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.recording import CameraPose, Lens, Recording
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import (
+    depth_reader,
+    pictures_from_files,
+    size_of,
+    stated_camera,
+    stated_depth,
+    stated_masks,
+)
+from endotsr.clips.sequences.trajectory import poses_at, read_trajectory
+from endotsr.errors import InputError
+from endotsr.untrusted.files import read_text
+from endotsr.untrusted.names import relative_path
+
+LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
+STEP = 1000.0 / 5000.0  # mm per step of the stored depth
+LONGEST = 0.02  # seconds between a picture and its depth or pose
+DEFAULT = (525.0, 525.0, 320.0, 240.0)  # the intrinsics recommended by the authors of the layout, 640x480
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder with a list of timed pictures."""
+    return (path / LIST).is_file()
+
+
+def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
+    """Times and files of a list, in time order. Raises InputError naming the line."""
+    times, files = [], []
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        words = line.split(maxsplit=1)
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            time = float(words[0])
+        except ValueError:
+            time = float("nan")
+        if len(words) != 2 or not np.isfinite(time):
+            raise InputError(f"{path}: line {number}: allowed: a time in seconds and the name of a file")
+        times.append(time)
+        files.append(path.parent / relative_path(words[1].strip(), f"{path}: line {number}"))
+    if not times:
+        raise InputError(f"{path}: names no picture")
+    order = np.argsort(times, kind="stable")
+    return np.array(times)[order], [files[i] for i in order]
+
+
+def open_tum(path: Path, options: SourceOptions) -> Recording:
+    """The folder as a recording. Raises InputError."""
+    times, files = read_list(path / LIST)
+    width, height = size_of(files)
+    lens, _ = stated_camera(options, width, height, path)
+    notes = []
+    if lens is None and (width, height) == (640, 480):
+        lens = Lens(*DEFAULT, width, height)
+        notes.append("no --camera: the intrinsics recommended by the authors of the layout")
+    depth = None
+    if (path / DEPTH_LIST).is_file():
+        stamps, planes = read_list(path / DEPTH_LIST)
+        nearest = np.abs(stamps[None, :] - times[:, None]).argmin(axis=1)
+        paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
+        depth = depth_reader(paired, STEP)
+    poses: list[CameraPose | None] | None = None
+    where = options.trajectory or path / TRAJECTORY
+    if where.is_file():
+        poses = poses_at(read_trajectory(where, options.trajectory_unit or "m", options.direction), times, LONGEST)
+    steps = np.diff(times)
+    return Recording(
+        layout="tum",
+        where=path,
+        names=[file.stem for file in files],
+        pictures=pictures_from_files(files, []),
+        masks=stated_masks(options, files, width, height),
+        depth=stated_depth(options, files) or depth,
+        unit="mm",
+        lens=lens,
+        poses=poses,
+        rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
+        times=times if steps.size and (steps > 0).all() else None,
+        notes=notes,
+    )
+
+
+LAYOUT = Layout(
+    name="tum",
+    about="a folder with rgb.txt and rgb/",
+    rank=3,
+    recognises=recognises,
+    open=open_tum,
+    takes=("camera", "distortion", "trajectory", "masks", "depth"),
+)

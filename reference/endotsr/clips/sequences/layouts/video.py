@@ -1,0 +1,93 @@
+"""A video file: one picture per frame, or stereo pairs side by side or stacked."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.clips.sequences.layouts import STATEMENTS, Layout
+from endotsr.clips.sequences.recording import Picture, PicturePair, Recording
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import (
+    halves,
+    split_pair,
+    stated_camera,
+    stated_depth,
+    stated_masks,
+    stated_poses,
+    unit_of,
+)
+from endotsr.clips.sequences.video_file import VIDEO_ENDINGS, VideoFacts, video_facts, video_pictures
+from endotsr.errors import InputError
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a file with the ending of a video."""
+    return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
+
+
+def open_video(path: Path, options: SourceOptions) -> Recording:
+    """The video as a recording. Raises InputError."""
+    facts = video_facts(path)
+    quarters = _quarter_turns(facts, options, path)
+    across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
+    stereo = "none" if options.stereo == "auto" else options.stereo
+    width, height = halves(across, down, stereo)
+    rate = options.rate or facts.rate
+    times = None if options.rate else facts.times
+    lens, rig = stated_camera(options, width, height, path)
+    notes = _notes(facts, rate, path)
+    if facts.turn:
+        done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
+        notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth refer to these")
+    poses, note = stated_poses(options, facts.count, rate, times)
+
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
+        for i, picture in zip(wanted, video_pictures(path, wanted)):
+            turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
+            yield split_pair(turned, stereo, f"{path}: picture {i}")
+
+    return Recording(
+        layout="video",
+        where=path,
+        names=[f"{i:06d}" for i in range(facts.count)],
+        pictures=pictures,
+        masks=stated_masks(options, facts.count, width, height),
+        depth=stated_depth(options, facts.count),
+        unit=unit_of(options, "m"),
+        lens=lens,
+        rig=rig,
+        baseline=options.baseline,
+        poses=poses,
+        rate=rate,
+        times=times,
+        notes=notes + note,
+    )
+
+
+def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int:
+    """Counter-clockwise quarter turns to apply. Raises InputError for a stated rotation without --orientation."""
+    if facts.turn and options.orientation is None:
+        raise InputError(
+            f"{path}: the file states that its pictures are shown rotated by {facts.turn} degrees counter-clockwise;"
+            " intrinsics, masks and depth fit only one of the two: allowed: --orientation turned (as players and ffmpeg"
+            " show them) or --orientation stored (as the sensor wrote them)"
+        )
+    return facts.turn // 90 if options.orientation == "turned" else 0
+
+
+def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
+    found = [
+        f"{path.name}: {facts.count} pictures of {facts.width}x{facts.height}, {facts.codec}, {rate or 0:g} a second"
+    ]
+    found += [f"{path.name}: {remark}" for remark in facts.remarks]
+    if facts.interlaced:
+        found.append(f"{path.name} is interlaced: deinterlaced to one picture per two fields (bwdif)")
+    if facts.pixel_shape != 1:
+        found.append(f"{path.name}: pixels are {facts.pixel_shape:.4g} times as wide as high, as are fx and fy")
+    if facts.times is None:
+        found.append(f"{path.name} states no times: frames count as evenly spaced")
+    return found
+
+
+LAYOUT = Layout(name="video", about="a video file", rank=5, recognises=recognises, open=open_video, takes=STATEMENTS)

@@ -1,0 +1,173 @@
+"""`endotsr depth`: depth for every frame of a folder in the common format, from its stereo pairs or from files.
+
+In: the folder. Out: `depth/`, the section [depth] of its `sequence.toml`, and the coverage of every frame. The new
+`depth/` replaces an old one when it is complete.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
+from endotsr.clips.sequences.common import list_contents, open_common
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
+from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.recording import ARBITRARY, Lens, PicturePair, Recording
+from endotsr.clips.sequences.relative_depth import Align, MadeDepth, relative_depth
+from endotsr.clips.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
+from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
+from endotsr.errors import InputError
+from endotsr.untrusted.writing import replace_text, replacing_folder
+
+EXCHANGED = 3.0  # ratio of matches that indicates exchanged left and right pictures
+OnFrame = Callable[[int, int], None]
+Kind = Literal["depth", "disparity"]
+
+
+class DepthReport(NamedTuple):
+    """What was written."""
+
+    file: SequenceFile
+    coverage: list[float]  # per frame, fraction of its pixels
+    median: float  # of the frame medians
+
+
+def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
+    """Depth of every frame from its stereo pair. Raises InputError without right pictures or baseline."""
+    if recording.lens is None or not recording.baseline:
+        raise InputError(
+            f"{recording.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME};"
+            " allowed: the distance between the two cameras in the unit of the file"
+        )
+    lens, baseline = recording.lens, recording.baseline
+    disparity_range(settings, lens, baseline)
+    pairs: list[PicturePair] = []
+    depths: list[NDArray[np.float32]] = []
+    for i, pair in enumerate(recording.pictures(list(range(recording.count)))):
+        if pair.right is None:
+            raise InputError(f"{recording.where}: no right pictures (images_right/); allowed: a stereo sequence")
+        found = stereo_depth(pair.left, pair.right, lens, baseline, settings)
+        if i == 0 and (found > 0).mean() < LITTLE:
+            exchanged = stereo_depth(pair.right, pair.left, lens, baseline, settings)
+            _refuse_exchanged(float((found > 0).mean()), float((exchanged > 0).mean()), recording.where)
+        if not settings.temporal:
+            yield found
+            continue
+        pairs, depths = [*pairs, pair][-3:], [*depths, found][-3:]
+        if i:
+            middle = len(depths) - 2
+            yield _consistent(depths, pairs, middle)
+    if settings.temporal:
+        yield _consistent(depths[-2:], pairs[-2:], len(depths[-2:]) - 1)
+
+
+def _refuse_exchanged(coverage: float, exchanged: float, where: Path) -> None:
+    """Refuse exchanged left and right pictures, from the fractions of matched pixels as stored and exchanged."""
+    if exchanged > max(LITTLE, EXCHANGED * coverage):
+        raise InputError(
+            f"{where}: {coverage:.1%} of the pixels of the first frame match the right picture, and {exchanged:.1%}"
+            " with left and right exchanged; allowed: left pictures in images/ and right ones in images_right/"
+        )
+
+
+def _consistent(depths: list[NDArray[np.float32]], pairs: list[PicturePair], middle: int) -> NDArray[np.float32]:
+    return temporal_median(depths, [pair.left for pair in pairs], middle)
+
+
+def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
+    """Depth from the stereo pairs of a folder. Raises InputError; for a single frame, when the frame is requested."""
+    smooth = " and weighted least squares" if settings.smooth else ""
+    method = f"semi-global matching, left-right check{smooth}{', median along the flow' if settings.temporal else ''}"
+    return MadeDepth(stereo_frames(open_common(folder), settings), method, "")
+
+
+def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDepth:
+    """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
+    contents, files = list_contents(folder), list_pictures(source, DEPTH_ENDINGS)
+    check_pairing(contents.images, files)
+    lens, baseline = contents.file.camera.lens(folder), contents.file.baseline
+    frames = (
+        _without_mark(depth_of_values(read_plane(file), kind, scale, lens, baseline, file), kind, file)
+        for file in files
+    )
+    return MadeDepth(frames, f"{kind} from {source.name}", "")
+
+
+def depth_of_values(
+    values: NDArray, kind: Kind, scale: float, lens: Lens, baseline: float | None, where: object
+) -> NDArray[np.float32]:
+    """Depth (H, W) in the unit of the sequence and at its size, 0 = none, from the values of another program.
+
+    values  as stored. Disparities refer to the left picture, in pixels at the width of the file. Their sign is reversed
+            if all of them are negative.
+    kind    of the values
+    scale   length, or pixels of disparity, per stored unit
+
+    Raises:  InputError for another aspect ratio, or for disparities without a baseline.
+    """
+    numbers = values.astype(np.float64) * scale
+    numbers[~np.isfinite(numbers)] = 0.0
+    if kind == "disparity":
+        if not baseline:
+            raise InputError(f"{where}: disparity needs the baseline: [camera] baseline is 0 in sequence.toml")
+        if (numbers <= 0).all():
+            numbers = -numbers
+        focal = lens.fx * values.shape[1] / lens.width
+        numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
+    depth = nearest_pixels(np.maximum(numbers, 0.0), lens.width, lens.height, where).astype(np.float32)
+    depth[~np.isfinite(depth)] = 0.0
+    return depth
+
+
+def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:
+    """The depth. Raises InputError if one value among the lengths seems to mark missing depth."""
+    if kind == "depth" and (marked := mark_finding([depth_facts(file.name, depth, depth, None)], str(file))):
+        raise InputError(f"{file}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}")
+    return depth
+
+
+def from_relative(folder: Path, source: Path, align: Align, farthest: float, trusted: bool, replace: bool) -> MadeDepth:
+    """Depth from the relative inverse depth of a network; see `relative_depth`. Raises InputError."""
+    contents = list_contents(folder)
+    if contents.depth and not replace:
+        raise InputError(
+            f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
+        )
+    return relative_depth(contents, source, align, farthest, trusted)
+
+
+def write_depth(
+    folder: Path, made: MadeDepth, replace: bool = False, on_frame: OnFrame = lambda i, n: None
+) -> DepthReport:
+    """Write the depth of a sequence and record it in its `sequence.toml`.
+
+    made      the depth; if any part of it is assumed, the unit of the sequence becomes arbitrary
+    replace   whether existing depth may be replaced
+
+    Raises:  InputError, leaving the folder unchanged.
+    """
+    contents = list_contents(folder)
+    if (contents.file.depth or (folder / DEPTH).exists()) and not replace:
+        raise InputError(f"{folder}: has depth already; allowed: --replace")
+    coverage, medians, step = [], [], 0.0
+    with replacing_folder(folder / DEPTH) as place:
+        for k, depth in enumerate(made.frames):
+            known = depth[depth > 0]
+            if known.size:
+                step = step or step_of_depth(float(np.percentile(known, 99.8)))
+                medians.append(float(np.median(known)))
+            coverage.append(known.size / depth.size)
+            write_levels(place / f"{contents.images[k].stem}.png", depth, step or 1.0)
+            on_frame(k + 1, len(contents.images))
+        if not medians:
+            raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
+    unit = ARBITRARY if contents.file.arbitrary or made.assumed else "mm"
+    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
+    found = msgspec.structs.replace(contents.file, depth=entry, unit=unit if made.assumed else contents.file.unit)
+    replace_text(folder / FILE_NAME, sequence_text(found))
+    return DepthReport(found, coverage, float(np.median(medians)))

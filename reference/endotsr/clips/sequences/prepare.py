@@ -1,0 +1,259 @@
+"""Conversion of a recording into a folder in the common format.
+
+In: a `Recording` and `PrepareSettings`. Out: a new folder with pictures, masks, depth and `sequence.toml`, and notes on
+every assumption. Frames are read, undistorted, resized and written one at a time. The folder appears when it is
+complete.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.sequences.checks.cameras import lens_findings
+from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
+from endotsr.clips.sequences.checks.guard import notes_of
+from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
+from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
+from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.points import depth_from_points
+from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Lens, PicturePair, Recording
+from endotsr.clips.sequences.sequence_file import (
+    DEPTH,
+    FILE_NAME,
+    FORMAT,
+    IMAGES,
+    MASKS,
+    RIGHT,
+    CameraEntry,
+    DepthEntry,
+    MaskEntry,
+    PoseEntry,
+    SequenceFile,
+    write_sequence_file,
+)
+from endotsr.clips.sequences.stated_depth import refuse_no_lengths
+from endotsr.clips.sequences.straighten import Straightener, straightener
+from endotsr.clips.sequences.trajectory import filled
+from endotsr.errors import InputError
+from endotsr.untrusted.writing import new_folder
+
+LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers
+OnFrame = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class PrepareSettings:
+    """Settings of the conversion."""
+
+    frames: str = ""  # of the source; see `editing.chosen_frames`
+    drop: str = ""  # frames to omit, in the same syntax
+    rate: float | None = None  # frames per second to keep
+    scale: float = 1.0
+    gaps: Literal["refuse", "drop", "fill"] = "refuse"  # frames without mask or pose where others have one
+    pictures: Literal["png", "jpg"] = "png"
+    points: Literal["interpolated", "sparse", "none"] = "interpolated"
+
+
+def prepare(
+    recording: Recording,
+    out: Path,
+    settings: PrepareSettings,
+    on_frame: OnFrame = lambda i, n: None,
+    replace: bool = False,
+) -> tuple[SequenceFile, list[str]]:
+    """Write the frames to the new folder `out`. Returns the contents of `sequence.toml`, and the notes.
+
+    on_frame  called with (frames written, frames in all)
+    replace   whether a folder written by `prepare` may be replaced once the new one is complete
+
+    Raises:  InputError, leaving nothing behind.
+    """
+    notes = list(recording.notes)
+    frames = without(chosen_frames(settings.frames, recording), settings.drop, recording)
+    chosen = thinned(recording, frames, settings.rate, notes)
+    chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
+    refuse_no_lengths(recording, chosen)
+    with new_folder(Path(out), FILE_NAME if replace else "") as folder:
+        found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
+        write_sequence_file(found, folder)
+    return found, notes
+
+
+def _poses_and_masks(
+    recording: Recording, chosen: list[int], gaps: str, notes: list[str]
+) -> tuple[list[int], list[CameraPose] | None]:
+    """The frames to write and their poses. Gaps are refused, dropped or filled, and noted."""
+    lacking: dict[str, list[int]] = {}
+    if recording.poses is not None:
+        lacking["pose"] = [i for i in chosen if recording.poses[i] is None]
+    if recording.masks is not None:
+        lacking["mask"] = [i for i in chosen if recording.masks(i) is None]
+    for what, frames in lacking.items():
+        if not frames:
+            continue
+        named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
+        if gaps == "refuse" or len(frames) == len(chosen):
+            raise InputError(f"{recording.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
+        filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
+        notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
+    if gaps == "drop":
+        without = set().union(*lacking.values())
+        chosen = [i for i in chosen if i not in without]
+    if recording.poses is None:
+        return chosen, None
+    every = filled(recording.poses) if lacking["pose"] and gaps == "fill" else recording.poses
+    return chosen, [pose for pose in (every[i] for i in chosen) if pose is not None]
+
+
+def _write_frames(
+    recording: Recording,
+    folder: Path,
+    chosen: list[int],
+    poses: list[CameraPose] | None,
+    settings: PrepareSettings,
+    notes: list[str],
+    on_frame: OnFrame,
+) -> SequenceFile:
+    if not chosen:
+        raise InputError(f"{recording.where}: no frame is left")
+    straight: Straightener | None = None
+    depth_scale, saturated = 0.0, 0
+    without_depth: list[int] = []
+    facts: list[FrameFacts] = []
+    (folder / IMAGES).mkdir()
+    for k, (i, pair) in enumerate(zip(chosen, recording.pictures(chosen))):
+        if straight is None:
+            height, width = pair.left.shape[:2]
+            straight = straightener(recording, width, height, settings.scale)
+            notes += straight.notes
+        new = _checked(recording, i, pair, straight)
+        facts.append(frame_facts(recording.names[i], new.left))
+        _write_pictures(folder, k, new, settings.pictures)
+        if recording.masks is not None:
+            _write_mask(folder, k, straight.mask(_mask_or_nearest(recording, i, chosen)))
+        depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
+        if depth is not None and depth.any():
+            depth_scale = depth_scale or step_of_depth(float(np.percentile(depth[depth > 0], LARGEST)))
+            saturated += write_levels(_depth_file(folder, k), depth, depth_scale)
+        elif recording.depth is not None or (recording.points is not None and settings.points != "none"):
+            without_depth.append(i)
+            write_levels(_depth_file(folder, k), np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
+        on_frame(k + 1, len(chosen))
+    assert straight is not None
+    notes += notes_of(frame_findings(facts, str(recording.where)) + lens_findings(straight.lens, str(recording.where)))
+    if without_depth:
+        notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
+    if saturated:
+        notes.append(f"{saturated} pixels are clipped at {65535 * depth_scale:g}, eight times the usual depth")
+    turned = [straight.pose(pose) for pose in poses] if poses else None
+    return _file_of(recording, straight, turned, chosen, depth_scale, settings, notes)
+
+
+def _checked(recording: Recording, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
+    """The pictures in the new camera. Raises InputError for a frame with another size than the first."""
+    size = pair.left.shape[:2]
+    expected = straight.left.x.shape if straight.left else None
+    source = recording.rig.left if recording.rig else recording.lens
+    expected = expected or (source and (source.height, source.width))
+    if expected and size != tuple(expected):
+        raise InputError(
+            f"{recording.where}: frame {recording.names[i]}: {size[1]}x{size[0]} pixels, others"
+            f" {expected[1]}x{expected[0]}"
+        )
+    if pair.right is not None and pair.right.shape != pair.left.shape:
+        raise InputError(f"{recording.where}: frame {recording.names[i]}: left and right differ in size")
+    return straight.pictures(pair)
+
+
+def _mask_or_nearest(recording: Recording, i: int, chosen: list[int]) -> NDArray[np.bool_]:
+    """The mask of a frame, or of the nearest frame with a mask."""
+    assert recording.masks is not None
+    for other in sorted(chosen, key=lambda k: (abs(k - i), k)):
+        found = recording.masks(other)
+        if found is not None:
+            return found
+    raise InputError(f"{recording.where}: no frame has a mask")
+
+
+def _depth(
+    recording: Recording, i: int, straight: Straightener, pose: CameraPose | None, points: str, size: tuple[int, ...]
+) -> NDArray[np.float32] | None:
+    if recording.depth is not None:
+        found = recording.depth(i)
+        if found is not None and found.shape != size:
+            raise InputError(
+                f"{recording.where}: frame {recording.names[i]}: depth of {found.shape[1]}x{found.shape[0]} pixels, the"
+                f" picture has {size[1]}x{size[0]}; allowed: one size (`endotsr depth --given` takes proportional ones)"
+            )
+        return None if found is None else straight.depth(found)
+    if recording.points is None or pose is None or points == "none":
+        return None
+    return depth_from_points(recording.points(i), straight.pose(pose), straight.lens, points)
+
+
+def _write_pictures(folder: Path, k: int, pair: PicturePair, ending: str) -> None:
+    for name, picture in ((IMAGES, pair.left), (RIGHT, pair.right)):
+        if picture is not None:
+            (folder / name).mkdir(exist_ok=True)
+            path = folder / name / f"{k:06d}.{ending}"
+            write_png(path, picture) if ending == "png" else write_jpeg(path, picture)
+
+
+def _write_mask(folder: Path, k: int, mask: NDArray[np.bool_]) -> None:
+    (folder / MASKS).mkdir(exist_ok=True)
+    write_png(folder / MASKS / f"{k:06d}.png", np.where(mask, 0, 255).astype(np.uint8))
+
+
+def _depth_file(folder: Path, k: int) -> Path:
+    (folder / DEPTH).mkdir(exist_ok=True)
+    return folder / DEPTH / f"{k:06d}.png"
+
+
+def _file_of(
+    recording: Recording,
+    straight: Straightener,
+    poses: list[CameraPose] | None,
+    chosen: list[int],
+    depth_scale: float,
+    settings: PrepareSettings,
+    notes: list[str],
+) -> SequenceFile:
+    unit = "arbitrary" if recording.unit == ARBITRARY else "mm"
+    if (recording.depth or recording.points) and not depth_scale:
+        notes.append("no frame has depth: none is written")
+    method = recording.depth_method if recording.depth else f"points, {settings.points}"
+    clipped = list(CLIPPED) if recording.depth and (settings.scale < 1 or recording.depth_clipped) else []
+    times, rate = written_times(recording, chosen, settings.rate, notes)
+    return SequenceFile(
+        format=FORMAT,
+        frames=len(chosen),
+        camera=camera_entry(straight.lens, straight.baseline),
+        source=f"{recording.where.name} ({recording.layout})",
+        unit=unit,
+        frame_rate=rate,
+        times=times,
+        masks=MaskEntry(proposed=recording.proposed) if recording.masks is not None else None,
+        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method, assumed=recording.depth_assumed)
+        if depth_scale
+        else None,
+        poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
+    )
+
+
+def camera_entry(lens: Lens, baseline: float | None) -> CameraEntry:
+    """The section [camera] of a lens without distortion."""
+    fx, fy, cx, cy = (float(value) for value in (lens.fx, lens.fy, lens.cx, lens.cy))
+    return CameraEntry(
+        width=lens.width, height=lens.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
+    )
+
+
+def pose_row(pose: CameraPose) -> list[float]:
+    """The twelve numbers of a pose in [poses] matrices."""
+    return [float(value) for value in np.column_stack([pose.rotation, pose.translation]).ravel()]

@@ -1,0 +1,241 @@
+"""Proposed instrument masks without a network: grey metal on red tissue, and motion relative to the tissue.
+
+Tissue is red, orange or mauve, and metal is grey. With the redness of a pixel,
+
+    s = (R - min(G, (G + B) / 2)) / (R + G + B + FLOOR),
+
+and the usual redness m of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m join them.
+Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. Such a
+region is an instrument if it is large and enters from the border of the picture, if it moves relative to the
+surrounding tissue, or if it overlaps an instrument of the previous or next frame. Other regions, such as highlights,
+remain tissue. Tissue-coloured and blood-covered instruments are not found.
+
+A scope shows tissue in a round or truncated field of view, and the border outside it is dark in all frames. That border
+is found first, from all frames together. It is excluded in every frame and from the search.
+
+In: the pictures of a clip. Out: a `Proposal`, or the reason why there is none. A person has to inspect it.
+"""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv import area_resize, dense_flow
+from endotsr.clips.sequences.recording import Picture
+from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+
+WORKING = 320  # px, longer side of the working pictures
+FLOOR = 12.0  # grey levels: the redness of a black pixel is noise
+SEED, GROW = 0.12, 0.4  # of the usual redness
+LEAST_REDNESS = 0.05  # usual redness of a clip; below it, metal is not distinguishable
+LEAST_AREA = 0.003  # of the picture
+ENTERING_AREA = 0.008  # of the picture, for a region accepted only because it touches the border
+CLOSING, MARGIN = 0.012, 0.02  # of the longer side: closed gaps, and margin added to a region
+RING = 0.05  # of the longer side: ring around a region whose motion counts as tissue motion
+UNLIKE = 1.5  # px at the working size: motion relative to the tissue
+OVERLAP = 0.5  # fraction of a region that overlaps the instruments of a neighbouring frame
+DARK = 20.0  # grey levels: pixels that are never brighter are outside the field of view
+LEAST_OUTSIDE, LEAST_INSIDE = 0.01, 0.05  # of the picture: smallest border and smallest field of view
+SOFT_EDGE = 2  # px at the working size: the blurred edge of the field of view, which is excluded
+LITTLE_TISSUE = 0.05  # of the field of view; a frame with less has almost no tissue
+
+
+class Proposal(NamedTuple):
+    """Proposed masks."""
+
+    excluded: list[BoolArray]  # (H, W) per frame, True = instrument; empty if nothing was found
+    reason: str  # number of frames with an instrument, or why there is no proposal
+    outside: float = 0.0  # fraction of the picture outside the field of view, excluded in every frame
+    without_tissue: tuple[int, ...] = ()  # frames with almost no remaining tissue
+
+    @property
+    def found(self) -> bool:
+        """Whether there are proposed masks."""
+        return bool(self.excluded)
+
+
+class _Region(NamedTuple):
+    """A connected grey region of one frame."""
+
+    pixels: BoolArray  # (h, w)
+    enters: bool  # large, and touches the border of the picture
+
+
+def propose_masks(pictures: Iterable[Picture]) -> Proposal:
+    """Instrument masks for the pictures (H, W, 3) of a clip, in time order.
+
+    Edges:  a single picture: motion is not used. A clip without colour: no proposal.
+    """
+    small, sizes = [], []
+    for picture in pictures:
+        sizes.append(picture.shape[:2])
+        small.append(_reduced(picture))
+    if not small:
+        return Proposal([], "there are no pictures")
+    outside = outside_of_view(small)
+    chosen, reason = _instruments(small, outside)
+    if not outside.any():
+        excluded = [_enlarged(_widened(plane), size) for plane, size in zip(chosen, sizes)]
+        return Proposal(excluded, reason, 0.0, _without_tissue(excluded, 1.0))
+    border = _enlarged(outside, sizes[0])
+    widened = [_widened(plane) for plane in chosen] or [np.zeros_like(outside)] * len(sizes)
+    excluded = [_enlarged(plane | outside, size) for plane, size in zip(widened, sizes)]
+    fraction = float(border.mean())
+    said = f"field of view: {1 - fraction:.1%} of the picture, the dark border of all frames is excluded; {reason}"
+    return Proposal(excluded, said, fraction, _without_tissue(excluded, 1 - fraction))
+
+
+def _without_tissue(excluded: list[BoolArray], view: float) -> tuple[int, ...]:
+    """Frames with less than `LITTLE_TISSUE` of the field of view left; `view` is its fraction of the picture."""
+    return tuple(i for i, plane in enumerate(excluded) if 1 - plane.mean() < LITTLE_TISSUE * view)
+
+
+def outside_of_view(pictures: list[Picture]) -> BoolArray:
+    """(h, w) True outside the field of view: dark in all pictures and connected to the border.
+
+    Bright areas out there, such as text, are also outside: the field of view is one region without holes.
+
+    Edges:  pictures of several sizes, almost no border or almost no field of view: False everywhere.
+    """
+    from scipy import ndimage
+
+    shape = pictures[0].shape[:2]
+    nowhere = np.zeros(shape, bool)
+    if any(picture.shape[:2] != shape for picture in pictures):
+        return nowhere
+    brightest = np.max([ndimage.gaussian_filter(p.max(axis=2).astype(np.float32), 1.0) for p in pictures], axis=0)
+    ring = np.ones((shape[0] + 2, shape[1] + 2), bool)
+    ring[1:-1, 1:-1] = brightest < DARK
+    joined = np.asarray(ndimage.binary_propagation(np.pad(nowhere, 1, constant_values=True), mask=ring), bool)[
+        1:-1, 1:-1
+    ]
+    labels: Any
+    labels, count = ndimage.label(ndimage.binary_opening(~joined, iterations=2))  # pyright: ignore[reportGeneralTypeIssues]
+    if not count:
+        return nowhere
+    largest = labels == 1 + int(np.bincount(labels.ravel())[1:].argmax())
+    beyond = ~np.asarray(ndimage.binary_fill_holes(largest), bool)
+    outside = np.asarray(ndimage.binary_dilation(beyond, iterations=SOFT_EDGE), bool)
+    if not LEAST_OUTSIDE <= joined.mean() or 1 - outside.mean() < LEAST_INSIDE:
+        return nowhere
+    return outside
+
+
+def _instruments(small: list[Picture], outside: BoolArray) -> tuple[list[BoolArray], str]:
+    """The instruments of every picture, empty if there are none, and the reason. Only the field of view is searched."""
+    redness = [_redness(picture) for picture in small]
+    bounded = bool(outside.any())
+    inside = [plane[~outside][::16] if bounded else plane[::4, ::4].ravel() for plane in redness]
+    usual = float(np.median(np.concatenate(inside)))
+    if usual < LEAST_REDNESS:
+        return [], f"the usual redness is {usual:.3f}: grey metal is not distinguishable in such pictures"
+    if bounded:  # near the edge of the view, pixels are too dark for a colour
+        redness = [np.where(outside | (p.max(axis=2) < DARK), usual, r) for r, p in zip(redness, small)]
+    regions = [_regions(plane, usual, outside) for plane in redness]
+    chosen = _chosen(small, regions)
+    frames = sum(plane.any() for plane in chosen)
+    if not frames:
+        return [], "no grey region enters from the border or moves relative to the tissue"
+    return chosen, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}"
+
+
+def _reduced(picture: Picture) -> Picture:
+    height, width = picture.shape[:2]
+    factor = min(1.0, WORKING / max(height, width))
+    return area_resize(picture, max(1, round(width * factor)), max(1, round(height * factor)))
+
+
+def _redness(picture: Picture) -> FloatArray:
+    """(h, w) in [-0.5, 1], smoothed with a standard deviation of 1 px."""
+    from scipy.ndimage import gaussian_filter
+
+    red, green, blue = (gaussian_filter(picture[..., k].astype(np.float32), 1.0) for k in range(3))
+    return (red - np.minimum(green, (green + blue) / 2)) / (red + green + blue + FLOOR)
+
+
+def _regions(redness: FloatArray, usual: float, outside: BoolArray) -> list[_Region]:
+    """Connected grey regions above the least area. They enter at the border of the picture or of the field of view."""
+    from scipy import ndimage
+
+    reach = max(1, round(CLOSING * max(redness.shape)))
+    grown = ndimage.binary_propagation(redness < SEED * usual, mask=redness < GROW * usual)
+    padded = np.pad(ndimage.binary_opening(grown), reach, "edge")  # closing must not erode at the border
+    closed = ndimage.binary_closing(padded, iterations=reach)[reach:-reach, reach:-reach]
+    labels: Any
+    labels, count = ndimage.label(ndimage.binary_fill_holes(closed))  # pyright: ignore[reportGeneralTypeIssues]
+    border = outside if outside.shape == redness.shape else np.zeros(redness.shape, bool)
+    near_border = np.asarray(ndimage.binary_dilation(border, iterations=2), bool)
+    found = []
+    for label in range(1, count + 1):
+        pixels = labels == label
+        if pixels.mean() >= LEAST_AREA:
+            edge = pixels[[0, -1]].any() or pixels[:, [0, -1]].any() or (pixels & near_border).any()
+            found.append(_Region(pixels, bool(edge) and pixels.mean() >= ENTERING_AREA))
+    return found
+
+
+def _chosen(pictures: list[Picture], regions: list[list[_Region]]) -> list[BoolArray]:
+    """The union of the instruments, per frame."""
+    chosen, left = [], []
+    for i, found in enumerate(regions):
+        flow = _flow(pictures, i) if any(not region.enters for region in found) else None
+        plane, rest = np.zeros(pictures[i].shape[:2], bool), []
+        for region in found:
+            if region.enters or (flow is not None and _moves_alone(region.pixels, flow)):
+                plane |= region.pixels
+            else:
+                rest.append(region.pixels)
+        chosen.append(plane)
+        left.append(rest)
+    sure = list(chosen)
+    for i, rest in enumerate(left):
+        beside = [sure[k] for k in (i - 1, i + 1) if 0 <= k < len(sure) and sure[k].shape == chosen[i].shape]
+        for pixels in rest:
+            if any((pixels & other).sum() >= OVERLAP * pixels.sum() for other in beside):
+                chosen[i] = chosen[i] | pixels
+    return chosen
+
+
+def _flow(pictures: list[Picture], i: int) -> NDArray[np.float32] | None:
+    """(2, h, w) px to the next picture, for the last one to the previous; None without a neighbour of equal size."""
+    other = i + 1 if i + 1 < len(pictures) else i - 1
+    if other < 0 or pictures[other].shape != pictures[i].shape:
+        return None
+    here, there = (np.ascontiguousarray(pictures[k].transpose(2, 0, 1)) for k in (i, other))
+    return dense_flow(here, there)
+
+
+def _moves_alone(pixels: BoolArray, flow: NDArray[np.float32]) -> bool:
+    """Whether the median motion of a region differs from the surrounding tissue."""
+    from scipy.ndimage import binary_dilation
+
+    reach = max(2, round(RING * max(pixels.shape)))
+    near, far = (np.asarray(binary_dilation(pixels, iterations=width), bool) for width in (2, reach))
+    ring = far & ~near
+    if not ring.any():
+        return False
+    inside, around = (np.median(flow[:, part], axis=1) for part in (pixels, ring))
+    return float(np.hypot(*(inside - around))) > UNLIKE
+
+
+def _widened(plane: BoolArray) -> BoolArray:
+    from scipy.ndimage import binary_dilation
+
+    if not plane.any():
+        return plane
+    return np.asarray(binary_dilation(plane, iterations=max(1, round(MARGIN * max(plane.shape)))), bool)
+
+
+def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:
+    """The mask at picture size."""
+    return nearest_pixels(plane, size[1], size[0], "mask")
+
+
+def overlay(picture: Picture, excluded: BoolArray) -> Picture:
+    """The picture with the excluded pixels in green, (H, W, 3) uint8."""
+    shown = picture.copy()
+    shown[excluded] = (0.5 * picture[excluded] + np.array([0.0, 127.0, 0.0])).astype(np.uint8)
+    return shown

@@ -1,0 +1,278 @@
+"""The file `sequence.toml` of the common format, which describes the pictures of a folder.
+
+    format = "endotsr-sequence-1"
+    source = "P2_8 (stereomis)"        # where the frames come from, in words
+    frames = 120
+    unit = "mm"                        # of poses and baseline; um, mm, cm, m or arbitrary
+    frame_rate = 25.0                  # frames per second, on average; 0 = unknown
+    times = [0.0, 0.04, 0.12, ...]     # seconds of the frames, ascending; absent: evenly spaced
+
+    [camera]                           # pixels; the centre of the first pixel is at (0.5, 0.5)
+    width = 640 ... height, fx, fy, cx, cy
+    distortion = []                    # k1 k2 p1 p2 [k3 [k4 k5 k6]], OpenCV's order; training needs none
+    baseline = 4.2                     # of a rectified pair; 0 = no stereo
+
+    [masks]                            # absent: every pixel is tissue
+    folder = "masks"
+    excluded_value = "white"           # or "black"
+    proposed = false                   # true: made by a program, not checked by a person
+
+    [depth]                            # absent: `endotsr depth` makes it
+    folder = "depth"
+    unit = "mm"
+    scale = 0.01                       # length = stored value x scale, in `unit`; 0 = no depth here
+    clipped = []                       # percentiles to which depth was clipped when it was resized: not repeated
+    method = "given"
+    assumed = ""                       # properties not measured: "", "scale and shift" or "shape"
+
+    [poses]                            # absent: static camera at the origin
+    direction = "world_to_camera"      # or "camera_to_world"
+    axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
+    matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers per frame
+
+In: the file. Out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder `images/`
+contains one picture per frame, `images_right/` the right pictures of a stereo pair.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+
+from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Lens, checked_lens, scene_factor
+from endotsr.config import Section, checked, refuse_unknown_keys
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.toml import read_toml, toml_text
+
+FILE_NAME = "sequence.toml"
+FORMAT = "endotsr-sequence-1"
+IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
+ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
+OPENGL = np.diag([1.0, -1.0, -1.0])  # OpenGL axes to OpenCV axes, and back
+Unit = Literal["um", "mm", "cm", "m", "arbitrary"]
+Assumed = Literal["", "scale and shift", "shape"]  # properties of the depth that are not measured
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0)]
+PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
+
+
+class CameraEntry(Section, frozen=True, kw_only=True):
+    """Intrinsics of all frames."""
+
+    width: PositiveCount
+    height: PositiveCount
+    fx: Positive
+    fy: Positive
+    cx: float
+    cy: float
+    distortion: list[float] = msgspec.field(default_factory=list)
+    baseline: NonNegative = 0.0
+
+    def lens(self, where: object) -> Lens:
+        """The lens, checked. Raises InputError."""
+        lens = Lens(self.fx, self.fy, self.cx, self.cy, self.width, self.height, tuple(self.distortion))
+        return checked_lens(lens, where)
+
+
+class MaskEntry(Section, frozen=True, kw_only=True):
+    """The mask pictures."""
+
+    folder: str = MASKS
+    excluded_value: Literal["white", "black"] = "white"
+    proposed: bool = False
+
+
+class DepthEntry(Section, frozen=True, kw_only=True):
+    """The depth files."""
+
+    folder: str = DEPTH
+    unit: Unit = "mm"
+    scale: Positive = 1.0
+    clipped: list[float] = msgspec.field(default_factory=list)
+    method: str = "given"
+    assumed: Assumed = ""
+
+
+class PoseEntry(Section, frozen=True, kw_only=True):
+    """One pose per frame."""
+
+    direction: Literal["world_to_camera", "camera_to_world"] = "world_to_camera"
+    axes: Literal["opencv", "opengl"] = "opencv"
+    matrices: list[list[float]]
+
+
+class SequenceFile(Section, frozen=True, kw_only=True):
+    """All of `sequence.toml`."""
+
+    format: str
+    frames: PositiveCount
+    camera: CameraEntry
+    source: str = ""
+    unit: Unit = "mm"
+    frame_rate: NonNegative = 0.0
+    times: list[float] | None = None
+    masks: MaskEntry | None = None
+    depth: DepthEntry | None = None
+    poses: PoseEntry | None = None
+
+    @property
+    def arbitrary(self) -> bool:
+        """Whether the unit of the lengths is unknown."""
+        return self.unit == ARBITRARY
+
+    @property
+    def unit_in_words(self) -> str:
+        """The unit of all lengths, with their assumptions; it accompanies every reported length."""
+        assumed = f", {self.depth.assumed} of the depth assumed" if self.depth and self.depth.assumed else ""
+        return f"arbitrary unit{assumed}" if self.arbitrary else "mm"
+
+    @property
+    def depth_scale(self) -> float:
+        """Scene units per stored depth value; 1 without depth."""
+        return self.depth.scale * scene_factor(self.depth.unit) if self.depth else 1.0
+
+    @property
+    def baseline(self) -> float:
+        """Baseline of the rectified pair, scene units; 0 without stereo."""
+        return self.camera.baseline * scene_factor(self.unit)
+
+
+def read_sequence_file(folder: Path) -> SequenceFile:
+    """The checked contents of `sequence.toml` in a folder.
+
+    Raises:  InputError naming the file, the key and what is allowed.
+    """
+    path = Path(folder) / FILE_NAME
+    data = read_toml(path)
+    if data.get("format") != FORMAT:
+        raise InputError(f"{path}: format = {data.get('format')!r} is not allowed; allowed: {FORMAT!r}")
+    for key, needed in (("frames", data), ("camera", data)):
+        if key not in needed:
+            raise InputError(f"{path}: {key} is missing")
+    refuse_unknown_keys(data, SequenceFile, str(path))
+    for key, kind in (("camera", CameraEntry), ("masks", MaskEntry), ("depth", DepthEntry), ("poses", PoseEntry)):
+        if isinstance(data.get(key), dict):
+            _check_section(data[key], kind, path, key)
+    found = checked(data, SequenceFile, str(path))
+    if found.depth and (found.depth.unit == ARBITRARY) != found.arbitrary:
+        raise InputError(
+            f"{path}: depth.unit = {found.depth.unit!r} with unit = {found.unit!r} is not allowed; allowed: both"
+            " arbitrary (then of one scale), or neither"
+        )
+    if found.depth and found.depth.assumed and not found.arbitrary:
+        raise InputError(f"{path}: depth.assumed with unit = {found.unit!r} is not allowed; allowed: 'arbitrary'")
+    for key, entry in (("masks", found.masks), ("depth", found.depth)):
+        if entry and not _plain_name(entry.folder):
+            raise InputError(
+                f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder next to the file"
+            )
+    found.camera.lens(path)
+    _check_times(found, path)
+    return found
+
+
+def _check_times(found: SequenceFile, path: Path) -> None:
+    """Raises InputError unless there is one finite time per frame, in ascending order."""
+    if found.times is None:
+        return
+    if len(found.times) != found.frames:
+        raise InputError(f"{path}: times: {len(found.times)} numbers for {found.frames} frames; allowed: one per frame")
+    steps = np.diff(found.times)
+    if not np.isfinite(found.times).all() or (steps <= 0).any():
+        wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
+        raise InputError(f"{path}: times: frame {wrong}: {found.times[wrong]:g}; allowed: finite, ascending seconds")
+
+
+def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> None:
+    """Raises InputError for a missing key or an invalid list of numbers in a section, naming the full key."""
+    refuse_unknown_keys(data, kind, str(path), f"{key}.")
+    for field in msgspec.structs.fields(kind):
+        if field.required and field.name not in data:
+            raise InputError(f"{path}: {key}.{field.name} is missing")
+    try:
+        msgspec.convert(data.get("matrices", []), list[list[float]], strict=True)
+        for name in ("distortion", "clipped"):
+            msgspec.convert(data.get(name, []), list[float], strict=True)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: {key}: a list of numbers is expected: {error}") from None
+    checked(data, kind, str(path), f"{key}.")
+
+
+def _plain_name(folder: str) -> bool:
+    return bool(folder) and Path(folder).name == folder and folder not in (".", "..")
+
+
+def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
+    """World-to-camera poses in OpenCV axes, translation in scene units; None for a static camera.
+
+    Raises:  InputError naming the frame of the first invalid pose, or for a wrong number of poses.
+    """
+    poses, faults = read_poses_with_gaps(found, path)
+    if faults:
+        raise InputError(faults[0])
+    return None if poses is None else [pose for pose in poses if pose is not None]
+
+
+def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
+    """As `read_poses`, with None for an invalid pose, and the reasons.
+
+    Raises:  InputError for a wrong number of poses.
+    """
+    if found.poses is None:
+        return None, []
+    rows = found.poses.matrices
+    if len(rows) != found.frames:
+        raise InputError(f"{path}: poses.matrices: {len(rows)} rows for {found.frames} frames")
+    poses: list[CameraPose | None] = []
+    faults = []
+    for i, row in enumerate(rows):
+        try:
+            poses.append(_pose(row, found.poses, scene_factor(found.unit), f"{path}: poses.matrices: frame {i}"))
+        except InputError as error:
+            poses.append(None)
+            faults.append(str(error))
+    return poses, faults
+
+
+def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> CameraPose:
+    if len(row) != 12:
+        raise InputError(f"{where}: {len(row)} numbers; allowed: 12, the rows of a 3x4 matrix")
+    matrix = np.array(row, np.float64).reshape(3, 4)
+    if entry.axes == "opengl":
+        matrix = OPENGL @ matrix if entry.direction == "world_to_camera" else matrix @ np.diag([1.0, -1.0, -1.0, 1.0])
+    rotation = checked_rotation(matrix[:, :3], where)
+    translation = matrix[:, 3] * scale
+    if not np.isfinite(translation).all():
+        raise InputError(f"{where}: the translation is not finite")
+    if entry.direction == "camera_to_world":
+        return inverse_pose(rotation, translation)
+    return CameraPose(rotation, translation)
+
+
+def inverse_pose(rotation: FloatArray, translation: FloatArray) -> CameraPose:
+    """World-to-camera from camera-to-world, or the reverse."""
+    turned = np.ascontiguousarray(rotation.T)
+    return CameraPose(turned, -turned @ translation + 0.0)
+
+
+def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
+    """The matrix. Raises InputError unless it is a finite rotation."""
+    if not np.isfinite(matrix).all():
+        raise InputError(f"{where}: the rotation is not finite")
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROTATION_TOLERANCE:
+        raise InputError(f"{where}: the first three columns are not perpendicular unit vectors")
+    if np.linalg.det(matrix) < 0:
+        raise InputError(f"{where}: the first three columns are a mirror image, not a rotation")
+    return np.ascontiguousarray(matrix)
+
+
+def write_sequence_file(found: SequenceFile, folder: Path) -> None:
+    """Write `sequence.toml`. `read_sequence_file` returns an equal value."""
+    (Path(folder) / FILE_NAME).write_text(sequence_text(found), encoding="utf-8", newline="\n")
+
+
+def sequence_text(found: SequenceFile) -> str:
+    """The contents as TOML text."""
+    return toml_text(msgspec.to_builtins(found))

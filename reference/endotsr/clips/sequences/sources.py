@@ -1,0 +1,244 @@
+"""Parts shared by several layouts: picture files as frames, masks and depth, stated cameras.
+
+In: paths and the statements of `SourceOptions`. Out: the fields of a `Recording`.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.clips.sequences.calibrations import lens_or_rig
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
+from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
+from endotsr.clips.sequences.recording import (
+    ARBITRARY,
+    CameraPose,
+    Lens,
+    Picture,
+    PicturePair,
+    Recording,
+    Rig,
+    checked_lens,
+    colour_picture,
+    grey_plane,
+    scene_factor,
+)
+from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.trajectory import poses_of_frames, read_trajectory
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
+
+PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
+
+
+def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
+    """The file itself, or the files of a folder in time order. Raises InputError."""
+    if path.is_file():
+        if path.suffix.lower() not in endings:
+            raise InputError(f"{path}: allowed: a file that ends in {', '.join(endings)}, or a folder of such files")
+        return [path]
+    return list_pictures(path, endings)
+
+
+def size_of(files: list[Path]) -> tuple[int, int]:
+    """Width and height of the first picture. Raises InputError."""
+    height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
+    return width, height
+
+
+def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
+    """Left and right of one stored picture: side by side (left half first), stacked (left on top), or none.
+
+    Raises:  InputError for a picture without two equal halves.
+    """
+    height, width = picture.shape[:2]
+    if stereo == "none":
+        return PicturePair(picture)
+    if (width if stereo == "side_by_side" else height) % 2:
+        side = "width" if stereo == "side_by_side" else "height"
+        raise InputError(f"{where}: {width}x{height} pixels: a {stereo} pair has an even {side}")
+    if stereo == "side_by_side":
+        return PicturePair(picture[:, : width // 2], picture[:, width // 2 :])
+    return PicturePair(picture[: height // 2], picture[height // 2 :])
+
+
+def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
+    """The size of one picture of a stored pair."""
+    return (width // 2 if stereo == "side_by_side" else width), (height // 2 if stereo == "stacked" else height)
+
+
+def pictures_from_files(
+    left: list[Path], right: list[Path], stereo: str = "none"
+) -> Callable[[list[int]], Iterator[PicturePair]]:
+    """Frames from picture files: two lists, or one list of pictures that contain both views."""
+
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
+        for i in wanted:
+            picture = colour_picture(read_picture(left[i]), left[i])
+            if right:
+                yield PicturePair(picture, colour_picture(read_picture(right[i]), right[i]))
+            else:
+                yield split_pair(picture, stereo, left[i])
+
+    return pictures
+
+
+def mask_reader(
+    files: list[Path | None], excluded_value: str, width: int, height: int
+) -> Callable[[int], NDArray[np.bool_] | None]:
+    """Tissue masks from files, one per frame; None where a frame has none.
+
+    A mask of another size but equal aspect ratio is resized by nearest-neighbour sampling. Values above half of the
+    largest are white: masks of 0 and 1 are valid, and intermediate JPEG values are rounded. The polarity states which
+    side is excluded.
+
+    Raises:  InputError for another aspect ratio, or a picture that is not a mask.
+    """
+
+    def mask(i: int) -> NDArray[np.bool_] | None:
+        path = files[i]
+        if path is None:
+            return None
+        plane = grey_plane(read_picture(path), path)
+        values = np.unique(plane)
+        if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT_FRACTION:
+            raise InputError(f"{path}: {len(values)} different values: this is not a mask; allowed: two values")
+        white = plane > values[-1] / 2
+        tissue = ~white if excluded_value == "white" else white
+        return nearest_pixels(tissue, width, height, path)
+
+    return mask
+
+
+def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | None]:
+    """The file with the number of each frame, or None. A single file, such as a field of view, matches all frames.
+
+    frames   files, or the count of a video, whose frames have the numbers 0 .. count - 1
+
+    Edges:   without numbers, files are paired with frame files by name.
+    Raises:  InputError if nothing matches.
+    """
+    if len(files) == 1:
+        return [files[0]] * (frames if isinstance(frames, int) else len(frames))
+    numbers, where = frame_numbers(files), files[0].parent
+    if isinstance(frames, int):
+        if numbers is None or len(numbers[0]) != 1:
+            raise InputError(f"{where}: names without one frame number, such as {files[0].name}")
+        wanted = [(i,) for i in range(frames)]
+        missing = f"{where}: no file has a number from 0 to {frames - 1}, such as {files[0].name}"
+    else:
+        wanted = frame_numbers(frames)
+        if wanted is None or numbers is None or len(wanted[0]) != len(numbers[0]):
+            check_pairing(frames, files)
+            return list(files)
+        missing = f"{where}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}"
+    by_number = dict(zip(numbers, files))
+    found = [by_number.get(number) for number in wanted]
+    if not any(found):
+        raise InputError(missing)
+    return found
+
+
+def depth_reader(files: list[Path | None], scale: float) -> Callable[[int], NDArray[np.float32] | None]:
+    """Depth from files, one per frame, in millimetres or the arbitrary unit; None where a frame has none."""
+
+    def depth(i: int) -> NDArray[np.float32] | None:
+        path = files[i]
+        return None if path is None else depth_plane(read_plane(path), scale, path)
+
+    return depth
+
+
+def stated_masks(
+    options: SourceOptions, frames: list[Path] | int, width: int, height: int
+) -> Callable[[int], NDArray[np.bool_] | None] | None:
+    """The masks of `--masks`, paired with frame files or with the frame numbers of a video; None if not stated."""
+    if options.masks is None:
+        return None
+    files = files_of(options.masks, PICTURE_ENDINGS)
+    return mask_reader(matching_files(frames, files), options.excluded_value, width, height)
+
+
+def masks_are_proposed(options: SourceOptions) -> bool:
+    """Whether the masks of `--masks` are an unchecked proposal of `endotsr masks`."""
+    return options.masks is not None and (options.masks.parent / PROPOSAL).is_file()
+
+
+def stated_depth(
+    options: SourceOptions, frames: list[Path] | int
+) -> Callable[[int], NDArray[np.float32] | None] | None:
+    """The depth of `--depth`, as `stated_masks`."""
+    if options.depth is None:
+        return None
+    files = files_of(options.depth, DEPTH_ENDINGS)
+    return depth_reader(matching_files(frames, files), depth_step(options))
+
+
+def depth_step(options: SourceOptions) -> float:
+    """Scene units per stored value of the files of `--depth`."""
+    return options.depth_scale * scene_factor(options.depth_unit)
+
+
+def with_stated(recording: Recording, options: SourceOptions) -> Recording:
+    """The recording with its masks and depth replaced by those of `--masks` and `--depth`, if stated.
+
+    Raises:  InputError for files that do not match its frames, or if only one of depth and recording is in millimetres.
+    """
+    lens = recording.lens
+    assert lens is not None
+    frames = [recording.where / f"{name}.png" for name in recording.names]
+    masks, depth = stated_masks(options, frames, lens.width, lens.height), stated_depth(options, frames)
+    if depth is not None and (options.depth_unit == ARBITRARY) != (recording.unit == ARBITRARY):
+        raise InputError(f"{recording.where}: --depth-unit {options.depth_unit} with the unit {recording.unit}")
+    return replace(
+        recording,
+        masks=masks or recording.masks,
+        depth=depth or recording.depth,
+        depth_clipped=recording.depth_clipped and depth is None,
+        depth_method="given" if depth else recording.depth_method,
+        depth_assumed="" if depth else recording.depth_assumed,
+        proposed=recording.proposed and masks is None,
+    )
+
+
+def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> tuple[Lens | None, Rig | None]:
+    """The lens of `--camera` or the lens or rig of `--calibration`, for pictures of this size; both None if not stated.
+
+    Raises:  InputError for a calibration of another aspect ratio; proportional sizes are scaled.
+    """
+    if options.calibration is not None:
+        return lens_or_rig(options.calibration, width, height)
+    if options.camera is None:
+        return None, None
+    fx, fy, cx, cy = options.camera
+    return checked_lens(Lens(fx, fy, cx, cy, width, height, options.distortion), where), None
+
+
+def stated_poses(
+    options: SourceOptions, count: int, rate: float | None, times: FloatArray | None = None
+) -> tuple[list[CameraPose | None] | None, list[str]]:
+    """The poses of `--trajectory`, and a note; (None, []) without it. See `poses_of_frames`. Raises InputError."""
+    if options.trajectory is None:
+        return None, []
+    unit = options.trajectory_unit or "m"
+    trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
+    poses, how = poses_of_frames(trajectory, count, rate, times)
+    return poses, [f"{options.trajectory.name}: {how}; positions in {unit}"]
+
+
+def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:
+    """`mm` or `arbitrary`, by the stated units of trajectory and depth. Raises InputError if they contradict."""
+    stated = []
+    if options.trajectory is not None:
+        stated.append(options.trajectory_unit or otherwise)
+    if options.depth is not None:
+        stated.append(options.depth_unit)
+    if len({unit == ARBITRARY for unit in stated}) > 1:
+        raise InputError("one of --trajectory-unit and --depth-unit is arbitrary: allowed: both or neither")
+    return ARBITRARY if ARBITRARY in stated else "mm"

@@ -1,0 +1,160 @@
+"""Trajectories in the TUM format: one line per pose, `stamp tx ty tz qx qy qz qw`; lines that begin with # are
+comments.
+
+The stamp is a time in seconds or a frame number. In: the file, its unit, direction and axes. Out: one world-to-camera
+pose per frame in millimetres or the arbitrary unit; None for frames without a pose.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.recording import CameraPose, scene_factor
+from endotsr.clips.sequences.sequence_file import OPENGL, inverse_pose
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.files import read_text
+
+NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
+
+
+class Trajectory(NamedTuple):
+    """Poses by stamp, ascending."""
+
+    stamps: NDArray[np.float64]  # (n,)
+    poses: list[CameraPose]  # world-to-camera, OpenCV axes
+    path: Path
+
+    @property
+    def counts_frames(self) -> bool:
+        """Whether every stamp is a non-negative integer, like a frame number."""
+        return bool((self.stamps == np.rint(self.stamps)).all() and self.stamps[0] >= 0)
+
+
+def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", axes: str = "opencv") -> Trajectory:
+    """The poses of a file.
+
+    unit        of the positions: um, mm, cm, m or arbitrary
+    direction   camera_to_world (positions of the camera) or world_to_camera
+    axes        of the camera: opencv (x right, y down, z forward) or opengl (x right, y up, z backward)
+
+    Raises:  InputError naming the line and the reason.
+    """
+    rows, lines = _rows(Path(path))
+    order = np.argsort(rows[:, 0], kind="stable")
+    rows = rows[order]
+    repeated = np.flatnonzero(np.diff(rows[:, 0]) == 0)
+    if repeated.size:
+        first = lines[order[repeated[0] + 1]]
+        raise InputError(f"{path}: line {first}: the stamp {rows[repeated[0], 0]:.12g} occurs twice")
+    poses = [_pose(row, scene_factor(unit), direction, axes) for row in rows]
+    return Trajectory(rows[:, 0].astype(np.float64), poses, Path(path))
+
+
+def _rows(path: Path) -> tuple[FloatArray, list[int]]:
+    rows, lines = [], []
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        words = line.replace(",", " ").split()
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if len(row) != 8 or not np.isfinite(row).all():
+            raise InputError(f"{path}: line {number}: allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw")
+        if abs(np.linalg.norm(row[4:]) - 1) > NORM_TOLERANCE:
+            raise InputError(
+                f"{path}: line {number}: the quaternion has length {np.linalg.norm(row[4:]):.4g}; allowed: 1,"
+                " in the order x y z w"
+            )
+        rows.append(row)
+        lines.append(number)
+    if not rows:
+        raise InputError(f"{path}: holds no pose; allowed: lines of 8 numbers, stamp tx ty tz qx qy qz qw")
+    return np.array(rows), lines
+
+
+def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> CameraPose:
+    from scipy.spatial.transform import Rotation
+
+    rotation, translation = Rotation.from_quat(row[4:]).as_matrix(), row[1:4] * scale
+    if direction == "camera_to_world":
+        rotation, translation = inverse_pose(rotation, translation)
+    return (
+        CameraPose(OPENGL @ rotation, OPENGL @ translation) if axes == "opengl" else CameraPose(rotation, translation)
+    )
+
+
+def poses_of_frames(
+    trajectory: Trajectory, count: int, rate: float | None, times: FloatArray | None = None
+) -> tuple[list[CameraPose | None], str]:
+    """One pose per frame, None without one, and a sentence on the assignment of stamps to frames.
+
+    times   seconds of the frames from the first one; None: evenly spaced at `rate`
+
+    Integer stamps below the number of frames are frame numbers. If there are as many poses as frames, they match in
+    order. Other stamps are seconds from the first one, and poses between stamps are interpolated.
+
+    Raises:  InputError if the stamps are times and the frame rate is unknown.
+    """
+    stamps = trajectory.stamps
+    if trajectory.counts_frames and stamps[-1] < count:
+        found: list[CameraPose | None] = [None] * count
+        for stamp, pose in zip(stamps, trajectory.poses):
+            found[int(stamp)] = pose
+        return found, "stamps are frame numbers"
+    if len(stamps) == count:
+        return list(trajectory.poses), "one pose per frame, in order"
+    if rate is None:
+        raise InputError(
+            f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose per frame, frame"
+            " numbers as stamps, or a known frame rate"
+        )
+    wanted = stamps[0] + (np.arange(count) / rate if times is None else times)
+    return poses_at(trajectory, wanted, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
+
+
+def poses_at(trajectory: Trajectory, times: FloatArray, longest: float) -> list[CameraPose | None]:
+    """Poses at times, interpolated; None outside the trajectory and in gaps longer than 2 `longest`, seconds."""
+    stamps, found = trajectory.stamps, []
+    for t in times:
+        after = int(np.searchsorted(stamps, t))
+        nearest = min((k for k in (after - 1, after) if 0 <= k < len(stamps)), key=lambda k: abs(stamps[k] - t))
+        if abs(stamps[nearest] - t) <= 1e-3 * longest:
+            found.append(trajectory.poses[nearest])
+        elif 0 < after < len(stamps) and stamps[after] - stamps[after - 1] <= 2 * longest:
+            fraction = (t - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+            found.append(pose_between(trajectory.poses[after - 1], trajectory.poses[after], fraction))
+        else:
+            found.append(trajectory.poses[nearest] if abs(stamps[nearest] - t) <= longest / 2 else None)
+    return found
+
+
+def pose_between(a: CameraPose, b: CameraPose, fraction: float) -> CameraPose:
+    """The interpolated pose: the centre on the straight line, the rotation on the shortest arc."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    centres = [-pose.rotation.T @ pose.translation for pose in (a, b)]
+    rotation = Slerp([0.0, 1.0], Rotation.from_matrix([a.rotation, b.rotation]))(fraction).as_matrix()
+    return CameraPose(rotation, -rotation @ (centres[0] + fraction * (centres[1] - centres[0])))
+
+
+def filled(poses: list[CameraPose | None]) -> list[CameraPose]:
+    """The poses with gaps interpolated; before the first and after the last pose, the nearest one."""
+    known = [i for i, pose in enumerate(poses) if pose is not None]
+    found = []
+    for i, pose in enumerate(poses):
+        if pose is None:
+            before = max((k for k in known if k < i), default=None)
+            after = min((k for k in known if k > i), default=None)
+            ends = [poses[k] for k in (before, after) if k is not None]
+            if before is not None and after is not None and ends[0] and ends[1]:
+                pose = pose_between(ends[0], ends[1], (i - before) / (after - before))
+            else:
+                pose = ends[0]
+        assert pose is not None
+        found.append(pose)
+    return found

@@ -1,0 +1,75 @@
+"""Settings of the simulator: the scene, and one section with a switch for each effect (sections.py).
+
+Lengths are in millimetres, rates in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
+that is off is not computed and draws no random numbers.
+"""
+
+from typing import Annotated
+
+import msgspec
+
+from endotsr.clips.simulator import sections
+from endotsr.config import Count, NonNegative, Positive, Section
+from endotsr.errors import InputError
+
+Side = Annotated[int, msgspec.Meta(ge=16)]
+FrameCount = Annotated[int, msgspec.Meta(ge=3)]
+
+
+class SimulatorSettings(Section, frozen=True, kw_only=True):
+    """Scene, size and effects of a simulated sequence."""
+
+    width: Side = 160
+    """columns, pixels"""
+    height: Side = 128
+    """rows, pixels"""
+    frames: FrameCount = 24
+    """n; frame i is at time i / n"""
+    seed: Count = 0
+    """seed of the surface, the texture and all noise"""
+    distance: Positive = 50.0
+    """from the camera to the middle of the tissue, mm"""
+    relief: NonNegative = 1.0
+    """factor on the folds of the tissue (1: about +-4 mm)"""
+    focal: Positive = 0.89
+    """focal length, image widths"""
+    block_length: Count = 0
+    """0 = every eighth frame is held out; otherwise the length of contiguous held-out blocks, frames"""
+    breathing: sections.Breathing = sections.Breathing()
+    pulsation: sections.Pulsation = sections.Pulsation()
+    pull: sections.Pull = sections.Pull()
+    exposure: sections.GainDrift = sections.GainDrift()
+    brightening: sections.Brightening = sections.Brightening()
+    highlights: sections.Highlights = sections.Highlights()
+    instrument: sections.Instrument = sections.Instrument()
+    camera_motion: sections.CameraMotion = sections.CameraMotion()
+    noise: sections.SensorNoise = sections.SensorNoise()
+    depth_errors: sections.DepthErrors = sections.DepthErrors()
+    cutting: sections.Cutting = sections.Cutting()
+    bleeding: sections.Bleeding = sections.Bleeding()
+    second_light: sections.SecondLight = sections.SecondLight()
+    more_instruments: sections.MoreInstruments = sections.MoreInstruments()
+    shadows: sections.Shadows = sections.Shadows()
+    smoke: sections.Smoke = sections.Smoke()
+    vignetting: sections.Vignetting = sections.Vignetting()
+    auto_exposure: sections.AutoExposure = sections.AutoExposure()
+    motion_blur: sections.MotionBlur = sections.MotionBlur()
+    stereo: sections.Stereo = sections.Stereo()
+    depth_rounding: sections.DepthRounding = sections.DepthRounding()
+
+
+EFFECTS = tuple(
+    field.name for field in msgspec.structs.fields(SimulatorSettings) if isinstance(field.default, sections.Effect)
+)
+
+
+def with_effects(settings: SimulatorSettings, *names: str) -> SimulatorSettings:
+    """The same settings with the named effects on and all others off.
+
+    Raises:  InputError for a name that is not in EFFECTS.
+    """
+    unknown = set(names) - set(EFFECTS)
+    if unknown:
+        raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; allowed: {', '.join(EFFECTS)}")
+    switched = {name: msgspec.structs.replace(getattr(settings, name), on=name in names) for name in EFFECTS}
+    return msgspec.structs.replace(settings, **switched)

@@ -1,0 +1,89 @@
+"""The first wrong operation of a port, described without a list of mistakes.
+
+In: the verdicts on all cases, with the relations of every refused output. Out: lines with the first wrong operation,
+its equation and level, its direction, its outputs and cases, and the relations common to all of them.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from endotsr.port.judge.format import Case
+
+PARTS = {
+    "scene": ("frequencies", "dictionary", "atoms", "appearance", "motion", "deformation"),
+    "render": ("covariance", "projection", "harmonics", "composite"),
+    "objective": ("scene", "render", "masked_l1", "masked_ssim", "normalised_depth", "smoothness", "laplacian",
+                  "matern", "exposure"),
+    "training": ("objective", "calibration", "adam", "schedule", "density"),
+    "determinism": ("objective",),
+}  # fmt: skip
+"""Operations that an operation is composed of."""
+MOST_CASES = 4  # listed by name
+
+
+def made_of(operation: str) -> set[str]:
+    """All operations that an operation is composed of, at any depth."""
+    parts = set(PARTS.get(operation, ()))
+    return parts.union(*map(made_of, parts))
+
+
+def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
+    """Lines on the first operation with a refused output, by level and then in the order of the cases; [] = none.
+
+    reports   case reports of the judge, with the relations of their outputs
+    """
+    known = {case.name: case for case in cases}
+    level, first = first_wrong(cases, reports)
+    if first is None:
+        return []
+    mine = [r for r in reports if r.name in known and known[r.name].operation == first.operation and r.outputs]
+    refused = [(r, o) for r in mine for o in r.outputs if o.status == "refused"]
+    place = f"operation {first.operation}" + (f", equation ({first.equation})" if first.equation else "")
+    lines = [f"first wrong: {place}, level {level}, {_direction(mine, refused)}"]
+    paths = [r for r in mine if r.first_wrong]
+    lines += _along(paths)
+    named: dict[str, list[str]] = {}
+    for name in dict.fromkeys(o.name for r, o in refused if not (paths and _follows(known[r.name], o.name))):
+        forms = [o.forms for _, o in refused if o.name == name]
+        shared = [form for form in forms[0] if all(form in other for other in forms)]
+        text = "; ".join(shared[:2]) or "; ".join(forms[0][:1]) or "no simple relation to the expected array"
+        named.setdefault(text, []).append(name)
+    lines += [f"  {', '.join(names)}: {text}" for text, names in named.items()]
+    bad = list(dict.fromkeys(r.name for r, _ in refused))
+    if 2 * len(bad) <= len(mine):
+        titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:MOST_CASES])
+        titles += "; and below" * (len(bad) > MOST_CASES)
+        lines.append(f"  only in {len(bad)} of its {len(mine)} cases: {titles}")
+    return lines
+
+
+def _along(paths: Sequence[Any]) -> list[str]:
+    """The first wrong iteration of trajectories, and the events common to all of them there."""
+    lines = [f"  {r.name}: {r.first_wrong}" for r in paths[:MOST_CASES]]
+    lines += [f"  and {len(paths) - MOST_CASES} more cases, see below"] if len(paths) > MOST_CASES else []
+    common = [event for event in paths[0].events if all(event in r.events for r in paths)] if len(paths) > 1 else []
+    return lines + [f"  in each of these cases {event} this iteration or the one before" for event in common]
+
+
+def _follows(case: Case, output: str) -> bool:
+    """Whether an output belongs to a trajectory, whose first wrong iteration matters more than its relations."""
+    return case.outputs[output].order == "iteration" or output.startswith("final_")
+
+
+def first_wrong(cases: Sequence[Case], reports: Sequence[Any]) -> tuple[int, Case | None]:
+    """The first case with a refused output, by level and then in the order of the cases, and that level."""
+    known = {case.name: case for case in cases}
+    wrong = [(o.level, k, r.name) for k, r in enumerate(reports) for o in r.outputs if o.status == "refused"]
+    wrong = [one for one in wrong if one[2] in known]
+    return (min(wrong)[0], known[min(wrong)[2]]) if wrong else (0, None)
+
+
+def _direction(mine: Sequence[Any], refused: Sequence[tuple[Any, Any]]) -> str:
+    """Forward, reverse alone, or one output alone."""
+    names = {o.name for _, o in refused}
+    everything = {o.name for r in mine for o in r.outputs}
+    if len(names) == 1 and len(everything) > 1:
+        return f"{next(iter(names))} alone; its other outputs are right"
+    if all(name.startswith("d_") for name in names):
+        return "reverse alone; its forward outputs are right"
+    return "forward" if not any(name.startswith("d_") for name in names) else "forward and reverse"

@@ -1,0 +1,91 @@
+"""The folder `golden/`: its location, reader and checks."""
+
+import functools
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.port.judge.format import Case, FileEntry, Manifest, read_struct
+from endotsr.port.judge.npy import LARGEST as LARGEST_ARRAY
+from endotsr.port.judge.npy import read_plain
+from endotsr.untrusted.files import read_bytes, read_text
+
+
+class Golden(NamedTuple):
+    """Cases with files verified against the checksums of the manifest."""
+
+    folder: Path
+    manifest: Manifest
+    cases: list[Case]
+
+    @property
+    def short_version(self) -> str:
+        """major.minor, as in a claim."""
+        return ".".join(self.manifest.version.split(".")[:2])
+
+    def array(self, case: Case, file: str) -> NDArray:
+        """An input or an expected output by its path within the case."""
+        return _loaded(self.folder / "cases" / case.family / case.case / file)
+
+    def inputs(self, case: Case) -> dict[str, NDArray]:
+        """Every input of a case by name, as stored."""
+        return {name: self.array(case, array.file) for name, array in case.inputs.items()}
+
+
+@functools.cache
+def _loaded(path: Path) -> NDArray:
+    """The array of a file, read once and read-only."""
+    return read_plain(path)
+
+
+def in_precision(inputs: Mapping[str, NDArray], precision: str) -> dict[str, NDArray]:
+    """Copies of the inputs, real ones in the given precision (exact: they are float32 numbers)."""
+    return {name: np.array(a, precision) if a.dtype.kind == "f" else np.array(a) for name, a in inputs.items()}
+
+
+def golden_folder(given: Path | None = None) -> Path:
+    """The named folder, else `golden/` of the source tree, else `golden/` of the working folder."""
+    places = [given] if given else [Path(__file__).parents[4] / "golden", Path("golden")]
+    for place in places:
+        if (place / "VERSION").is_file():
+            return place.resolve()  # the caller may change the working folder
+    raise InputError(f"{places[-1]}: no golden folder (no file VERSION); name it with --golden")
+
+
+def read_golden(folder: Path, *, verify: bool = True) -> Golden:
+    """Manifest and cases. Raises InputError with the name of a missing, damaged or foreign file."""
+    try:
+        manifest = read_struct(folder / "manifest.json", Manifest)
+        version = read_text(folder / "VERSION").strip()
+    except (OSError, msgspec.DecodeError) as error:
+        raise InputError(f"{folder / 'manifest.json'}: cannot be read: {error}") from None
+    if version != manifest.version:
+        raise InputError(f"{folder}: VERSION says {version}, manifest.json {manifest.version}")
+    if verify:
+        for entry in manifest.files:
+            _verify(folder, entry)
+    cases = []
+    for family, names in manifest.families.items():
+        for name in names:
+            path = folder / "cases" / family / name / "case.json"
+            try:
+                cases.append(read_struct(path, Case))
+            except (OSError, msgspec.DecodeError) as error:
+                raise InputError(f"{path}: cannot be read: {error}") from None
+    return Golden(folder, manifest, cases)
+
+
+def _verify(folder: Path, entry: FileEntry) -> None:
+    path = folder / entry.path
+    try:
+        data = read_bytes(path, LARGEST_ARRAY)
+    except InputError as error:
+        raise InputError(f"{error}; the golden folder is incomplete") from None
+    if hashlib.sha256(data).hexdigest() != entry.sha256:
+        raise InputError(f"{path}: differs from the checksum in manifest.json; the golden folder is damaged")

@@ -1,0 +1,249 @@
+"""The changes of the definition that are tried for one operation, likely ones first.
+
+First come numbers, then other texts, then other names of one expression, in the code of the operation before the code
+of its parts. Then come settings and inputs read differently, and at the end changes of two expressions, of a part of
+an array, and of the order.
+"""
+
+import ast
+import contextlib
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from endotsr.port.judge.diagnose import made_of
+from endotsr.port.judge.store import Golden, in_precision
+from endotsr.port.search.cases import Answered
+from endotsr.port.search.numbers import START, said_number
+from endotsr.port.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
+from endotsr.port.search.requests import OtherReading, other_requests
+from endotsr.port.search.rewrites import rewrites, with_number
+from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts
+from endotsr.port.search.trial import LATEST, TELLING, Live, Trial
+from endotsr.port.stages.definition import definition_stages
+from endotsr.port.stages.stage import Outputs, Stage
+
+SECONDS = 16.0  # computing time of a search
+UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
+MOST_VALUES = 64  # examined values of an expression
+
+
+def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float = SECONDS) -> Trial:
+    """Changes of one operation that explain the port's outputs, best first in `hits`."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        found = Trial(stage, answered, golden, seconds)
+        calls: dict[str, Callable[[], Any]] = {
+            "forward": lambda: [one.forward(stage, one.inputs, one.settings) for one in answered],
+            "reverse": lambda: [one.reverse(stage, one.inputs, one.saved) for one in answered],
+        }
+        places = executed(calls)
+        inner = _inner(stage.name, golden)
+        glue = [place for place in places if inner and not place.is_constant and place.name not in inner]
+        _places(found, glue)
+        _requests(found)
+        _places(found, [place for place in places if not place.is_constant and place not in glue])
+        _places(found, [place for place in places if place.is_constant])
+        _second(found, [place for place in (glue or places) if not place.is_constant])
+    for module in definition_modules():
+        for name in ("_knob", "_seen", "_at", "_nth"):
+            module.__dict__.pop(name, None)
+    found.hits.sort(key=lambda hit: hit.rank)
+    return found
+
+
+def _inner(operation: str, golden: Golden) -> set[str]:
+    """Functions of the definition executed by the parts of an operation, which are right."""
+    stages = definition_stages()
+    parts = made_of(operation) & stages.keys()
+    cases = {case.operation: case for case in golden.cases if case.operation in parts}
+    calls = {
+        part: lambda part=part: stages[part].compute(
+            in_precision(golden.inputs(cases[part]), "float64"), cases[part].settings
+        )
+        for part in parts & cases.keys()
+    }
+    return {place.name for place in executed(calls)}
+
+
+def _places(trial: Trial, places: Sequence[Statement]) -> None:
+    """Changes of some places: numbers, then other texts, then other names; for a trajectory, numbers last."""
+    long = any(one.length for one in trial.cases)
+    live = _reached(trial, places, long)
+    trial.live += live
+    for texts, rank in ((_texts, 1), (_names, 2)):
+        lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
+        for one in live:  # after a hit, the rest of its line is tried
+            if not lines or one.spot.place.where(one.spot.node) in lines:
+                _try(trial, one, texts(one), rank)
+    for one in live if long and not trial.explains else ():
+        if not trial.over:
+            _solved(trial, one.spot, one.mode, one.values)
+
+
+def _requests(trial: Trial) -> None:
+    """Settings and inputs read differently; for a numeric setting, also the number that fits best."""
+    for request in other_requests([one.case for one in trial.cases], trial.golden.cases):
+        if trial.over:
+            return
+        with contextlib.suppress(Exception):
+            for one in [request] if request.at is None else _best_fixed(trial, request.at, request.rest):
+                trial.note(trial.fits(None, "both", one), one.text, None, *one.rank)
+
+
+def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) -> list[OtherReading]:
+    """A setting fixed at the number that fits best, if nothing else was found."""
+    if trial.hits:
+        return []
+    numbers, _ = trial.number(lambda value: trial.outputs(None, "both", at(value)), rest)
+    return [at(value) for value, _ in numbers]
+
+
+def _reached(trial: Trial, places: Sequence[Statement], long: bool) -> list[Live]:
+    """Reached spots, the most promising first.
+
+    Each is ranked by the factor, term or constant with which it explains most; for a trajectory, which is slow, by one
+    computation.
+    """
+    live: list[Live] = []
+    for place in places:
+        for spot in spots(place):
+            for mode in trial.modes(place):
+                if trial.over:
+                    return live
+                late = list[int]()
+                if values := _values(trial, spot, mode, late if long else None):
+                    rank = next(iter(late), UNKNOWN) if long else _solved(trial, spot, mode, values)
+                    live.append(Live(spot, mode, values, rank))
+    return sorted(live, key=lambda one: one.late)
+
+
+def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) -> list[Any]:
+    """Values of an expression in the first case, None for a value that is not an array; True for a statement.
+
+    late   if given, real values are perturbed while they are read, and the number of spoiled outputs is stored here
+    """
+    if isinstance(spot.node, ast.stmt):
+        return [True]
+    found: list[Any] = []
+    changed = False
+
+    def seen(value: Any) -> Any:
+        nonlocal changed
+        if len(found) < MOST_VALUES:
+            found.append(value if isinstance(value, bool | int | float | np.ndarray | np.generic) else None)
+        if late is None or np.asarray(value).dtype.kind != "f":
+            return value
+        changed = True
+        return np.multiply(value, 1 + START)
+
+    spot.place.module.__dict__["_seen"] = seen
+    with contextlib.suppress(Exception):
+        with written(spot, f"_seen({ast.unparse(spot.node)})"):
+            install = spot.place.compiled()
+        moved = trial.outputs(install, mode)
+        if late is not None and changed:
+            late.append(trial.cases[0].spoiled(moved) if trial.moves(moved) else LATEST - 1)
+    return found
+
+
+def _solved(trial: Trial, spot: Spot, mode: str, values: list[Any]) -> int:
+    """Search for the number at a spot that explains everything; returns the rank of other texts there."""
+    late = LATEST
+    for text, rest in with_number(spot.node, values):
+        late = min(late, _number_at(trial, spot, mode, text, rest, 2 if isinstance(spot.node, ast.Constant) else 3))
+    return late
+
+
+def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank: int, words: str = "") -> int:
+    """As `_solved`, for one text."""
+    names, counter = spot.place.module.__dict__, trial.counter
+    try:
+        with written(spot, text):
+            made = spot.place.compiled()
+
+        def install() -> Any:
+            counter.count = 0
+            return made()
+
+        def outputs(value: float) -> Outputs:
+            names["_knob"] = value
+            return trial.outputs(install, mode)
+
+        numbers, spoils = trial.number(outputs, rest)
+        for value, plain in numbers:
+            names["_knob"] = value
+            whole, phases = trial.best(install, mode)
+            if whole:
+                when = words or (f"at {counter.words()}" if rank > 3 else "")
+                said = _replaced(spot, phases, said_number(spot.node, rest, value), when)
+                by_name = rest == 0 and isinstance(spot.node, ast.Name | ast.Attribute)  # rather another name
+                trial.note(whole, said, spot, 1 + (trial.discrete or by_name) if plain else 3, rank)
+                break
+    except Exception:  # a changed text may raise anything
+        return LATEST
+    return spoils
+
+
+def _texts(one: Live) -> Iterator[tuple[str, int]]:
+    """Other texts of a spot."""
+    return rewrites(one.spot.node, one.values, one.spot.truth)
+
+
+def _names(one: Live) -> Iterator[tuple[str, int]]:
+    """Names of the function in place of another name."""
+    is_name = isinstance(one.spot.node, ast.Name | ast.Attribute)
+    return ((name, 0) for name in (names_in(one.spot.place) if is_name else ()))
+
+
+def _try(trial: Trial, one: Live, texts: Iterator[tuple[str, int]], rank: int) -> None:
+    less_likely = trial.discrete and isinstance(one.spot.node, ast.Constant)
+    for text, less in texts:
+        if trial.over:
+            return
+        with contextlib.suppress(Exception):
+            with written(one.spot, text):
+                install = one.spot.place.compiled()
+            whole, mode = trial.best(install, one.mode)
+            trial.note(whole, _replaced(one.spot, mode, text), one.spot, rank, less + less_likely)
+
+
+def _replaced(spot: Spot, mode: str, new: str, words: str = "") -> str:
+    return f"`{new}` {f'{words} ' if words else ''}where `{ast.unparse(spot.node)}` is right{_side(spot, mode)}"
+
+
+def _side(spot: Spot, mode: str) -> str:
+    return "" if mode == "both" or len(spot.place.phases) == 1 else f", in the {mode} pass alone"
+
+
+def _second(trial: Trial, places: Sequence[Statement]) -> None:
+    """Changes of more than one expression, of a part of an array and of the order, if nothing else fits."""
+    if trial.explains or trial.wrong < TELLING:
+        return
+    for module in definition_modules():
+        module.__dict__.update(_at=at, _nth=trial.counter.nth)
+    places = [place for place in places if trial.forward_refused or "reverse" in place.phases]
+    live = sorted((one for one in trial.live if one.spot.place in places), key=lambda one: one.late)
+    for place in places:
+        _changes(trial, orders(place))
+    for one in live if not trial.explains else ():
+        for text, words in parts(one.spot, one.values):
+            if not trial.over:
+                _number_at(trial, one.spot, one.mode, text, 1.0, 4, words)
+    for place in places if not trial.explains else ():
+        _changes(trial, pairs([one.spot for one in live if one.spot.place is place]))
+    for one in live if not trial.explains else ():
+        _try(trial, one, beside(one.spot, one.values, expressions(one.spot.place)), 5)
+
+
+def _changes(trial: Trial, changes: Iterator[SecondChange]) -> None:
+    for spot, text, writing in changes:
+        if trial.over:
+            return
+        with contextlib.suppress(Exception):
+            with writing:
+                install = spot.place.compiled()
+            whole, mode = trial.best(install, trial.modes(spot.place)[0])
+            trial.note(whole, f"{text}{_side(spot, mode)}", spot, 4, 0)

@@ -1,0 +1,80 @@
+"""The search: single changes of the definition against the outputs of a port, within a time limit."""
+
+import contextlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from endotsr.errors import InputError
+from endotsr.port.judge.format import Precision
+from endotsr.port.judge.store import Golden
+from endotsr.port.judge.verdict import INSIDE, Report, judge, left_out
+from endotsr.port.search.cases import Answered
+from endotsr.port.search.changes import SECONDS, search
+from endotsr.port.search.trial import WHOLE, Hit, Trial
+from endotsr.port.stages.definition import definition_stages
+
+START_UP = 60.0  # seconds of a process outside its search
+SLOWEST = 10.0  # elapsed seconds per second of computing on a busy machine
+LONG = 3.0  # factor on the time of a search among trajectories
+MOST_LINES = 3  # source lines listed if all explain the outputs equally
+
+
+def explained(golden: Golden, outputs: Path, precision: Precision, level: int, operation: str, seconds: float) -> Trial:
+    """The search for the mistake of an operation with a refused output.
+
+    Raises: InputError if the definition does not compute the operation, or none of its readable outputs is refused.
+    """
+    stage = definition_stages().get(operation)
+    cases = [case for case in golden.cases if case.operation == operation and case.level <= level]
+    reports = judge(golden._replace(cases=cases), outputs, precision, level=min(level, 4)).cases
+    answered = [Answered(golden, *pair, outputs, precision) for pair in zip(cases, reports)]
+    answered = [one for one in answered if one.got]
+    answered.sort(key=_order)
+    if stage is None or not answered or not answered[0].refused:
+        raise InputError(f"{operation}: nothing to explain")
+    return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
+
+
+def _order(one: Answered) -> tuple[bool, int, int, int]:
+    """Sort key: refused cases first, short trajectories before long ones, then cases with the most to explain."""
+    return not one.refused, one.length, -len(one.refused), -sum(one.got[name].size for name in one.refused)
+
+
+def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECONDS) -> None:
+    """Add to a report the results of a search for the mistake of its first wrong operation.
+
+    The search runs in a separate process: a change may exhaust the memory or misuse a library.
+    """
+    if not report.first_wrong:
+        return
+    words = [golden.folder, outputs, report.precision, report.asked_level, report.first_wrong, seconds]
+    limit = START_UP + SLOWEST * LONG * seconds
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        done = subprocess.run([sys.executable, "-m", "endotsr.port.search", *map(str, words)],
+                              capture_output=True, timeout=limit, check=False)  # fmt: skip
+        if done.returncode == 0:
+            found = json.loads(done.stdout)
+            report.causes, report.inside = found["causes"], found["inside"]
+            unasked = report.causes or INSIDE in left_out(outputs)[0]
+            report.notes += [found["asked"]] if found["asked"] and not unasked else []
+
+
+def sentences(trial: Trial) -> list[str]:
+    """The changes that explain most, one per source line; nothing if changes in many functions do."""
+    best: dict[str, Hit] = {}
+    for hit in trial.hits:
+        if hit.rank[:3] == trial.hits[0].rank[:3]:
+            best.setdefault(hit.where or hit.text, hit)
+    functions = sorted({hit.function for hit in best.values()})
+    if not best or len(functions) > MOST_LINES:
+        return []
+    said = [f"{hit.text}{f': {hit.where}' if hit.where else ''}" for hit in best.values()]
+    rest = [f"  or equally with {one}" for one in said[1:]]
+    if len(best) > MOST_LINES:
+        said[0] = f"for example {said[0]}"
+        rest = [f"  or equally with another change in {', '.join(functions)}: {len(best)} lines"]
+    number = len(trial.cases)
+    whole = f"  ({WHOLE[trial.hits[0].whole]} of its {number} case{'s' * (number > 1)})"
+    return [f"your outputs are those of the definition with {said[0]}", *rest, whole]

@@ -1,0 +1,151 @@
+"""Misread requests: a setting fixed by a port, an input in another order, unit or sign."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import permutations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.port.judge.format import Case
+from endotsr.port.stages.stage import Inputs, Outputs, Settings
+
+MOST_ORDERED = 4  # longest axis with every order tried
+MOST_SWAPPED = 16  # longest axis with every pair exchanged
+
+
+class OtherReading(NamedTuple):
+    """A misreading of requests, the same for all cases."""
+
+    text: str
+    rank: tuple[int, int]  # as of the other changes
+    ask: Callable[[Inputs, Settings], tuple[Inputs, Settings]]
+    tell: Callable[[Outputs], Outputs] = lambda found: found
+    at: "Callable[[float], OtherReading] | None" = None  # the same with another number
+    rest: float = 0.0  # the number of the first case
+
+
+def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
+    """Misreadings of the requests of one operation, settings first."""
+    for path in dict.fromkeys(path for case in cases for path in leaves(case.settings)):
+        yield from _settings(path, cases, all_cases)
+    for name, array in cases[0].inputs.items():
+        yield from _inputs(name, array.shape, array.dtype)
+
+
+def leaves(settings: Mapping[str, Any], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The path of every value."""
+    for key, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, (*above, key))
+        else:
+            yield (*above, key)
+
+
+def value_at(settings: Any, path: Sequence[str]) -> Any:
+    """The value of a path; None if missing."""
+    for key in path:
+        settings = settings.get(key) if isinstance(settings, Mapping) else None
+    return settings
+
+
+def with_value(settings: Settings, path: Sequence[str], value: Any) -> Settings:
+    """The settings with another value at a path."""
+    if len(path) == 1:
+        return {**settings, path[0]: value}
+    return {**settings, path[0]: with_value(settings[path[0]], path[1:], value)}
+
+
+def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
+    """A setting fixed at a value, or changed by a rule."""
+    name = ".".join(path)
+    seen = [value_at(case.settings, path) for case in cases]
+    seen += [value_at(case.settings, p) for case in all_cases for p in leaves(case.settings) if p[-1] == path[-1]]
+    numbers = [v for v in seen if isinstance(v, int | float) and not isinstance(v, bool)]
+    fixed = [
+        *seen,
+        *([0, 1] if numbers else []),
+        *([True, False] if any(isinstance(v, bool) for v in seen) else []),
+    ]
+
+    def fixed_at(value: Any) -> OtherReading:
+        return OtherReading(
+            f"{name} fixed at {value!r}", (0, 0), lambda i, s: (i, with_value(s, path, value) if _has(s, path) else s)
+        )
+
+    yield from map(fixed_at, dict.fromkeys(v for v in fixed if v is not None and not isinstance(v, list)))
+    if isinstance(seen[0], float):
+        yield fixed_at(seen[0])._replace(at=fixed_at, rest=seen[0])
+    rules: dict[str, Callable[[Any], Any]] = {}
+    if numbers:
+        rules = {"twice": lambda v: 2 * v, "half": lambda v: v / 2, "the square of": lambda v: v * v,
+                 "10 times": lambda v: 10 * v, "1/10 of": lambda v: v / 10,
+                 "255/256 of": lambda v: v * 255 / 256, "1 more than": lambda v: v + 1,
+                 "1 less than": lambda v: v - 1, "minus": lambda v: -v}  # fmt: skip
+    elif any(isinstance(v, bool) for v in seen):
+        rules = {"the opposite of": lambda v: not v}
+    for rule, change in rules.items():
+        text = f"{rule} {name} in place of {name}"
+        yield OtherReading(text, (0, 1), lambda i, s, c=change: (i, with_value(s, path, c(value_at(s, path)))))
+
+
+def _has(settings: Settings, path: Sequence[str]) -> bool:
+    return value_at(settings, path) is not None
+
+
+def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReading]:
+    """An input and its gradient, or a cotangent, in another order; an input with another sign or unit."""
+    for axis, size in enumerate(shape):
+        if 1 < size <= MOST_ORDERED:
+            yield from (_ordered(name, axis, np.array(order)) for order in list(permutations(range(size)))[1:])
+        elif size > 1:
+            if size <= MOST_SWAPPED:
+                pairs = [(a, b) for b in range(size) for a in range(b)]
+                yield from (_ordered(name, axis, _swapped(size, *pair), f"with {pair} exchanged") for pair in pairs)
+            halves = np.arange(size).reshape(2, -1) if size % 2 == 0 else np.arange(size)[None]
+            orders = {"backwards": np.arange(size)[::-1], "with its halves in turns": halves.T.reshape(-1)}
+            orders["with its entries in turns put into halves"] = np.argsort(orders["with its halves in turns"])
+            for text, order in orders.items():
+                if list(order) != sorted(order):
+                    yield _ordered(name, axis, order, text)
+    if len(shape) > 1 and len(set(shape[:2])) == 1:
+        yield _mapped(name, "transposed", lambda a: a.swapaxes(0, 1), lambda a: a.swapaxes(0, 1))
+    if kind == "boolean":
+        yield _mapped(name, "negated", lambda a: ~a, lambda a: a)
+    if kind == "real":
+        for text, factor in (("-1", -1.0), ("2", 2.0), ("1/2", 0.5), ("255", 255.0), ("1/255", 1 / 255),
+                             ("pi/180", np.pi / 180)):  # fmt: skip
+            yield _mapped(name, f"times {text}", lambda a, f=factor: a * f, lambda a, f=factor: a * f, (2, 1))
+        yield _mapped(name, "taken as 0", lambda a: 0 * a, lambda a: 0 * a, (2, 1))
+
+
+def _swapped(size: int, a: int, b: int) -> NDArray:
+    order = np.arange(size)
+    order[[a, b]] = b, a
+    return order
+
+
+def _ordered(name: str, axis: int, order: NDArray, text: str = "") -> OtherReading:
+    """One axis in another order."""
+    text = text or f"in the order {order.tolist()}"
+    return _mapped(
+        name, f"read {text} along axis {axis}", lambda a: np.take(a, order, axis),
+        lambda a: np.take(a, np.argsort(order), axis),
+    )  # fmt: skip
+
+
+def _mapped(
+    name: str, text: str, change: Callable[[NDArray], NDArray], back: Callable[[NDArray], NDArray],
+    rank: tuple[int, int] = (0, 2),
+) -> OtherReading:  # fmt: skip
+    """An input changed, and its gradient changed back; for a cotangent, its output."""
+    partner = name.removeprefix("d_") if name.startswith("d_") else f"d_{name}"
+
+    def ask(inputs: Inputs, settings: Settings) -> tuple[Inputs, Settings]:
+        return ({**inputs, name: change(inputs[name])} if name in inputs else inputs), settings
+
+    def tell(found: Outputs) -> Outputs:
+        return {**found, partner: back(found[partner])} if partner in found else found
+
+    what = f"the output {partner} and its derivative" if name.startswith("d_") else f"the input {name}"
+    return OtherReading(f"{what} {text}", rank, ask, tell)

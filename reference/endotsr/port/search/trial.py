@@ -1,0 +1,187 @@
+"""One operation, the outputs of a port, and the extent to which a change of the definition explains them.
+
+In: the cases of the operation with the port's answers. Out: the explanations of the changes, in `hits`. `changes.py`
+selects the changes.
+"""
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.port.judge.store import Golden
+from endotsr.port.search.cases import Answered
+from endotsr.port.search.numbers import START, best_number, plain_first
+from endotsr.port.search.places import Spot, Statement
+from endotsr.port.search.requests import OtherReading
+from endotsr.port.search.second import Counter
+from endotsr.port.stages.stage import Outputs, Stage
+
+LATEST = 1000  # rank of a spot with unknown reach
+ENOUGH = 40  # equal explanations that end the search
+TELLING = 8  # smallest number of wrong entries for which any number is accepted, and of outputs for wrong gradients
+WHOLE = {
+    "all": "every output",
+    "derivative": "every forward output, of which the gradients of the port are the derivatives,",
+    "refused": "every output of those that are refused; it would be wrong in others that pass,",
+    "forward": "every forward output; the gradients of the port are wrong in another way,",
+}
+"""Extents of an explanation."""
+Install = Callable[[], Any]  # applies a change and returns a function that undoes it
+
+
+class Hit(NamedTuple):
+    """A change with which the definition reproduces the port's outputs."""
+
+    text: str
+    where: str  # equation and line
+    function: str  # of the line
+    whole: str  # a key of WHOLE
+    rank: tuple[int, ...]
+
+
+class Live(NamedTuple):
+    """A spot, a phase, its values, and its rank: the number of passed outputs that a change spoils."""
+
+    spot: Spot
+    mode: str
+    values: list[Any]
+    late: int
+
+
+class Trial:
+    """The search for one operation: its cases, the one with the most refused outputs first, and the hits."""
+
+    def __init__(self, stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
+        self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
+        self.golden = golden
+        self.hits: list[Hit] = []
+        self.live: list[Live] = []
+        self.counter = Counter()
+        self.tried = 0
+        self.matched = False  # the last change reproduces the forward outputs of a case with a refused one
+        for one in answered:
+            one.begin(stage)
+        most = answered[0]
+        real = [name for name in sorted(most.refused) if most.case.outputs[name].dtype == "real"]
+        self.fitted = [name for name in real if name in most.forward_names] or real  # outputs for fitting a number
+        # decisions are refused: other numbers may give the same decisions
+        self.discrete = any(one.case.outputs[name].dtype != "real" for one in answered for name in one.refused)
+        self.refusals = [one.refused for one in answered]
+        self.wrong = sum(one.wrong(one.forward_names + one.gradient_names) for one in answered)
+        self.wrong_forward = sum(one.wrong(one.forward_names) for one in answered)
+        self.forward_refused = any(
+            one.refused & set(one.forward_names) for one in answered
+        )  # a forward output is refused
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is over or enough has been found."""
+        return time.process_time() > self.end or len(self.hits) >= ENOUGH
+
+    @property
+    def explains(self) -> bool:
+        """Whether a change explains both passes."""
+        return any(hit.whole in ("all", "derivative") for hit in self.hits)
+
+    def fits(self, install: Install | None, mode: str, request: OtherReading | None = None) -> str:
+        """The extent to which a change explains all cases: a key of WHOLE, or "" for nothing."""
+        self.tried += 1
+        self.matched = False
+        gradients: list[bool | None] = []  # of cases with gradients that differ from the changed definition's
+        spoils = False  # a case that passed
+        for one in self.cases:
+            if spoils:
+                break
+            inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
+            found, saved = one.right, one.saved
+            if mode != "reverse":
+                with _installed(install):
+                    found, saved = one.forward(self.stage, inputs, settings)
+            same = one.same(request.tell(found) if request else found, one.forward_names)
+            if not same and one.refused:
+                return ""
+            self.matched |= same and bool(one.refused.intersection(one.forward_names))
+            if same and one.gradient_names and False not in gradients and (one.refused or not gradients):
+                with _installed(install if mode != "forward" else None):
+                    back = one.reverse(self.stage, inputs, saved)
+                same = one.same(request.tell(back) if request else back, one.gradient_names)
+                if not same and one.refused:
+                    if mode == "reverse" or not self.forward_refused:
+                        return ""
+                    with _installed(install):
+                        gradients.append(one.is_derivative(self.stage))
+            spoils = spoils or (not same and not one.refused)
+        if gradients and spoils:
+            return ""
+        if gradients:
+            return "derivative" if True in gradients and False not in gradients else "forward"
+        return "refused" if spoils else "all"
+
+    def best(self, install: Install, mode: str) -> tuple[str, str]:
+        """As `fits`, with the best phases: a change of both may explain more without the reverse pass."""
+        whole = self.fits(install, mode)
+        if mode == "both" and whole != "all" and self.matched:
+            alone, order = self.fits(install, "forward"), list(WHOLE)
+            if alone and (not whole or order.index(alone) < order.index(whole)):
+                return alone, "forward"
+        return whole, mode
+
+    def outputs(self, install: Install | None, mode: str, request: OtherReading | None = None) -> Outputs:
+        """All outputs of the first case with a change."""
+        one = self.cases[0]
+        self.tried += 1
+        inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
+        found, saved = one.right, one.saved
+        if mode != "reverse":
+            with _installed(install):
+                found, saved = one.forward(self.stage, inputs, settings)
+        with _installed(install if mode != "forward" else None):
+            return {**found, **one.reverse(self.stage, inputs, saved)}
+
+    def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
+        """Numbers to try, the simplest first, and the number of passed outputs that another number spoils."""
+        one = self.cases[0]
+
+        def off(value: float) -> Any:
+            return one.distance(at(value), self.fitted)
+
+        moved = at(rest + START * (abs(rest) or 1.0))
+        number = best_number(off, rest, one.distance(one.right, self.fitted)) if self.fitted else None
+        late = one.spoiled(moved)
+        known = number is not None and abs(number - rest) > START
+        numbers = plain_first(number) if number is not None and known else []
+        numbers = [one for one in numbers if one[1] or self.wrong >= TELLING]
+        return numbers, late if self.moves(moved) else LATEST - 1
+
+    def moves(self, found: Outputs) -> bool:
+        """Whether these outputs of the first case differ from the definition's."""
+        one = self.cases[0]
+        return not all(np.array_equal(found[name], one.right[name]) for name in one.got)
+
+    def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
+        """Record a change that fits."""
+        enough = {"forward": self.wrong_forward, "refused": self.wrong if sum(map(bool, self.refusals)) > 1 else 0}
+        if whole and enough.get(whole, TELLING) >= TELLING:
+            if spot and not self.forward_refused and spot.place.phases == {"forward"}:
+                rank = (rank[0] + 1, *rank[1:])  # the refused outputs are computed elsewhere
+            where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
+            self.hits.append(Hit(text, where, function, whole, (int(whole in enough), *rank, len(self.hits))))
+
+    def modes(self, place: Statement) -> list[str]:
+        """The phases in which a change of a place can affect the refused outputs."""
+        if len(place.phases) == 1:
+            return list(place.phases)
+        return ["both" if self.forward_refused else "reverse"]
+
+
+@contextlib.contextmanager
+def _installed(install: Install | None) -> Iterator[None]:
+    back = install() if install else None
+    try:
+        yield
+    finally:
+        if back:
+            back()

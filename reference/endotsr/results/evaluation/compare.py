@@ -1,0 +1,148 @@
+"""Comparison of methods on the same held-out frames: means and paired differences.
+
+In: metrics.json of runs or of folders of pictures. Out: one row per method and metric. Differences to the first method
+are taken frame by frame, which cancels the difficulty of the frames. Their intervals are bootstrapped over frames: they
+cover other frames of this clip, but not other clips.
+"""
+
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.results.evaluation.records import EvaluationRecord, FrameMetrics, RunEvaluation
+
+RESAMPLES = 9999
+CONFIDENCE = 0.95
+SMALLER_IS_BETTER = ("lpips", "lpips_symmetric")
+
+
+class Method(NamedTuple):
+    """The held-out metrics of one method."""
+
+    label: str
+    per_frame: list[FrameMetrics]  # entries of metrics.json: frame, name, time, metrics
+    digests: dict[str, str]  # SHA-256 of `images` and `masks` of the sequence
+
+
+class PairedDifference(NamedTuple):
+    """A paired difference to the first method, over the frames with both values."""
+
+    mean: float
+    low: float  # of the interval
+    high: float
+    better: int  # number of frames on which this method is better
+    frames: int
+
+
+class Row(NamedTuple):
+    """The result of one method and metric."""
+
+    label: str
+    metric: str
+    mean: float | None
+    difference: PairedDifference | None  # None for the first method, and without a common frame
+
+
+def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: bool = False) -> list[Method]:
+    """The method of one metrics.json, optionally with its baselines.
+
+    where   the file, for messages
+    Raises: InputError if the dictionary is not from `endotsr evaluate`.
+    """
+    try:
+        about: Any = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
+        digests = {name: str(about["arrays_sha256"][name]) for name in ("images", "masks")}
+        rows = {label: metrics["held_out"]["per_frame"]}
+        if baselines:
+            rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
+        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
+        for method in methods:
+            _frames(method)
+            _about(method)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
+    return methods
+
+
+def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:
+    """Means and paired differences to the first method for each metric.
+
+    metric_names   keys of the entries; a metric without any value is left out
+    seed           of the resampling
+    Raises: InputError if two methods have the same label, or were measured on different frames or masks.
+    """
+    _refuse_other_frames(methods)
+    rows = []
+    for metric in metric_names:
+        columns = [_column(method, metric) for method in methods]
+        if all(np.isnan(column).all() for column in columns):
+            continue
+        for k, (method, column) in enumerate(zip(methods, columns)):
+            difference = None if k == 0 else _paired(column - columns[0], metric, seed)
+            mean = None if np.isnan(column).all() else float(np.nanmean(column))
+            rows.append(Row(method.label, metric, mean, difference))
+    return rows
+
+
+def _refuse_other_frames(methods: list[Method]) -> None:
+    first = methods[0]
+    frames = _frames(first)
+    for k, other in enumerate(methods[1:], start=1):
+        if other.label in [method.label for method in methods[:k]]:
+            raise InputError(f"two methods are called {other.label!r}; allowed: NAME=PATH with different names")
+        if _frames(other) != frames:
+            raise InputError(
+                f"{other.label}: {_about(other)}; {first.label}: {_about(first)}; allowed: the same held-out frames"
+            )
+        for name, digest in other.digests.items():
+            if first.digests.get(name) != digest:
+                raise InputError(f"{other.label} and {first.label}: measured on different {name}; allowed: the same")
+
+
+def _frames(method: Method) -> list[int]:
+    """Frame numbers. Names are not compared: they depend on the layout of the clip; the digests do not."""
+    return [int(row["frame"]) for row in method.per_frame]
+
+
+def _about(method: Method) -> str:
+    names = [row["name"] for row in method.per_frame]
+    return f"{len(names)} frames" + (f" from {names[0]} to {names[-1]}" if names else "")
+
+
+def _column(method: Method, metric: str) -> FloatArray:
+    """The metric of every frame; NaN if it has no value."""
+    values = [row.get(metric) for row in method.per_frame]
+    return np.array([np.nan if value is None else float(value) for value in values], np.float64)
+
+
+def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference | None:
+    """The paired difference; NaN entries are left out, None if there is no other."""
+    known = difference[np.isfinite(difference)]
+    if not known.size:
+        return None
+    low, high = interval(known, seed)
+    better = int(np.count_nonzero(known < 0 if metric in SMALLER_IS_BETTER else known > 0))
+    return PairedDifference(float(known.mean()), low, high, better, known.size)
+
+
+def interval(values: FloatArray, seed: int = 0) -> tuple[float, float]:
+    """Percentile bootstrap interval of a mean at CONFIDENCE; for a single value both limits equal it."""
+    if values.size < 2:
+        return float(values[0]), float(values[0])
+    return bootstrapped((values,), np.mean, seed)
+
+
+def bootstrapped(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> tuple[float, float]:
+    """Percentile bootstrap interval at CONFIDENCE of the average of the samples' means or medians (`middle`)."""
+    from scipy.stats import bootstrap
+
+    def averaged(*drawn: FloatArray, axis: int = -1) -> FloatArray:
+        return np.mean([middle(sample, axis=axis) for sample in drawn], axis=0)
+
+    found = bootstrap(
+        samples, averaged, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile", vectorized=True,
+        rng=np.random.default_rng(seed),
+    ).confidence_interval  # fmt: skip
+    return float(found.low), float(found.high)

@@ -1,0 +1,153 @@
+"""Metrics of renders and baselines on the frames, and the dictionary of metrics.json.
+
+The input is a function from frame number to picture, so the same code evaluates the model, a baseline, and the pictures
+of another program.
+
+A metric without a finite value (LPIPS without weights, infinite PSNR of two equal pictures, tissue PSNR of an empty
+mask, a render that is not finite) is None, never NaN, because the result is JSON. Means exclude and count such values.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.results.evaluation.baselines import BASELINES, unit_image
+from endotsr.results.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
+from endotsr.results.evaluation.metrics import image_metrics, mean_metrics
+from endotsr.results.evaluation.records import (
+    EvaluationRecord,
+    FrameMetrics,
+    FramesMeasured,
+    FramesPart,
+    LabelledFrames,
+    Means,
+)
+
+RenderFrame = Callable[[int], FloatArray]
+
+FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
+LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
+EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
+
+
+def evaluate_frames(
+    sequence: Sequence, indices: Iterable[int], render_frame: RenderFrame, lpips_weights: LpipsWeights | None = None
+) -> FramesMeasured:
+    """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
+
+    render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
+    lpips_weights   None: LPIPS is None
+
+    Raises   ValueError naming the frame if the shapes of render and frame differ
+    """
+    rows: list[FrameMetrics] = []
+    bad = 0
+    for index in (int(i) for i in indices):
+        render, truth, mask = np.asarray(render_frame(index)), unit_image(sequence, index), sequence.masks[index]
+        if render.shape != truth.shape:
+            raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
+        found = image_metrics(render, truth, mask) | _lpips(render, truth, mask, lpips_weights)
+        values = {key: _finite(value) for key, value in found.items()}
+        bad += sum(values[key] is None and found[key] is not None for key in found)
+        about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
+        rows.append(cast(FrameMetrics, about | values))
+    return measured_rows(rows, bad)
+
+
+def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
+    """Frames with the means of their metrics; `not_finite` is the number of computed values that are not finite."""
+    keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]
+    summary = mean_metrics([{key: row.get(key) for key in keys} for row in rows])
+    excluded = {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])}
+    return {
+        "mean": {key: summary[key] for key in keys}, "per_frame": rows, "excluded": excluded, "not_finite": not_finite,
+    }  # fmt: skip
+
+
+def left_out(evaluation: EvaluationRecord) -> list[str]:
+    """Names of the held-out frames without a tissue PSNR, which the means exclude."""
+    rows = (evaluation.get("held_out") or {}).get("per_frame") or []
+    return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
+
+
+def baseline_table(sequence: Sequence, lpips_weights: LpipsWeights | None = None) -> dict[str, LabelledFrames]:
+    """Held-out metrics of the four baselines, in the order of BASELINES."""
+    return {
+        name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights)}
+        for name, (label, make) in BASELINES.items()
+    }
+
+
+def training_sample(sequence: Sequence) -> list[int]:
+    """Every sixth training frame, starting with the first."""
+    return [int(i) for i in sequence.train_index[::EVERY_TRAINING_FRAME]]
+
+
+def evaluate_model(
+    sequence: Sequence,
+    render_frame: RenderFrame,
+    lpips_weights: LpipsWeights | None = None,
+    training: Iterable[int] | None = None,
+) -> EvaluationRecord:
+    """The content of metrics.json for the renders of a sequence.
+
+    training   training frames to evaluate too, without LPIPS; default: `training_sample`
+    returns    {"format", "frames", "held_out", "training", "temporal_gap", "baselines", "lpips_reason",
+               "not_finite"}; `temporal_gap` is the training mean minus the held-out mean of each metric;
+               `lpips_reason` is None if LPIPS was computed
+    """
+    chosen = training_sample(sequence) if training is None else [int(i) for i in training]
+    held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights)
+    inside = evaluate_frames(sequence, chosen, render_frame)
+    frames: FramesPart = {
+        "total": len(sequence.images),
+        "training": len(sequence.train_index),
+        "held_out": [int(i) for i in sequence.test_index],
+        "training_sample": chosen,
+        "tissue_fraction": float(np.mean(sequence.masks)),
+    }
+    obstacle = lpips_obstacle(lpips_weights, *sequence.images.shape[2:])
+    return evaluation_record(frames, held_out, inside, baseline_table(sequence, lpips_weights), obstacle)
+
+
+def evaluation_record(
+    frames: FramesPart,
+    held_out: FramesMeasured,
+    training: FramesMeasured,
+    baselines: dict[str, LabelledFrames],
+    lpips_reason: str | None,
+) -> EvaluationRecord:
+    """The content of metrics.json from its measured parts; see `evaluate_model`."""
+    return {
+        "format": FORMAT,
+        "frames": frames,
+        "held_out": held_out,
+        "training": training,
+        "temporal_gap": difference(training["mean"], held_out["mean"]),
+        "baselines": baselines,
+        "lpips_reason": lpips_reason,
+        "not_finite": sum(part["not_finite"] for part in (held_out, training, *baselines.values())),
+    }
+
+
+def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> Means:
+    """Both LPIPS values, with a clipped render and excluded pixels 0; None without weights."""
+    if weights is None:
+        return dict.fromkeys(LPIPS_KEYS)
+    shown, wanted = np.where(mask, np.clip(render, 0, 1), 0), np.where(mask, truth, 0)
+    return {key: lpips(shown, wanted, weights, how) for key, how in LPIPS_KEYS.items()}
+
+
+def difference(inside: Means, outside: Means) -> Means:
+    """Inside minus outside for each metric; None if one of them has no value."""
+    pairs = {key: (value, outside.get(key)) for key, value in inside.items()}
+    return {key: None if a is None or b is None else a - b for key, (a, b) in pairs.items()}
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

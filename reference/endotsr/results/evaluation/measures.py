@@ -1,0 +1,123 @@
+"""Additional measurements, computed on request because each renders many views.
+
+depth        rendered depth of the held-out frames, compared with the prior and with predictions without a model
+flicker      temporal noise of static tissue, compared with the recorded frames
+right_view   renders for the right camera, compared with the real right pictures and the warped left ones
+
+In: a model, its sequence, and the source of the sequence. Out: plain values for metrics.json under the name of the
+measurement; {"reason": ...} if the sequence does not allow it.
+
+Flicker at a pixel is the second difference of its colour over three successive frames,
+
+    d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6).
+
+If the noise is independent from frame to frame, d has the standard deviation of the noise. A linear change of the light
+cancels. A static pixel is tissue in every frame, with small optical flow between successive frames. The recorded
+frames flicker because of camera noise; a larger value means that the model itself flickers.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import RenderOut
+from endotsr.results.evaluation.baselines import unit_image
+from endotsr.results.evaluation.depth import held_out_depth
+from endotsr.results.evaluation.right_view import right_view
+from endotsr.training.fitting.model import render_at, with_corrected_cameras
+from endotsr.training.runs.model import Model
+
+STATIC = 0.5  # px between successive frames: largest median flow of a static pixel
+STATIC_HIGH = 1.0  # px: largest 90th percentile of the flow
+LEAST_PIXELS = 100  # with fewer static pixels nothing is reported
+LEVELS = 255.0  # results are given in 8-bit grey levels
+
+RenderView = Callable[[int, Camera], RenderOut]  # frame number (for the time) and camera -> render
+
+MEASURES: dict[str, Callable[[Model, Sequence, str, RenderView], dict[str, Any]]] = {
+    "depth": lambda model, sequence, source, render: held_out_depth(sequence, render),
+    "flicker": lambda model, sequence, source, render: flicker(sequence, render),
+    "right_view": lambda model, sequence, source, render: right_view(sequence, source, model.config.sequence, render),
+}
+
+
+def check_measures(names: Iterable[str], what: str = "measure") -> None:
+    """Raises InputError for an unknown name; the message begins with `what`."""
+    for name in names:
+        if name not in MEASURES:
+            raise InputError(f"{what} {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
+
+
+def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str) -> dict[str, dict[str, Any]]:
+    """The named measurements of a model.
+
+    source   folder of the sequence, or `simulated`
+    Raises:  InputError for an unknown name and for an unreadable right picture.
+    """
+    names = list(names)
+    check_measures(names)
+    seen = with_corrected_cameras(sequence, model.frames)
+
+    def render(index: int, camera: Camera) -> RenderOut:
+        time = float(seen.times[index])
+        return render_at(model.gaussians, model.spectral, model.config, camera, time, frames=model.frames)
+
+    return {name: MEASURES[name](model, seen, source, render) for name in names}
+
+
+def measure_lines(found: dict[str, dict[str, Any]]) -> list[str]:
+    """The measurements as lines of text."""
+    lines = []
+    for name, entry in found.items():
+        if "reason" in entry:
+            lines.append(f"{name}: not measured: {entry['reason']}")
+            continue
+        for row in entry["rows"]:
+            values = ", ".join(f"{key} {value:.4g}" for key, value in row.items() if isinstance(value, float))
+            lines.append(f"{name}: {row['label']}: {values}")
+    return lines
+
+
+def flicker(sequence: Sequence, render: RenderView) -> dict[str, Any]:
+    """Root mean square of d over the static pixels and all inner frames, or the held-out ones; grey levels.
+
+    render   frame number and camera -> render; called once per frame
+    returns  {"pixels", "rows": [{"label", "all_frames", "held_out"}]} for the model and the recorded frames, or
+             {"reason"}. `held_out` uses d(t) at held-out t only: it is large if the model jumps between training and
+             held-out times
+    """
+    if not sequence.static_camera:
+        return {"reason": "the camera moves: pixels do not show the same tissue in all frames"}
+    static = static_pixels(sequence)
+    if np.count_nonzero(static) < LEAST_PIXELS:
+        return {"reason": f"{np.count_nonzero(static)} static pixels; needed: {LEAST_PIXELS}"}
+
+    def rendered(index: int) -> FloatArray:
+        return np.clip(render(index, sequence.cameras[index]).colour, 0, 1)
+
+    frames = {"this model": rendered, "the recorded frames": lambda index: unit_image(sequence, index)}
+    rows = [_row(label, sequence, static, frame) for label, frame in frames.items()]
+    return {"pixels": int(np.count_nonzero(static)), "rows": rows}
+
+
+def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int], FloatArray]) -> dict[str, Any]:
+    values = np.stack([frame(i)[:, static].astype(np.float64) for i in range(sequence.count)])
+    squares = np.square(values[:-2] - 2 * values[1:-1] + values[2:]).mean(axis=(1, 2)) / 6  # of frames 1 .. n - 2
+    held_out = [int(i) - 1 for i in sequence.test_index if 0 < i < sequence.count - 1]
+    inside = float(np.sqrt(squares[held_out].mean()) * LEVELS) if held_out else None
+    return {"label": label, "all_frames": float(np.sqrt(squares.mean()) * LEVELS), "held_out": inside}
+
+
+def static_pixels(sequence: Sequence) -> BoolArray:
+    """(H, W) bool: tissue in every frame, with small optical flow between successive recorded frames."""
+    from endotsr.clips.opencv import dense_flow
+
+    flows = [dense_flow(sequence.images[i], sequence.images[i + 1]) for i in range(sequence.count - 1)]
+    lengths = np.stack([np.hypot(*flow) for flow in flows])
+    middle, high = np.quantile(lengths, (0.5, 0.9), axis=0)
+    return sequence.masks.all(axis=0) & (middle <= STATIC) & (high <= STATIC_HIGH)

@@ -1,0 +1,136 @@
+"""The types of metrics.json. Every number is finite; a metric without a value is None."""
+
+from typing import Any, NotRequired, Required, TypedDict
+
+from endotsr.training.runs.machine import MachinePart
+from endotsr.training.runs.records import InputPart
+
+Means = dict[str, float | None]  # metric -> value
+
+
+class MetricValues(TypedDict, total=False):
+    """Every metric; PSNR in dB."""
+
+    psnr_full: float | None
+    psnr_tissue: float | None
+    psnr_full_8bit: float | None
+    psnr_tissue_8bit: float | None
+    ssim_full_8bit: float | None
+    ssim_tissue_8bit: float | None
+    ssim_full: float | None
+    ssim_tissue: float | None
+    lpips: float | None
+    lpips_symmetric: float | None
+
+
+class LabelledMeans(MetricValues, total=False):
+    """Metrics with a label."""
+
+    label: Required[str]
+
+
+class FrameMetrics(MetricValues, total=False):
+    """Number, name, time and metrics of one frame."""
+
+    frame: Required[int]
+    name: Required[str]
+    time: Required[float]
+
+
+class FramesMeasured(TypedDict):
+    """Metrics of several frames."""
+
+    mean: Means  # over the frames with a value
+    per_frame: list[FrameMetrics]
+    excluded: dict[str, int]  # metric -> number of frames without a value, if any
+    not_finite: int  # number of computed values that are not finite
+
+
+class LabelledFrames(FramesMeasured):
+    """Metrics of several frames with a label: of a baseline, or of the blend of renders."""
+
+    label: str
+
+
+class FramesPart(TypedDict):
+    """The entry `frames` of metrics.json."""
+
+    total: int
+    training: int
+    held_out: list[int]
+    training_sample: list[int]
+    tissue_fraction: float
+
+
+class MotionPart(TypedDict):
+    """The entry `trajectories` of metrics.json: error of the motion, and size of the true motion."""
+
+    scene_units: float
+    pixels: float
+    motion_scene_units: float
+    motion_pixels: float
+    unit: str
+
+
+class PosePart(TypedDict):
+    """The entry `pose_correction` of metrics.json: means over the training cameras."""
+
+    degrees: float
+    scene_units: float
+    pixels: float
+    unit: str
+
+
+class RunPart(TypedDict):
+    """The entry `run` of metrics.json: checkpoint, settings, input and machine."""
+
+    iteration: int
+    iterations_planned: int
+    status: str | None
+    gaussians: int
+    seed: int | None
+    threads: int | None
+    started: str | None
+    finished: str | None
+    seconds: float | None
+    peak_memory_bytes: int | None
+    lambda_lap: float | None
+    versions: dict[str, str]
+    machine: MachinePart
+    input: InputPart
+    settings: dict[str, Any]
+
+
+class PicturesPart(TypedDict):
+    """The entry `pictures` of metrics.json: the evaluated folder or video."""
+
+    folder: str
+    pairing: str
+    arrays_sha256: dict[str, str]
+    files: dict[str, str]  # file of every frame
+
+
+class EvaluationRecord(TypedDict):
+    """metrics.json of a model, or of pictures (with `label`)."""
+
+    format: int
+    frames: FramesPart
+    held_out: FramesMeasured
+    training: FramesMeasured
+    temporal_gap: NotRequired[Means]
+    components: NotRequired[list[LabelledMeans]]  # with one residual left out
+    baselines: dict[str, LabelledFrames]
+    lpips_reason: str | None  # None if LPIPS was computed
+    not_finite: int
+    cross_fade: NotRequired[LabelledFrames]
+    trajectories: NotRequired[MotionPart | None]
+    pose_correction: NotRequired[PosePart | None]
+    measures: NotRequired[dict[str, dict[str, Any]]]
+    label: NotRequired[str]
+    pictures: NotRequired[PicturesPart]
+
+
+class RunEvaluation(EvaluationRecord):
+    """metrics.json of a run."""
+
+    run: RunPart

@@ -1,0 +1,136 @@
+"""`endotsr export`: a slim model, one ply file, animated points, or a folder of ply files, selected by name."""
+
+import re
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.results.export.gltf import write_animated_points
+from endotsr.results.export.mesh import surface
+from endotsr.results.export.model import save_slim_model
+from endotsr.results.export.placement import placed_points, placed_scene
+from endotsr.results.export.ply import gaussian_vertices, mesh_vertices, point_vertices, write_ply
+from endotsr.results.export.scene import MovingScene
+from endotsr.results.export.times import Times, chosen_times
+from endotsr.training.runs.files import refuse_unwritable
+from endotsr.training.runs.folder import refuse_existing
+from endotsr.untrusted.writing import replacing_folder
+
+FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
+ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # extension of a file; `run.2` and `scale_0.5` are folder names
+WRITTEN = (
+    "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.glb (animated points), FILE.npz (a slim"
+    " model), or a name without an ending (a folder of .ply files)"
+)
+
+
+class Content(NamedTuple):
+    """The content of a ply file."""
+
+    kind: Literal["gaussians", "points", "mesh"] = "gaussians"
+    least_opacity: float = 0.1  # minimum opacity of a point
+    taken_out: tuple[str, ...] = ()  # spectral components to leave out
+    voxel: float | None = None  # side of a voxel for a mesh, scene units
+
+
+ALL_TIMES, GAUSSIANS = Times(), Content()
+AXES = "axes: x right, y down, z forward in the camera of the first frame"
+
+
+def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> None:
+    """Raises InputError for a folder name with a file extension.
+
+    of        content of the folder, for the message
+    film      advice for the extension of a film
+    written   advice for other extensions
+    """
+    ending = out.suffix.lower()
+    if ENDING.fullmatch(ending) and not out.is_dir():
+        advice = film if film and ending in FILM_ENDINGS else written or "allowed: a name without an ending"
+        raise InputError(f"{out}: --out is a folder of {of}, but this is the name of a {ending} file; {advice}")
+
+
+def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Content = GAUSSIANS) -> str:
+    """Write a scene to `out`; returns one line on the written file. The extension of `out` selects the format:
+
+    .npz    slim model; times or content cannot be chosen
+    .glb    animated points; default: at all frames
+    .ply    one time; default: the first frame of the sequence
+    none    a folder with one ply file per time; default: all frames
+    Raises: InputError for another extension, for invalid times or content, and for a path that cannot be written.
+    """
+    if not 0.0 <= content.least_opacity <= 1.0:
+        raise InputError(f"export: --opacity {content.least_opacity:g} is not allowed; allowed: 0 to 1")
+    if content.voxel is not None and content.kind != "mesh":
+        raise InputError("export: --voxel applies to a mesh only; allowed: with --content mesh")
+    ending = out.suffix.lower()
+    if ending == ".npz":
+        return _slim(scene, out, times, content)
+    if ending == ".glb":
+        return _animated(scene, out, times, content)
+    if ending == ".ply":
+        return _one_time(scene, out, times, content)
+    check_folder_name(out, "ply files", written=WRITTEN)
+    return _every_time(scene, out, times, content)
+
+
+def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    if times.chosen or content != GAUSSIANS:
+        raise InputError(
+            f"{out}: a slim model stores all times and the whole scene; allowed: --out alone, or a .ply file"
+        )
+    if scene.one_time:
+        raise InputError(f"{out}: a slim model cannot be made from a .ply file of one time; allowed: a run folder")
+    refuse_unwritable(out)
+    model = scene.model
+    save_slim_model(out, model, scene.record)
+    size = out.stat().st_size
+    whole = scene.folder.checkpoint.stat().st_size if scene.folder else None
+    compared = f", {size / whole:.1%} of the checkpoint" if whole else ""
+    return f"{out}: {model.gaussians.count} Gaussians, {size / 1e6:.2f} MB{compared}"
+
+
+def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    if content.kind == "mesh":
+        raise InputError(f"{out}: a .glb stores points; the triangles of a mesh change over time; allowed: a folder")
+    wanted = [time for time, _, _, _ in chosen_times("export", times, scene.record, default="all")]
+    refuse_unwritable(out)
+    count = write_animated_points(out, scene, wanted, content.least_opacity, content.taken_out)
+    return f"{out}: {count} points at {len(wanted)} times, {out.stat().st_size / 1e6:.2f} MB"
+
+
+def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    wanted = chosen_times("export", times if times.chosen else Times(frames="all"), scene.record)
+    if times.chosen and len(wanted) > 1:
+        raise InputError(f"{out}: a .ply file stores one time, not {len(wanted)}; allowed: a folder, one time")
+    refuse_unwritable(out)
+    count = _write(scene, out, wanted[0][0], content)
+    name = "triangles" if content.kind == "mesh" else content.kind
+    return f"{out}: {count} {name} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
+
+
+def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    wanted = chosen_times("export", times, scene.record, default="all")
+    refuse_existing(out)
+    scene.model  # raises for a run without a usable checkpoint, before any file is created  # noqa: B018
+    out.absolute().parent.mkdir(parents=True, exist_ok=True)
+    with replacing_folder(out) as target:
+        for k, (time, _, _, _) in enumerate(wanted):
+            _write(scene, target / f"{k:05d}.ply", time, content)
+    return f"{out}: {len(wanted)} files of {content.kind}, 00000.ply to {len(wanted) - 1:05d}.ply"
+
+
+def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
+    """Write one ply file; returns the number of Gaussians, points or triangles."""
+    unit = scene.record.unit
+    comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}", AXES)
+    placement = scene.placement
+    if content.kind == "mesh":
+        found = surface(scene, time, content.voxel, content.taken_out)
+        vertices = placed_points(found.vertices.T, placement).T
+        write_ply(file, mesh_vertices(vertices, found.colours), comments, found.faces)
+        return len(found.faces)
+    placed = placed_scene(scene.at(time, content.taken_out), placement)
+    vertices = point_vertices(placed, content.least_opacity) if content.kind == "points" else gaussian_vertices(placed)
+    write_ply(file, vertices, comments)
+    return vertices.size

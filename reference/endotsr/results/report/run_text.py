@@ -1,0 +1,84 @@
+"""The metrics of an evaluated run as text: facts, sentences, and the table for the terminal.
+
+In: the dictionary of metrics.json. Out: plain text.
+"""
+
+from endotsr.results.evaluation.evaluate import left_out
+from endotsr.results.evaluation.records import EvaluationRecord, MotionPart, PosePart, RunPart
+from endotsr.results.report.tables import duration, fixed, plain
+
+SHOWN = (("psnr_full", "PSNR full", 2), ("psnr_tissue", "PSNR tissue", 2), ("ssim_full", "SSIM full", 4))
+TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
+
+
+def iterations(run: RunPart) -> str:
+    """Iteration of the evaluated checkpoint: "6000", or "2000 of 6000, the run is not finished"."""
+    done, planned = run["iteration"], run["iterations_planned"]
+    return f"{done}" if done >= planned else f"{done} of {planned}, the run is not finished"
+
+
+def facts(run: RunPart) -> dict[str, str | int | float | None]:
+    """Label -> value for the facts listed in the report."""
+    about, machine = run["input"], run["machine"]
+    peak, memory = run["peak_memory_bytes"], machine.get("memory_bytes")
+    size = f"{about.get('width')}x{about.get('height')}"
+    return {
+        "Sequence": f"{about.get('source')}, {about.get('frames')} frames of {size}",
+        "Frames": f"{about.get('training_frames')} for training, {about.get('held_out_frames')} held out",
+        "Tissue": f"{about.get('tissue_fraction', 0.0):.1%} of the pixels",
+        "Iterations": iterations(run),
+        "Gaussians": run["gaussians"],
+        "Laplacian weight": run["lambda_lap"],
+        "Seed": run["seed"],
+        "Threads": run["threads"],
+        "Training time": duration(run["seconds"] or 0.0),
+        "Peak memory": f"{peak / 1e9:.2f} GB" if peak else "unknown",
+        "Machine": f"{machine.get('processor')}, {machine.get('cores')} cores, "
+        + (f"{memory / 1e9:.0f} GB" if memory else "memory unknown"),
+        "System": machine.get("system"),
+    }
+
+
+def held_out_table(metrics: EvaluationRecord) -> str:
+    """The held-out means of model and baselines as text.
+
+    metrics   of a run, or from `evaluation.pictures.measure_pictures` (with `label`)
+    """
+    rows = [(metrics.get("label", "this model"), metrics["held_out"]["mean"])]
+    rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
+    rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
+    columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
+    head = [f"{len(metrics['held_out']['per_frame'])} held-out frames", *(label for _, label, _ in columns)]
+    cells = [[label, *(fixed(mean.get(key), digits) for key, _, digits in columns)] for label, mean in rows]
+    lines = [plain(head, cells)]
+    inside = metrics["training"]["mean"].get("psnr_tissue")
+    run: RunPart | None = metrics.get("run")
+    if run is not None or inside is not None:
+        lines.append(f"training frames: PSNR tissue {fixed(inside, 2)} dB")
+    if motion := metrics.get("trajectories"):
+        lines.append(trajectory_sentence(motion))
+    if change := metrics.get("pose_correction"):
+        lines.append(pose_sentence(change))
+    if frames := left_out(metrics):
+        lines.append(f"excluded from the tissue means (no finite value): {', '.join(frames)}")
+    if run is not None and run["iteration"] < run["iterations_planned"]:
+        lines.append(f"checkpoint of iteration {iterations(run)}")
+    if metrics["lpips_reason"]:
+        lines.append(f"LPIPS: {metrics['lpips_reason']} (--lpips FILE)")
+    return "\n".join(lines)
+
+
+def trajectory_sentence(motion: MotionPart) -> str:
+    """The mean trajectory error, compared with the mean motion."""
+    return (
+        f"Mean trajectory error {motion['scene_units']:.3f} {motion['unit']} ({motion['pixels']:.2f} px); mean tissue "
+        f"motion {motion['motion_scene_units']:.3f} {motion['unit']} ({motion['motion_pixels']:.2f} px)."
+    )
+
+
+def pose_sentence(change: PosePart) -> str:
+    """The mean pose correction."""
+    return (
+        f"Mean pose correction {change['degrees']:.2f} degrees and {change['scene_units']:.2f} {change['unit']}; it "
+        f"moves the picture by {change['pixels']:.2f} px."
+    )

@@ -1,0 +1,316 @@
+"""The report of a run as one self-contained HTML page: metrics, baselines, pictures, curves, settings.
+
+The functions follow the order of the sections; each returns "" if its data is missing. The page embeds all pictures and
+needs no script and no other file. It follows the reader's light or dark colour scheme and is readable on a phone. It
+links to the viewer page, if there is one.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from endotsr.results.evaluation.evaluate import left_out
+from endotsr.results.evaluation.records import Means
+from endotsr.results.report import curves, figures, parts
+from endotsr.results.report.data import COLUMNS, DECIDING, FramePictures, ReportData
+from endotsr.results.report.run_text import SHOWN, facts, pose_sentence, trajectory_sentence
+from endotsr.results.report.tables import duration, html_table
+
+Column = tuple[str, str, int, int]  # of COLUMNS
+MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
+OPENED_FRAMES = 3  # the worst frames are unfolded
+
+
+def _mean(data: ReportData, key: str) -> Means:
+    return (data.evaluation.get(key) or {}).get("mean") or {}
+
+
+def _baseline_rows(data: ReportData) -> list[tuple[str, Means]]:
+    baselines = data.evaluation.get("baselines") or {}
+    return [(row.get("label", name), row.get("mean") or {}) for name, row in baselines.items()]
+
+
+def headline(data: ReportData) -> str:
+    """Title, a sentence comparing the model with the baselines, the headline numbers."""
+    mean = _mean(data, "held_out")
+    count = len((data.evaluation.get("held_out") or {}).get("per_frame") or [])
+    cards = [
+        (mean.get("psnr_full"), 2, "dB", "held-out PSNR, full image"),
+        (mean.get("psnr_tissue"), 2, "dB", "held-out PSNR, tissue"),
+        (mean.get("ssim_full"), 4, "", "SSIM, full image"),
+        (mean.get("lpips"), 4, "", "LPIPS (AlexNet)"),
+    ]
+    boxes = [parts.card(parts.number(value, digits), unit, label) for value, digits, unit, label in cards if mean]
+    reached, gaussians = curves.series(data.log, "gaussians")
+    seconds = curves.series(data.log, "seconds")[1]
+    if gaussians.size:
+        boxes.append(parts.card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
+    if run := data.evaluation.get("run"):
+        boxes.append(parts.card(duration(run["seconds"] or 0.0), "", "training time"))
+    elif seconds.size:
+        boxes.append(parts.card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
+    frames = f"{count} held-out frame{'s' if count != 1 else ''}" if count else "report"
+    return (
+        f'<header><p class="eyebrow">Endo-TSR · {frames}</p><h1>{parts.text(data.title)}</h1>{_verdict(data)}'
+        f'<div class="cards">{"".join(boxes)}</div></header>'
+    )
+
+
+ABOUT_BASELINES = (
+    "A baseline interpolates the neighbouring pictures. It provides no geometry, no other viewpoint, no depth and no"
+    " tissue behind the instrument, but can predict the pixels of a single missing frame better."
+)
+
+
+def _verdict(data: ReportData) -> str:
+    """The tissue PSNR of the model compared with the best baseline, as a paragraph."""
+    ours = _mean(data, "held_out").get("psnr_tissue")
+    means = _baseline_rows(data)
+    rows = [(label, value) for label, mean in means if (value := mean.get("psnr_tissue")) is not None]
+    if ours is None or not rows or len(rows) < len(means):
+        return ""  # a baseline without a finite PSNR may be exact
+    label, best = max(rows, key=lambda row: row[1])
+    kind, word = ("good", "above") if ours >= best else ("bad", "below")
+    beaten = sum(ours >= value for _, value in rows)
+    return (
+        f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the best '
+        f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB). "
+        f"It is above {beaten} of {len(rows)} baselines. {ABOUT_BASELINES}</p>"
+    )
+
+
+def moving(data: ReportData) -> str:
+    """The animation of the scene, and the link to the viewer."""
+    blocks = []
+    if data.preview:
+        preview = data.preview
+        picture = parts.moving_image(preview.moving, preview.still, preview.words, preview.width, preview.height)
+        blocks.append(f'<figure class="preview">{picture}<figcaption>{parts.text(preview.words)}</figcaption></figure>')
+    if data.viewer:
+        link = f'<a href="{parts.text(data.viewer)}">Open the viewer</a>'
+        blocks.append(f"<p>{link} to play and rotate the scene, and to show its depth and error.</p>")
+    return parts.section("The scene", *blocks)
+
+
+def held_out(data: ReportData) -> str:
+    """The table of held-out metrics of model and baselines; 8-bit values are folded."""
+    rows: list[MetricsRow] = []
+    if mean := _mean(data, "held_out"):
+        rows.append(("This model", mean, "model"))
+    if faded := data.evaluation.get("cross_fade"):
+        rows.append((faded["label"], faded["mean"], ""))
+    rows += [(label, mean, "") for label, mean in _baseline_rows(data)]
+    columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
+    if not columns:
+        return ""
+    note = "Means over the held-out frames. Baselines use training frames only. The best value per column is coloured."
+    table = _held_out_table(rows, [c for c in columns if c in DECIDING] or columns)
+    title = "Held-out frames, compared with baselines without a model"
+    return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
+
+
+def _held_out_table(rows: list[MetricsRow], columns: list[Column]) -> str:
+    best = {key: _best(rows, key, sign) for key, _, _, sign in columns}
+    cells = [
+        [
+            parts.text(label),
+            *(_metric(row.get(key), n, best[key]) for key, _, n, _ in columns),
+        ]
+        for label, row, _ in rows
+    ]
+    return html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
+
+
+def _eight_bit(rows: list[MetricsRow], columns: list[Column]) -> str:
+    """The folded table for pictures rounded to 8 bits; the values differ from the others in the second decimal."""
+    rounded = [c for c in columns if c not in DECIDING]
+    if not rounded or len(rounded) == len(columns):
+        return ""
+    measured = [row for row in rows if any(row[1].get(c[0]) is not None for c in rounded)]
+    summary = "With renders rounded to 8 bits<small>as measured from PNG files</small>"
+    return parts.details(summary, _held_out_table(measured, rounded))
+
+
+def _best(rows: list[MetricsRow], key: str, sign: int) -> float | None:
+    values = [row[key] for _, row, _ in rows if row.get(key) is not None]
+    return max(values, key=lambda v: sign * v) if len(values) > 1 else None
+
+
+def _metric(value: Any, digits: int, best: float | None) -> str:
+    shown = parts.number(value, digits)
+    return f'<span class="best">{shown}</span>' if value is not None and value == best else shown
+
+
+def _absent_reasons(data: ReportData) -> str:
+    reasons = []
+    if reason := data.evaluation.get("lpips_reason"):
+        reasons.append(f"LPIPS: {reason}")
+    if frames := left_out(data.evaluation):
+        reasons.append(f"excluded from the tissue means (no finite value): {', '.join(frames)}")
+    if count := data.evaluation.get("not_finite"):
+        reasons.append(f"{count} value(s) were not finite and are shown as a dash")
+    return f'<p class="note">{parts.text("; ".join(reasons))}.</p>' if reasons else ""
+
+
+def temporal_gap(data: ReportData) -> str:
+    """Means over training and held-out frames, and a chart of the held-out frames."""
+    held_out, training = _mean(data, "held_out"), _mean(data, "training")
+    table = ""
+    if held_out and training:
+        rows = []
+        for key, label, digits, _ in DECIDING:
+            inside, outside = training.get(key), held_out.get(key)
+            if inside is None or outside is None:
+                continue
+            values = (inside, outside, inside - outside)
+            rows.append([parts.text(label), *(parts.number(value, digits) for value in values)])
+        table = html_table(["Mean over frames", "Training", "Held-out", "Gap"], rows)
+    chart = curves.frame_chart(data.evaluation, "psnr_tissue")
+    pair = f'<div class="charts">{table}{curves.chart_figure(chart)}</div>' if chart else table
+    note = (
+        "The temporal gap is the difference between training and held-out frames. A large gap means that interpolation "
+        "in time, not capacity, limits the model."
+    )
+    return parts.section("Temporal gap", pair, _motion(data), note=note)
+
+
+def _motion(data: ReportData) -> str:
+    """Sentences on the motion, compared with the cross-fade and with the truth, and on the pose correction."""
+    sentences = []
+    faded = ((data.evaluation.get("cross_fade") or {}).get("mean") or {}).get("psnr_tissue")
+    ours = _mean(data, "held_out").get("psnr_tissue")
+    if faded is not None and ours is not None:
+        word, what = ("above", "adds") if ours > faded else ("below", "adds no")
+        sentences.append(
+            f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "
+            f"two neighbouring training times: its motion {what} information between the training frames."
+        )
+    if motion := data.evaluation.get("trajectories"):
+        sentences.append(trajectory_sentence(motion))
+    if change := data.evaluation.get("pose_correction"):
+        sentences.append(pose_sentence(change))
+    return "".join(f"<p>{parts.text(sentence)}</p>" for sentence in sentences)
+
+
+def training(data: ReportData) -> str:
+    """The curves of the log."""
+    found = curves.charts(data.log, data.evaluation)
+    return parts.section(
+        "Training", f'<div class="charts">{"".join(map(curves.chart_figure, found))}</div>' if found else ""
+    )
+
+
+def pictures(data: ReportData) -> str:
+    """Render, truth, error and depth of the given held-out frames, worst first."""
+    if not data.frames:
+        return ""
+    errors = [figures.tissue_error(f.render, f.truth, f.mask) for f in data.frames]
+    scale = figures.error_scale(errors)
+    order = sorted(range(len(errors)), key=lambda i: (-_squared(data.frames[i]), data.frames[i].index))
+    depths = [f for f in data.frames if f.depth is not None]
+    span = _depth_span(depths)
+    legend = [f"Error {parts.colour_bar(figures.ERROR_MAP, '0', f'{scale:g} or more')}"]
+    if depths:
+        bar = parts.colour_bar(figures.DEPTH_MAP, f"{span[0]:.4g}", f"{span[1]:.4g} {data.depth_unit}")
+        legend.append(f"Rendered depth {bar}")
+    note = (
+        "Worst first. Error: absolute difference, averaged over the colour channels, in display units from 0 to 1, "
+        "with the same scale for all frames. Grey: excluded or without depth. The white border marks the window with "
+        "the largest tissue error, enlarged 4×."
+    )
+    frames = len(data.evaluation.get("held_out", {}).get("per_frame", ()))
+    if frames > len(data.frames):
+        note = f"The {len(data.frames)} worst of {frames} frames; see renders/ for all of them. {note}"
+    blocks = [_frame(data.frames[i], scale, span, position < OPENED_FRAMES) for position, i in enumerate(order)]
+    return parts.section(
+        "Pictures of the held-out frames", f'<div class="legend">{"".join(legend)}</div>', *blocks, note=note
+    )
+
+
+def _squared(frame: FramePictures) -> float:
+    """Mean squared tissue error, for the order of the frames; infinite for a render that is not finite."""
+    error = np.where(frame.mask, np.clip(frame.render, 0, 1) - frame.truth, 0.0)
+    value = float(np.square(error, dtype=np.float64).sum() / max(3 * frame.mask.sum(), 1))
+    return value if np.isfinite(value) else np.inf
+
+
+def _depth_span(frames: list[FramePictures]) -> tuple[float, float]:
+    spans = [figures.depth_range(f.depth, f.mask) for f in frames if f.depth is not None]
+    return (min(s[0] for s in spans), max(s[1] for s in spans)) if spans else (0.0, 1.0)
+
+
+def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened: bool) -> str:
+    panels = figures.triptych(frame.render, frame.truth, frame.mask, scale)
+    views = [("Render", panels.render), ("Truth", panels.truth), ("Error", panels.error)]
+    if frame.depth is not None:
+        views.append(("Depth", figures.depth_picture(frame.depth, *span, mask=frame.mask)))
+    cells = []
+    for label, picture in views:
+        name = f"{label}, frame {frame.index}"
+        whole = parts.image(figures.framed(picture, panels), name)
+        inset = parts.image(panels.window(picture), f"{name}, enlarged", "inset")
+        cells.append(f"<div>{whole}<span>{label}</span></div><div>{inset}<span>4×</span></div>")
+    shown = [f"t = {frame.time:.3f}"]
+    for key, before, digits, after in (("psnr_tissue", "tissue", 2, " dB"), ("ssim_tissue", "SSIM", 4, "")):
+        if (value := (frame.metrics or {}).get(key)) is not None:
+            shown.append(f"{before} {parts.number(value, digits)}{after}")
+    facts = " · ".join([*shown, parts.text(frame.name)])
+    summary = f"Frame {frame.index}<small>{facts}</small>"
+    return parts.details(summary, f'<div class="views">{"".join(cells)}</div>', opened)
+
+
+def components(data: ReportData) -> str:
+    """Held-out means of the model, rendered without one component at a time."""
+    found, rows = data.evaluation.get("components", []), []
+    for row in found:
+        ours, whole = row.get("psnr_tissue"), found[0].get("psnr_tissue")
+        gain = None if ours is None or whole is None or row is found[0] else ours - whole
+        change = "" if gain is None else f"{gain:+.2f} dB"
+        rows.append([parts.text(row["label"]), *(parts.number(row.get(key), n) for key, _, n in SHOWN), change])
+    note = (
+        "Held-out means of the trained model, rendered with the named residual set to zero. Component L, the Laplacian "
+        "loss, affects training only; to measure it, train with --model.no-laplacian."
+    )
+    table = html_table(["Rendered", *(label for _, label, _ in SHOWN), "Change, PSNR tissue"], rows) if rows else ""
+    return parts.section("Contribution of each component", table, note=note)
+
+
+def the_run(data: ReportData) -> str:
+    """Facts, configuration, versions and input hashes."""
+    run, blocks = data.evaluation.get("run"), []
+    about = run["input"] if run else {}
+    if run:
+        pairs = facts(run) | {"Versions": ", ".join(f"{k} {v}" for k, v in run["versions"].items())}
+        listed = parts.definitions((parts.text(k), parts.cell(v)) for k, v in pairs.items())
+        blocks.append(f'<div class="panel">{listed}</div>')
+    if notes := about.get("notes"):
+        lines = "".join(f"<li>{parts.text(note)}</li>" for note in notes)
+        blocks.append(parts.details("Assumptions and findings of the reader", f"<ul>{lines}</ul>"))
+    if data.configuration:
+        content = f'<div class="panel"><pre>{parts.text(data.configuration)}</pre></div>'
+        blocks.append(parts.details("Configuration (TOML)", content))
+    if hashes := about.get("files_sha256") or about.get("arrays_sha256"):
+        rows = [[parts.text(k), f"<code>{parts.text(v)}</code>"] for k, v in hashes.items()]
+        summary = f"Input files<small>{len(rows)}, SHA-256</small>"
+        blocks.append(parts.details(summary, html_table(["File", "SHA-256"], rows)))
+    return parts.section("The run", *blocks)
+
+
+def footer(data: ReportData) -> str:
+    """Definitions of the metrics."""
+    return (
+        "<footer><p>PSNR and SSIM are computed per frame and averaged over frames. <em>Full</em>: all pixels, excluded "
+        "ones set to zero in render and truth. <em>Tissue</em>: tissue pixels only. <em>8-bit</em>: render rounded to "
+        "256 levels first. LPIPS: AlexNet, version 0.1, excluded pixels zero, values scaled to the given "
+        "interval.</p></footer>"
+    )
+
+
+SECTIONS = (headline, moving, held_out, temporal_gap, pictures, training, components, the_run, footer)
+
+
+def report_html(data: ReportData) -> str:
+    """The page as text."""
+    body = [make(data) for make in SECTIONS]
+    return parts.page(data.title, "\n".join(part for part in body if part))

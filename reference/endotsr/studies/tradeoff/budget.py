@@ -1,0 +1,114 @@
+"""`--budget`: a limit on time or error, and the best measured setting within it.
+
+Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), or an error (`1/255`, `0.5/255`, `1e-3`, in display units).
+"""
+
+import math
+import re
+from typing import Any, Literal, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.studies.tradeoff.text import levels, milliseconds
+
+Kind = Literal["frame", "error"]
+
+NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+)"
+FORMS = 'a time per frame ("10 ms", "0.1 s", "30 fps") or an error ("1/255", "1e-3")'
+FACTORS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
+
+
+class Budget(NamedTuple):
+    """A limit: seconds per frame, or largest error in display units."""
+
+    kind: Kind
+    amount: float
+    text: str
+
+
+class Advice(NamedTuple):
+    """A measured setting within a budget."""
+
+    point: dict[str, Any]
+    lines: list[str]
+
+
+def parse_budget(text: str) -> Budget:
+    """Parse a budget. Raises InputError naming the allowed forms."""
+    plain = " ".join(text.lower().split())
+    found = None
+    if fraction := re.fullmatch(rf"{NUMBER} ?/ ?{NUMBER}", plain):
+        found = Budget("error", _quotient(*map(float, fraction.groups())), text)
+    elif quantity := re.fullmatch(rf"{NUMBER} ?(us|ms|s|fps)?", plain):
+        amount, unit = float(quantity[1]), quantity[2]
+        if unit is None:
+            found = Budget("error", amount, text)
+        elif unit == "fps":
+            found = Budget("frame", _quotient(1.0, amount), text)
+        else:
+            found = Budget("frame", amount * FACTORS[unit], text)
+    if found is None or not 0 < found.amount < math.inf:
+        raise InputError(f"--budget {text!r} is not understood; allowed: {FORMS}, each finite and > 0")
+    return found
+
+
+def _quotient(numerator: float, denominator: float) -> float:
+    """The quotient; infinity, which `parse_budget` refuses, for a denominator of 0."""
+    return numerator / denominator if denominator else math.inf
+
+
+def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
+    """The best setting within the budget, on the Pareto front of error against forward time.
+
+    For a time budget: the most accurate setting with its upper quartile within the budget. For an error budget: the
+    fastest setting with its largest error within the budget. Raises InputError with the reason if there is none.
+    """
+    by_name = {p["name"]: p for p in result["points"]}
+    front = [by_name[name] for name in result["fronts"]["forward"]]
+    about = result["scene"]
+    where = f"{about['gaussians']} Gaussians at {about['width']}x{about['height']} ({about['name']})"
+    if budget.kind == "frame":
+        kept = [p for p in front if p["forward"]["high"] <= budget.amount]
+        if not kept:
+            least = min(front, key=lambda p: p["forward"]["high"])
+            raise InputError(
+                f"--budget {budget.text}: no measured setting renders {where} that fast; the fastest is "
+                f"{least['name']} with {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels are faster"
+            )
+        chosen = min(kept, key=lambda p: p["error"]["max"])
+    else:
+        kept = [p for p in front if p["error"]["max"] <= budget.amount]
+        if not kept:
+            best = min(front, key=lambda p: p["error"]["max"])
+            raise InputError(
+                f"--budget {budget.text}: no measured setting reaches this error on {where}; the most accurate is "
+                f"{best['name']} with a largest error of {best['error']['max']:.2g}"
+            )
+        chosen = min(kept, key=lambda p: p["forward"]["median"])
+    return Advice(chosen, [f"{budget.text}: {chosen['name']}", *_expectation(chosen), f"measured on {where}"])
+
+
+def _expectation(point: dict[str, Any]) -> list[str]:
+    error = point["error"]
+    return [
+        f"expected error: largest {levels(error['max'])}, RMS {levels(error['rms'])}, "
+        f"worst gradient block {error['gradient']:.2g} (relative)",
+        f"expected time: {milliseconds(point['forward']['median'])} per frame, "
+        f"{milliseconds(point['both']['median'])} with the reverse pass",
+        f"as settings: {settings_words(point['setting'])}",
+    ]
+
+
+def settings_words(setting: dict[str, Any]) -> str:
+    """The options of `endotsr train` for a setting."""
+    raster = setting["raster"]
+    words = [
+        f"--raster.alpha-cutoff {raster['alpha_cutoff']:.4g}",
+        f"--raster.transmittance-stop {raster['transmittance_stop']:.4g}",
+        f"--raster.alpha-max {raster['alpha_max']:.7g}",
+        f"--training.precision {setting['precision']}",
+    ]
+    if raster["support"] == "everywhere":
+        return f"--raster.preset exact --training.precision {setting['precision']}"
+    if setting["scale"] != 1:
+        words.append(f"--scale {setting['scale']:g}")
+    return " ".join(words)

@@ -1,0 +1,283 @@
+"""The training: one view per iteration, on the published schedule (specification, equation 6 and B10-B12).
+
+`training_step` computes `view_gradients` (`training/fitting/view.py`) with the same functions. Only the reverse passes
+of the time bases and of the Fourier coefficients are replaced by `optimise`, which fuses them with their Adam step. No
+result depends on the number of threads.
+"""
+
+import math
+from collections.abc import Callable
+from typing import cast
+
+import msgspec
+import numpy as np
+
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.config import Config
+from endotsr.method.equations.matern import matern_penalty_forward
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.kernels.threads import parallel_calls
+from endotsr.method.kernels.timer import NO_TIMER, Timer, timed
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import RenderGrads, RenderOut, render_forward, render_reverse
+from endotsr.training.fitting.adam import adam_update, add_array, regather
+from endotsr.training.fitting.coarse_start import coarse_ends, coarse_start
+from endotsr.training.fitting.divergence import Diverged, DivergenceWatch, not_finite
+from endotsr.training.fitting.fused.step import optimise
+from endotsr.training.fitting.model import (
+    SceneGrads,
+    SceneSaved,
+    raster_settings,
+    scene_at,
+    scene_reverse,
+    with_exposure,
+    with_exposure_reverse,
+    with_pose_correction,
+    with_pose_correction_reverse,
+)
+from endotsr.training.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, image_loss
+from endotsr.training.fitting.records import LogEntry, RngState
+from endotsr.training.fitting.sampling import View, drawn_view
+from endotsr.training.fitting.schedules import (
+    active_degree,
+    densifications_left,
+    densify_now,
+    laplacian_ramp,
+    learning_rates,
+    residuals_activate,
+    smoothness_active,
+    statistics_active,
+)
+from endotsr.training.fitting.state import (
+    TrainingConstants,
+    TrainingState,
+    check_state,
+    new_training,
+    training_constants,
+)
+from endotsr.training.scene.density_control import densify, gather_statistics
+from endotsr.training.scene.gaussians import Gaussians, arrays
+from endotsr.training.scene.initialisation import activate_residuals
+from endotsr.training.scene.parameters import (
+    Exposure,
+    Pose,
+    exposure_gradients,
+    exposure_of,
+    pose_at,
+    pose_gradients,
+    trained,
+)
+
+OnIteration = Callable[[LogEntry], None]
+
+WATCHED_GRADIENTS = ("d_position", "d_log_scale", "d_quaternion", "d_opacity_logit")
+PSNR_EVERY = 10  # iterations between two training PSNRs in the log; each costs a pass over the image
+
+
+def train(
+    state: TrainingState,
+    sequence: Sequence,
+    config: Config,
+    on_iteration: OnIteration,
+    on_checkpoint: Callable[[TrainingState], None],
+    *,
+    on_message: Callable[[str], object] = print,
+) -> TrainingState:
+    """Run to `config.training.iterations`; the state is updated in place and returned.
+
+    With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
+    This pre-training is not checkpointed: after an interruption it restarts and gives the same weight.
+    Raises: Diverged (a FloatingPointError) with iteration, frame and term if a loss or a gradient is not finite; the
+            state is then unchanged since the previous iteration, except for the density statistics. ValueError with
+            array and index if the state has a non-finite number.
+    """
+    check_state(state)
+    watch = DivergenceWatch(state.gaussians)
+    if state.lambda_lap is None and config.model.laplacian:
+        on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
+        state.lambda_lap = calibrated_weight(sequence, config)
+        on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
+    coarse = coarse_start(sequence, config) if state.coarse else None
+    if coarse:
+        on_message("coarse start: half-size frames until the fit error is below the detail that they lack")
+    constants = coarse.constants if coarse else training_constants(sequence, config)
+    while state.iteration < config.training.iterations:
+        if coarse and coarse_ends(state, coarse):
+            coarse, state.coarse, constants = None, False, training_constants(sequence, config)
+            on_message(f"coarse start: full-size frames after iteration {state.iteration}")
+        entry = training_step(state, constants)
+        on_iteration(entry)
+        if advice := watch.see(entry, state.gaussians):
+            on_message(advice)
+        if state.iteration % config.training.checkpoint_every == 0:
+            on_checkpoint(state)
+    return state
+
+
+def calibrated_weight(sequence: Sequence, config: Config) -> float:
+    """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate."""
+    model = msgspec.structs.replace(config.model, appearance=False, spectral_motion=False, laplacian=False)
+    loss = msgspec.structs.replace(config.loss, lambda_lap=0.0)
+    base = msgspec.structs.replace(config, model=model, loss=loss)
+    constants, state = training_constants(sequence, base), new_training(sequence, base)
+    while state.iteration < config.training.residual_activation:
+        training_step(state, constants)
+    return calibrate_on(state.gaussians, constants.spectral, sequence, base, state.frames).lambda_lap
+
+
+def training_step(state: TrainingState, constants: TrainingConstants, timer: Timer = NO_TIMER) -> LogEntry:
+    """One iteration; returns its log entry."""
+    config, iteration = constants.config, state.iteration + 1
+    if residuals_activate(iteration, config):
+        _activate_residuals(state, config)
+    state.drawn = state.drawn or drawn_view(state.rng, constants.sequence, config.training)
+    view, rng_state = state.drawn
+    targets, camera = constants.observed(view)
+    scene, scene_saved = scene_at(state.gaussians, constants.spectral, config.model, view.t, state.ahead, timer)
+    degree = active_degree(iteration, config)
+    camera, pose_saved = with_pose_correction(camera, pose_at(state.frames, view.t))
+    rendered, render_saved = render_forward(scene, camera, raster_settings(config), degree=degree, timer=timer)
+    rendered, exposure_saved = with_exposure(rendered, exposure_of(state.frames, constants.column(view)))
+    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
+    d_colour, d_exposure = with_exposure_reverse(loss.d_colour, exposure_saved)
+    moving = pose_saved is not None
+    d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, pose_gradient=moving, timer=timer)
+    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
+    watched = statistics_active(iteration, config)
+    back, penalty, _ = parallel_calls(
+        lambda: scene_reverse(d_scene, scene_saved, coefficients=False),
+        timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, constants)),
+        timed(timer, "density control", lambda: _watch_density(state, d_scene, camera, watched)),
+    )
+    _refuse_not_finite(iteration, view, loss, penalty, d_scene, rng_state)
+    entry = _log_entry(iteration, view, loss, penalty, rendered, targets, state, config)
+    dense, state.ahead = densify_now(iteration, config), None
+    state.drawn = None
+    if not (dense and config.optimiser.legacy_skip):
+        _optimise(state, constants, scene_saved, d_scene, back, iteration, timer)
+        _optimise_frames(state, constants, view, d_exposure, d_pose, iteration)
+    if dense:
+        with timer.stage("density control"):
+            _control_density(state, constants, iteration)
+    state.iteration = iteration
+    return entry
+
+
+def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:
+    """The weights of the image terms at this iteration."""
+    smoothness = config.loss.smoothness_weight if smoothness_active(iteration, config) else 0.0
+    laplacian = laplacian_ramp(iteration, config) * (state.lambda_lap or 0.0)
+    return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, laplacian)
+
+
+def _activate_residuals(state: TrainingState, config: Config) -> None:
+    """Activate the spectral residuals with zero coefficients, zero moments and step 0."""
+    model = config.model
+    state.gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
+    for name in ("appearance_coefficients", "motion_coefficients"):
+        array = getattr(state.gaussians, name)
+        if array is not None and name not in state.adam.first:  # tracked motion has moments from the start
+            add_array(state.adam, name, array)
+
+
+def _matern_penalty(gaussians: Gaussians, constants: TrainingConstants) -> float | None:
+    """L_msp; None without component S. Its gradient is added in `optimise`."""
+    coefficients = gaussians.motion_coefficients
+    return None if coefficients is None else matern_penalty_forward(coefficients, constants.spectral.rho)[0]
+
+
+def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, active: bool) -> None:
+    """Add this view to the density statistics."""
+    if active:
+        gather_statistics(state.statistics, d_scene.d_mean2d, d_scene.visible, camera.width, camera.height)
+
+
+def _optimise(
+    state: TrainingState,
+    constants: TrainingConstants,
+    saved: SceneSaved,
+    d_scene: RenderGrads,
+    back: SceneGrads,
+    iteration: int,
+    timer: Timer,
+) -> None:
+    """One Adam step of the Gaussians; also draws the next view and computes the offsets at its time.
+
+    No view is drawn before density control, which must draw its random numbers first, or after the last iteration.
+    """
+    config, later = constants.config, None
+    if iteration < config.training.iterations and not densify_now(iteration, config):
+        state.drawn = drawn_view(state.rng, constants.sequence, config.training)
+        later = state.drawn.view.t
+    rates = learning_rates(iteration, config)
+    gaussians, adam, spectral = state.gaussians, state.adam, constants.spectral
+    state.ahead = optimise(gaussians, adam, spectral, config, saved, d_scene, back, rates, later, timer)
+
+
+def _optimise_frames(
+    state: TrainingState,
+    constants: TrainingConstants,
+    view: View,
+    d_exposure: Exposure | None,
+    d_pose: Pose | None,
+    iteration: int,
+) -> None:
+    """One Adam step of the frame parameters: all columns, with gradient 0 for unseen frames."""
+    if state.frames is None:
+        return
+    gradients, o = {}, constants.config.optimiser
+    if d_exposure is not None:
+        gradients |= exposure_gradients(state.frames, constants.column(view), d_exposure)
+    if d_pose is not None:
+        gradients |= pose_gradients(state.frames, view.t, d_pose)
+    rates = constants.in_scene_units(learning_rates(iteration, constants.config))
+    adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
+
+
+def _control_density(state: TrainingState, constants: TrainingConstants, iteration: int) -> None:
+    """Clone, split and prune; gather the moments. Clones and children have zero moments; all statistics are zeroed."""
+    left = densifications_left(iteration, constants.config)
+    result = densify(state.gaussians, state.statistics, constants.config.density, state.rng, constants.extent, left)
+    regather(state.adam, arrays(result.gaussians), result.plan.source, result.plan.survivors)
+    state.gaussians, state.statistics = result.gaussians, result.statistics
+
+
+def _refuse_not_finite(
+    iteration: int, view: View, loss: ImageLoss, penalty: float | None, d_scene: RenderGrads, rng_state: RngState
+) -> None:
+    """Raise `Diverged` for the first non-finite loss term or gradient, before any parameter is updated."""
+    terms = {**loss.terms, "matern_penalty": penalty or 0.0, "loss": loss.loss}
+    broken = next(((name, str(float(v))) for name, v in terms.items() if not math.isfinite(v)), None)
+    broken = broken or not_finite({name: getattr(d_scene, name) for name in WATCHED_GRADIENTS})
+    if broken:
+        raise Diverged(iteration, view.index, *broken, rng_state)
+
+
+def _log_entry(
+    iteration: int,
+    view: View,
+    loss: ImageLoss,
+    penalty: float | None,
+    rendered: RenderOut,
+    targets: Targets,
+    state: TrainingState,
+    config: Config,
+) -> LogEntry:
+    """The log entry of an iteration."""
+    total = float(loss.loss) + config.loss.lambda_msp * (penalty or 0.0)
+    terms = {name: float(value) for name, value in loss.terms.items()}
+    entry = cast(LogEntry, {"iteration": iteration, "frame": view.index, "loss": total, **terms})
+    if penalty is not None:
+        entry["matern_penalty"] = penalty
+    if iteration % PSNR_EVERY == 0 or iteration == 1:
+        entry["psnr"] = tissue_psnr(rendered.colour, targets)
+    entry["gaussians"] = state.gaussians.count
+    return entry
+
+
+def tissue_psnr(colour: FloatArray, targets: Targets) -> float | None:
+    """PSNR over the tissue pixels of the clipped render, dB; None without tissue or for a perfect render."""
+    difference = np.clip(colour, 0, 1) - targets.image
+    square = np.einsum("chw,chw,hw->", difference, difference, targets.mask, dtype=np.float64)
+    count = 3 * int(np.count_nonzero(targets.mask))
+    return -10.0 * math.log10(square / count) if square > 0 and count > 0 else None

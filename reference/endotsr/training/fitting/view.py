@@ -1,0 +1,99 @@
+"""One training view, equation (6), composed only of documented pairs: the definition of one iteration.
+
+    Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
+                            camera --(B16)--^
+
+In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and the gradient of every array. The
+gradient check and the golden family `objective` call this function. Training computes the same with the same functions
+(`training_step`), but fuses the largest reverse passes with the Adam step that follows (`fused/`). One such step is
+bitwise equal to `view_gradients` followed by `adam_update` (tested).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Config
+from endotsr.method.equations.deformation import deformation_reverse
+from endotsr.method.equations.matern import matern_penalty_forward, matern_penalty_reverse
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import Compositor, RenderOut, RenderSaved, render_forward, render_reverse
+from endotsr.method.splatting.settings import RasterSettings
+from endotsr.training.fitting.model import (
+    Spectral,
+    raster_settings,
+    scene_at,
+    scene_reverse,
+    with_exposure,
+    with_exposure_reverse,
+    with_pose_correction,
+    with_pose_correction_reverse,
+)
+from endotsr.training.fitting.objective import LossWeights, Targets, image_loss
+from endotsr.training.scene.gaussians import Gaussians
+from endotsr.training.scene.parameters import Exposure, Pose
+
+
+class ViewGradients(NamedTuple):
+    """Equation (6) of one view and its derivatives."""
+
+    loss: float  # the Matern penalty included
+    terms: dict[str, float]  # unweighted; only those evaluated
+    gradients: dict[str, FloatArray]  # by field of `Gaussians`, for every array that exists
+    d_exposure: Exposure | None  # gradients with respect to the exposure of this frame
+    d_pose: Pose | None  # gradients with respect to the correction of its pose
+    rendered: RenderOut  # the images that were compared
+    render_saved: RenderSaved  # has the decisions of the render: order, contributors, clamps
+
+
+def view_gradients(
+    gaussians: Gaussians,
+    spectral: Spectral,
+    targets: Targets,
+    weights: LossWeights,
+    config: Config,
+    camera: Camera,
+    t: float,
+    edges: NDArray[np.bool_] | None = None,
+    *,
+    exposure: Exposure | None = None,
+    pose: Pose | None = None,
+    raster: RasterSettings | None = None,
+    degree: int | None = None,
+    compositor: Compositor = "auto",
+) -> ViewGradients:
+    """Loss and gradients of one view, equation (6), with all components that `gaussians` has.
+
+    targets   of the observed frame, see `frame_targets`;  weights   at this iteration
+    t         normalised time; any value is allowed, [0, 1] is the sequence
+    edges     (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth
+    exposure  of this frame, equation (B13); None = none
+    pose      correction of the pose of `camera`, equation (B16); None = none
+    raster    None = that of `config`;  degree   active harmonic degree, None = the model's
+
+    Edges:  a term of weight 0 is not evaluated; a component without arrays gets no gradient.
+    Oracle: central differences (`endotsr gradcheck objective`), golden family `objective`.
+    """
+    raster = raster_settings(config) if raster is None else raster
+    degree = config.model.harmonics_degree if degree is None else degree
+
+    scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
+    camera, pose_saved = with_pose_correction(camera, pose)
+    rendered, render_saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor)
+    rendered, exposure_saved = with_exposure(rendered, exposure)
+    loss, terms, d_colour, d_depth = image_loss(rendered, targets, weights, config.loss, edges)
+
+    d_colour, d_exposure = with_exposure_reverse(d_colour, exposure_saved)
+    d_scene = render_reverse(d_colour, d_depth, None, render_saved, pose_gradient=pose is not None)
+    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
+    gradients, d_offsets = scene_reverse(d_scene, scene_saved)
+    if scene_saved.deformation is not None and d_offsets is not None:
+        fdm = deformation_reverse(d_offsets, scene_saved.deformation)
+        gradients |= {"fdm_weight": fdm.d_fdm_weight, "fdm_centre": fdm.d_fdm_centre, "fdm_width": fdm.d_fdm_width}
+    if gaussians.motion_coefficients is not None:
+        penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
+        loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}
+        gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)
+    return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered, render_saved)

@@ -1,0 +1,141 @@
+"""Calibrations of other programs: one camera, pairs, the half pixel, and what is refused."""
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from public_layouts import K, stereo_yaml
+from raw_sources import ini
+
+from endotsr.clips.sequences.calibration_formats import FORMATS
+from endotsr.clips.sequences.calibrations import lens_or_rig
+from endotsr.errors import InputError
+
+SIZE = (128, 96)
+BENT = [-0.2, 0.05, 0.001, -0.002, 0.01]
+TURN = cv2.Rodrigues(np.array([0.01, -0.02, 0.005]))[0]
+SHIFT = np.array([-5.0, 0.1, -0.2])  # mm
+
+
+def ros(matrix, distortion=BENT, **changes):
+    """A camera_info as ROS writes it."""
+    stored = lambda values, rows: {"rows": rows, "cols": len(values) // rows, "data": [float(v) for v in values]}
+    return yaml.safe_dump({
+        "image_width": 128, "image_height": 96, "camera_name": "left", "camera_matrix": stored(np.ravel(matrix), 3),
+        "distortion_model": "plumb_bob", "distortion_coefficients": stored(distortion, 1),
+        "rectification_matrix": stored(np.eye(3).ravel(), 3),
+        "projection_matrix": stored(np.column_stack([matrix, np.zeros(3)]).ravel(), 3),
+    } | changes)  # fmt: skip
+
+
+def kalibr(pair=True, **changes):
+    """A camchain as Kalibr writes it."""
+    camera = {"camera_model": "pinhole", "intrinsics": [100.0, 101.0, 63.5, 47.5], "distortion_model": "radtan",
+              "distortion_coeffs": BENT[:4], "resolution": [128, 96], "rostopic": "/cam0"}  # fmt: skip
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = TURN, SHIFT / 1000
+    chain = {"cam0": camera | changes}
+    return yaml.safe_dump(chain | ({"cam1": camera | {"T_cn_cnm1": motion.tolist()}} if pair else {}))
+
+
+def check_lens(lens, distortion):
+    assert lens[:6] == (100.0, 101.0, 64.0, 48.0, *SIZE)  # half a pixel more than the file
+    np.testing.assert_allclose(lens.distortion, distortion)
+
+
+def test_one_camera_of_opencv(tmp_path):
+    stereo_yaml(tmp_path / "a.yaml", image_width=128, image_height=96, camera_matrix=K,
+                distortion_coefficients=np.array([BENT]))  # fmt: skip
+    lens, rig = lens_or_rig(tmp_path / "a.yaml", *SIZE)
+    assert rig is None
+    check_lens(lens, BENT)
+
+
+def test_pictures_of_half_the_size_scale_a_calibration_that_says_its_size(tmp_path):
+    stereo_yaml(tmp_path / "a.yaml", image_width=128, image_height=96, camera_matrix=K)
+    lens = lens_or_rig(tmp_path / "a.yaml", 64, 48)[0]
+    assert lens[:4] == (50.0, 50.5, 32.0, 24.0)
+    with pytest.raises(InputError, match="the calibration is of 128x96"):
+        lens_or_rig(tmp_path / "a.yaml", 64, 64)
+
+
+def test_a_pair_of_opencv(tmp_path):
+    bent = np.array([BENT])
+    stereo_yaml(tmp_path / "a.yaml", M1=K, D1=bent, M2=K, D2=bent, R=TURN, T=SHIFT.reshape(3, 1))
+    lens, rig = lens_or_rig(tmp_path / "a.yaml", *SIZE)
+    assert lens is None
+    check_lens(rig.left, BENT)
+    np.testing.assert_allclose(rig.rotation, TURN)
+    np.testing.assert_allclose(rig.translation, SHIFT)
+
+
+def test_one_camera_of_ros_and_of_kalibr(tmp_path):
+    (tmp_path / "ros.yaml").write_text(ros(K))
+    (tmp_path / "kalibr.yaml").write_text(kalibr(pair=False))
+    check_lens(lens_or_rig(tmp_path / "ros.yaml", *SIZE)[0], BENT)
+    check_lens(lens_or_rig(tmp_path / "kalibr.yaml", *SIZE)[0], BENT[:4])
+
+
+def test_a_pair_of_kalibr_is_in_metres(tmp_path):
+    (tmp_path / "a.yaml").write_text(kalibr())
+    rig = lens_or_rig(tmp_path / "a.yaml", *SIZE)[1]
+    np.testing.assert_allclose(rig.translation, SHIFT)
+    np.testing.assert_allclose(rig.rotation, TURN)
+
+
+def test_a_pair_of_ros_is_that_of_stereo_rectify(tmp_path):
+    """OpenCV rectifies a known pair; its matrices, written as ROS does, give the pair back."""
+    none = np.zeros(5)
+    left, right, p_left, p_right, *_ = cv2.stereoRectify(K, none, K, none, SIZE, TURN, SHIFT.reshape(3, 1) / 1000)
+    for name, turn, projection in (("left", left, p_left), ("right", right, p_right)):
+        changes = {"rectification_matrix": {"data": turn.ravel().tolist()},
+                   "projection_matrix": {"data": projection.ravel().tolist()}}  # fmt: skip
+        (tmp_path / f"{name}.yaml").write_text(ros(K, none, **changes))
+    rig = lens_or_rig(tmp_path, *SIZE)[1]
+    np.testing.assert_allclose(rig.rotation, TURN, atol=1e-9)
+    np.testing.assert_allclose(rig.translation, SHIFT, atol=1e-9)
+
+
+@pytest.mark.parametrize("text", ["100 0 63.5\n0 101 47.5\n0 0 1\n", "[[100,0,63.5],[0,101,47.5],[0,0,1]]",
+                                  "100 0 63.5 0\n0 101 47.5 0\n0 0 1 0\n"])  # fmt: skip
+def test_a_matrix_as_text(text, tmp_path):
+    (tmp_path / "K.txt").write_text(text)
+    check_lens(lens_or_rig(tmp_path / "K.txt", *SIZE)[0], ())
+
+
+def test_the_ini_of_stereomis_is_one_of_them(tmp_path):
+    (tmp_path / "a.ini").write_text(ini())
+    lens, rig = lens_or_rig(tmp_path / "a.ini", 64, 48)
+    assert lens is None and rig.left.cx == 31.5 and rig.translation.tolist() == [-4.0, 0.0, 0.0]
+
+
+FISH = {"distortion_model": "equidistant"}
+REFUSED = {
+    "a.yaml: not YAML": ("a.yaml", "a: [1"),
+    "no calibration that is known": ("a.yaml", "hello: 1"),
+    "holds no keys": ("b.yaml", "- 1"),
+    "distortion_model 'equidistant'": ("a.yaml", ros(K, **FISH)),
+    "distortion_model 'equidistant' is": ("a.yaml", kalibr(**FISH)),
+    "camera_model 'omni'": ("a.yaml", kalibr(camera_model="omni")),
+    "6 distortion coefficients": ("a.yaml", ros(K, [0.1] * 6)),
+    "resolution": ("a.yaml", kalibr(resolution=[128.5, 96])),
+    "allowed: 3x3 finite numbers": ("a.yaml", "camera_matrix: [1, 2]"),
+    "R is missing": ("a.yaml", "M1: [1,0,0,0,1,0,0,0,1]\nM2: [1,0,0,0,1,0,0,0,1]"),
+    "could not determine a constructor": ("a.yaml", "camera_matrix: !!python/object/apply:os.getcwd []"),
+    "4 words": ("a.txt", "1 2 3 4"),
+    "allowed: rows": ("a.txt", "100 0 63 0 100 47 0 1 1"),
+    "allowed: FILE.ini": ("a.xml", "<x/>"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("said", REFUSED)
+def test_what_is_no_calibration_is_refused(said, tmp_path):
+    name, text = REFUSED[said]
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=name) as caught:
+        lens_or_rig(tmp_path / name, *SIZE)
+    assert said in str(caught.value)
+
+
+def test_every_format_says_what_it_reads():
+    assert len(FORMATS) == 5 and len({entry.about for entry in FORMATS}) == 5

@@ -1,0 +1,389 @@
+"""`endotsr check`: each of the wrong inputs, made by a script, gives the finding it must give, and no wrong alarm."""
+
+import json
+import re
+from types import SimpleNamespace
+
+import msgspec
+import numpy as np
+import pytest
+from common_folder import moving, written
+from test_stereo_depth import slanted_pair, stereo_folder
+
+from data_folder import data_folder
+from endonerf_writer import write_endonerf
+from endotsr.cli.main import main
+from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.checks.cost import Standing, estimated_cost, work_left
+from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
+from endotsr.clips.sequences.frame_store import FrameStore
+from endotsr.clips.sequences.layouts import read_sequence
+from endotsr.clips.sequences.sequence_file import FILE_NAME
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import PAPER, SequenceConfig, config_from_dict
+from endotsr.errors import InputError
+
+FRAMES = 9
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    return simulate(SimulatorSettings(width=64, height=48, frames=FRAMES)).sequence
+
+
+def each(folder, name, change, frames=range(FRAMES)):
+    """Change the pictures of a folder."""
+    for i in frames:
+        file = folder / name / f"{i:06d}.png"
+        write_png(file, change(read_png(file)))
+
+
+def poses(folder, change):
+    rows = np.load(folder / "poses_bounds.npy")
+    change(rows)
+    np.save(folder / "poses_bounds.npy", rows)
+
+
+def drift(rows, step=1.0):
+    rows[:, 3] = step * np.arange(len(rows))
+
+
+def jump(rows):
+    drift(rows)
+    rows[5, 3] += 500
+
+
+def turn(rows):
+    rows[4, :15] = np.column_stack([np.diag([-1.0, 1.0, -1.0]), rows[4, :15].reshape(3, 5)[:, 3:]]).ravel()
+
+
+def metres(depth):
+    return (depth // 1000 + (depth > 0)).astype(np.uint8)
+
+
+def normalised(depth):
+    return (depth / depth.max() * 255).astype(np.uint8)
+
+
+def exposure(image):
+    return (image * 0.3).astype(np.uint8)
+
+
+def entry(row, column, value):
+    def change(rows):
+        rows[:, :15].reshape(-1, 3, 5)[:, row, column] = value
+
+    return change
+
+
+def copied(folder, a, b, names=("images",)):
+    for name in names:
+        (folder / name / f"{b:06d}.png").write_bytes((folder / name / f"{a:06d}.png").read_bytes())
+
+
+def renamed(folder):
+    for name in ("images", "masks", "depth"):
+        for i in range(5, FRAMES):
+            (folder / name / f"{i:06d}.png").rename(folder / name / f"{i + 20:06d}.png")
+
+
+# Name -> (damage, code of the finding, level, frame)
+WRONG = {
+    "no masks folder": (lambda p: (p / "masks").rename(p / "m"), "masks-files", "refusal", None),
+    "no depth folder": (lambda p: (p / "depth").rename(p / "d"), "depth-files", "refusal", None),
+    "no images": (lambda p: (p / "images").rename(p / "i"), "images-files", "refusal", None),
+    "image without mask": (lambda p: (p / "masks/000003.png").unlink(), "pairing", "refusal", None),
+    "image without depth": (lambda p: (p / "depth/000003.png").unlink(), "pairing", "refusal", None),
+    "truncated image": (lambda p: cut(p / "images/000003.png"), "picture", "refusal", 3),
+    "truncated mask": (lambda p: cut(p / "masks/000003.png"), "mask", "refusal", 3),
+    "truncated depth": (lambda p: cut(p / "depth/000003.png"), "depth-file", "refusal", 3),
+    "image of another size": (lambda p: each(p, "images", lambda x: x[:40], [3]), "size", "refusal", 3),
+    "mask of another size": (lambda p: each(p, "masks", lambda x: x[:40], [3]), "size", "refusal", 3),
+    "depth of another size": (lambda p: each(p, "depth", lambda x: x[:40], [3]), "size", "refusal", 3),
+    "soft mask": (lambda p: each(p, "masks", lambda x: x // 2 + 40, [3]), "mask-values", "refusal", 3),
+    "polarity": (lambda p: each(p, "masks", lambda x: 255 - x), "polarity", "refusal", None),
+    "one mask inverted": (lambda p: each(p, "masks", lambda x: 255 - x, [4]), "single-mask", "refusal", None),
+    "one mask over everything": (lambda p: each(p, "masks", lambda x: x * 0 + 255, [4]), "frame-without-tissue",
+                                 "warning", 4),
+    "masks empty": (lambda p: each(p, "masks", lambda x: x * 0), "tissue-fraction", "refusal", None),
+    "masks full": (lambda p: each(p, "masks", lambda x: x * 0 + 255), "tissue-fraction", "refusal", None),
+    "numbers with a gap": (renamed, "number-gap", "warning", 5),
+    "duplicated frame": (lambda p: copied(p, 3, 4), "duplicated-frame", "warning", 4),
+    "black frame": (lambda p: each(p, "images", lambda x: x * 0, [3]), "black-frame", "warning", 3),
+    "white frame": (lambda p: each(p, "images", lambda x: x * 0 + 255, [3]), "white-frame", "warning", 3),
+    "black clip": (lambda p: each(p, "images", lambda x: x * 0), "no-picture", "refusal", 0),
+    "mostly white": (lambda p: each(p, "images", lambda x: x * 0 + 255, range(2, 8)), "no-picture", "refusal", 2),
+    "one colour": (lambda p: each(p, "images", lambda x: x * 0 + np.uint8(90)), "no-picture", "refusal", 0),
+    "frozen": (lambda p: [copied(p, 0, i) for i in range(1, FRAMES)], "constant-clip", "refusal", 0),
+    "woven of two moments": (lambda p: each(p, "images", combed), "interlaced-pictures", "warning", None),
+    "overexposed": (lambda p: each(p, "images", half_white, [3]), "clipped-frame", "warning", 3),
+    "exposure jump": (lambda p: each(p, "images", exposure, range(4, FRAMES)), "exposure-jump", "warning", 4),
+    "metres cut to 8 bits": (lambda p: each(p, "depth", metres), "metres-cut", "refusal", None),
+    "times 256": (lambda p: each(p, "depth", lambda x: (x * 256).astype(np.uint16)), "depth-unit", "warning", None),
+    "micrometres": (lambda p: each(p, "depth", lambda x: (x * 1000).clip(0, 65535)), "depth-unit", "warning", None),
+    "normalised": (lambda p: each(p, "depth", normalised), "normalised-depth", "warning", None),
+    "constant depth": (lambda p: each(p, "depth", lambda x: (x > 0) * np.uint8(60)), "constant-depth", "refusal", None),
+    "coarse depth": (lambda p: each(p, "depth", lambda x: (x // 10) * 10), "coarse-depth", "warning", None),
+    "no depth at all": (lambda p: each(p, "depth", lambda x: x * 0), "no-depth", "refusal", None),
+    "little depth": (lambda p: each(p, "depth", corner), "little-depth", "warning", None),
+    "one frame without depth": (lambda p: each(p, "depth", lambda x: x * 0, [3]), "frame-without-depth", "note", 3),
+    "one frame far off": (lambda p: each(p, "depth", lambda x: x * 10, [3]), "depth-far-off", "warning", 3),
+    "no poses": (lambda p: (p / "poses_bounds.npy").unlink(), "cameras", "refusal", None),
+    "a pose too few": (lambda p: np.save(p / "poses_bounds.npy", np.load(p / "poses_bounds.npy")[1:]), "cameras",
+                       "refusal", None),
+    "no number": (lambda p: poses(p, entry(0, 3, np.nan)), "cameras", "refusal", None),
+    "no rotation": (lambda p: poses(p, entry(0, 0, 2.0)), "cameras", "refusal", None),
+    "size swapped": (lambda p: poses(p, entry(0, 4, 64.0)), "cameras", "refusal", None),
+    "pose jump": (lambda p: poses(p, jump), "pose-jump", "warning", 5),
+    "pose turn": (lambda p: poses(p, turn), "pose-turn", "warning", 4),
+    "poses in metres": (lambda p: poses(p, lambda r: drift(r, 1e-4 / 8)), "pose-unit", "warning", None),
+    "poses in micrometres": (lambda p: poses(p, lambda r: drift(r, 1e3)), "pose-unit", "warning", None),
+    "red and blue exchanged": (lambda p: each(p, "images", lambda x: x[:, :, ::-1]), "blue-pictures", "warning", None),
+    "two views in turn": (lambda p: each(p, "images", lambda x: np.roll(x, 20, 1), range(1, FRAMES, 2)),
+                          "alternating-views", "warning", None),
+    "65535 without depth": (lambda p: each(p, "depth", without), "marked-depth", "warning", None),
+    "far away": (lambda p: poses(p, entry(0, 3, 1e9)), "far-from-origin", "note", None),
+    "focal length in mm": (lambda p: poses(p, entry(2, 4, 4.0)), "field-of-view", "warning", None),
+    "grey image": (lambda p: each(p, "images", lambda x: x[:, :, 0], [3]), "picture", "refusal", 3),
+    "16-bit image": (lambda p: each(p, "images", lambda x: x.astype(np.uint16) * 257, [3]), "picture", "refusal", 3),
+    "coloured mask": (lambda p: each(p, "masks", coloured, [3]), "mask", "refusal", 3),
+    "empty file": (lambda p: (p / "images/000003.png").write_bytes(b""), "picture", "refusal", 3),
+    "two files of one number": (lambda p: copied_as(p / "images", "000003.png", "3.png"), "images-files", "refusal",
+                                None),
+    "a stray picture": (lambda p: copied_as(p / "images", "000003.png", "overview.png"), "images-files", "refusal",
+                        None),
+    "all grey": (lambda p: each(p, "images", lambda x: np.repeat(x[:, :, :1], 3, 2)), "grey-pictures", "note", None),
+    "centimetres": (lambda p: each(p, "depth", lambda x: (x // 10 + (x > 0)).astype(np.uint8)), "coarse-depth",
+                    "warning", None),
+    "mirrored pose": (lambda p: poses(p, mirrored), "cameras", "refusal", None),
+    "two frames": (lambda p: keep(p, 2), "frames", "refusal", None),
+}  # fmt: skip
+
+
+def cut(file):
+    file.write_bytes(file.read_bytes()[:-20])
+
+
+def without(depth):
+    return np.where(np.arange(depth.shape[1]) < 4, 65535, depth).astype(np.uint16)
+
+
+def combed(image):
+    image[1::2] = np.roll(image[1::2], 6, 1)
+    return image
+
+
+def coloured(mask):
+    return np.stack([mask, mask, mask // 2], axis=2)
+
+
+def copied_as(folder, name, other):
+    (folder / other).write_bytes((folder / name).read_bytes())
+
+
+def mirrored(rows):
+    rows[:, :15].reshape(-1, 3, 5)[:, :, 0] *= -1
+
+
+def half_white(image):
+    image[: len(image) // 2] = 255
+    return image
+
+
+def corner(depth):
+    result = depth * 0
+    result[30:36, 30:50] = depth[30:36, 30:50]
+    return result
+
+
+def keep(folder, count):
+    for name in ("images", "masks", "depth"):
+        for file in sorted((folder / name).iterdir())[count:]:
+            file.unlink()
+    np.save(folder / "poses_bounds.npy", np.load(folder / "poses_bounds.npy")[:count])
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_input_gives_its_finding(case, sequence, tmp_path):
+    damage, code, level, frame = WRONG[case]
+    write_endonerf(sequence, tmp_path / "clip")
+    damage(tmp_path / "clip")
+    found = check_sequence(tmp_path / "clip", PAPER).findings
+    matching = [f for f in found if f.code == code]
+    assert matching, [f.line for f in found]
+    assert matching[0].level == level and (frame is None or frame in [f.frame for f in matching])
+    assert all(f.what and f.why and f.remedy and str(tmp_path) in f.where for f in found)
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_train_and_check_judge_alike(case, sequence, tmp_path):
+    """What the check refuses is refused, and its warnings are in the notes of what is accepted."""
+    write_endonerf(sequence, tmp_path / "clip")
+    WRONG[case][0](tmp_path / "clip")
+    checked = check_sequence(tmp_path / "clip", PAPER)
+    if checked.refused:
+        with pytest.raises(InputError):
+            read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near)
+        return
+    notes = read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near).notes
+    said = [found[1] for note in notes if (found := re.match(r"(?:warning|note): ([\w-]+): ", note))]
+    assert said == [f.code for f in checked.findings if f.code not in SAID_ALREADY]
+
+
+def test_many_findings_of_one_kind_are_counted(sequence, tmp_path):
+    write_endonerf(sequence, tmp_path / "clip")
+    each(tmp_path / "clip", "images", half_white, range(7))
+    notes = read_sequence(tmp_path / "clip", PAPER.sequence, 0.2).notes
+    clipped = [note for note in notes if "clipped-frame" in note]
+    assert len(clipped) == MOST and clipped[-1].endswith("(2 more of this kind)")
+
+
+def test_a_right_sequence_has_no_finding(sequence, tmp_path):
+    write_endonerf(sequence, tmp_path / "clip")
+    checked = check_sequence(tmp_path / "clip", PAPER)
+    assert checked.findings == [] and not checked.refused
+    assert not any("warning" in note for note in read_sequence(tmp_path / "clip", PAPER.sequence, 0.2).notes)
+    assert checked.facts["frames"] == FRAMES and checked.facts["cost"]["minutes"] > 0
+
+
+def test_the_time_is_that_of_a_training_on_these_frames(sequence, tmp_path):
+    write_endonerf(sequence, tmp_path / "sequence")
+    training = msgspec.structs.replace(PAPER.training, visits_per_frame=1500)  # 8 training frames: 12000 iterations
+    configs = (PAPER, msgspec.structs.replace(PAPER, training=training))
+    once, twice = (check_sequence(tmp_path / "sequence", config).facts["cost"]["minutes"] for config in configs)
+    assert twice == pytest.approx(2 * once, rel=1e-3)
+
+
+def test_everything_is_found_in_one_pass(sequence, tmp_path):
+    write_endonerf(sequence, tmp_path / "clip")
+    for case in ("truncated image", "black frame", "pose jump", "times 256"):
+        WRONG[case][0](tmp_path / "clip") if case != "black frame" else each(
+            tmp_path / "clip", "images", lambda x: x * 0, [6]
+        )
+    codes = [f.code for f in check_sequence(tmp_path / "clip", PAPER).findings]
+    assert {"picture", "black-frame", "pose-jump", "depth-unit"} <= set(codes) and codes[0] == "picture"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("fx = 30.0", "fx = -1.0", "sequence-file"),
+        ("distortion = []", "distortion = [0.1, 0, 0, 0]", "distortion"),
+        ("cx = 15.0", "cx = 29.0", "principal-point"),
+        ("fy = 33.0", "fy = 66.0", "pixel-shape"),
+        ("width = 32", "width = 64", "cameras"),
+        ("frames = 5", "frames = 7", "cameras"),
+        ('[depth]\nfolder = "depth"\nunit = "mm"', '[depth]\nfolder = "depth"\nunit = "m"', "depth-unit"),
+    ],
+)
+def test_wrong_statements_of_the_common_format(tmp_path, old, new, code):
+    written(tmp_path, poses=moving())
+    file = tmp_path / FILE_NAME
+    assert old in file.read_text()
+    file.write_text(file.read_text().replace(old, new))
+    assert code in [f.code for f in check_sequence(tmp_path, PAPER).findings]
+
+
+def test_what_the_common_format_lacks(tmp_path):
+    written(tmp_path, masks=False, depth=False)
+    found = {f.code: f for f in check_sequence(tmp_path, PAPER).findings}
+    assert found["no-masks"].level == "note" and found["no-depth"].level == "refusal"
+
+
+def test_an_inverted_picture_of_depth_is_found_by_the_stereo_pair(tmp_path):
+    stereo_folder(tmp_path)
+    assert main(["depth", str(tmp_path), "--nearest", "25", "--farthest", "120"]) == 0
+    assert "inverted-depth" not in [f.code for f in check_sequence(tmp_path, PAPER).findings]
+    disparity = slanted_pair()[2]
+    stored = read_png(tmp_path / "depth/000000.png")
+    write_png(tmp_path / "depth/000000.png", np.where(stored > 0, disparity * 100, 0).astype(np.uint16))
+    found = [f for f in check_sequence(tmp_path, PAPER).findings if f.code == "inverted-depth"]
+    assert found and found[0].level == "refusal" and "disparity" in found[0].remedy
+
+
+def test_cost_grows_with_the_clip_up_to_the_limit():
+    def of(frames, preset="paper", memory=8.0):
+        return estimated_cost(frames, 640, 512, config_from_dict({"preset": preset, "sequence": {"memory": memory}}))
+
+    small, large = of(60), of(120)
+    assert large.sequence_bytes == pytest.approx(2 * small.sequence_bytes) and not large.file_bytes
+    assert large.total_bytes - small.total_bytes == pytest.approx(60 * 640 * 512 * (9 + 0.17))
+    long = of(2000, "sharp", 4.0)
+    assert long.file_bytes == long.sequence_bytes == 2000 * 640 * 512 * 9
+    assert long.total_bytes == pytest.approx(4e9 / 4 + 2000 * 640 * 512 * 0.17 + 0.6e9 + 8.7e3 * long.gaussians)
+    assert of(60, "sharp").total_bytes > small.total_bytes
+
+
+def test_a_budget_decides_gaussians_and_minutes():
+    wide, narrow = (
+        estimated_cost(60, 640, 512, config_from_dict({"preset": "quick", "density": {"maximum": n}}))
+        for n in (60_000, 22_000)
+    )
+    assert (wide.gaussians, narrow.gaussians) == (60_000, 22_000)
+    assert wide.minutes > 1.2 * narrow.minutes
+    assert wide.total_bytes - narrow.total_bytes == pytest.approx(8.7e3 * 38_000)
+
+
+def test_the_work_that_is_left_adds_up():
+    """Half of an iteration is for 60 000 Gaussians, four tenths for 640x512 pixels; a coarse start sees a quarter,
+    and the first third of a run takes less."""
+    config = msgspec.structs.replace(
+        PAPER, density=msgspec.structs.replace(PAPER.density, growth="budget", maximum=120_000)
+    )
+    full = 640 * 512
+    assert work_left(config, full, Standing(5990, 60_000)) == pytest.approx(10 * 1.0)
+    assert work_left(config, full, Standing(6000, 60_000)) == 0.0
+    assert work_left(config, full, Standing(3990, 60_000, True)) == pytest.approx(
+        work_left(config, full, Standing(3990, 60_000)) - 10 * 0.3
+    )
+    growing = work_left(config, full, Standing(2100, 60_000)) - work_left(config, full, Standing(4000, 120_000))
+    assert growing == pytest.approx(1900 * 1.25, rel=1e-3)
+    early = work_left(config, full, Standing(0, 120_000)) - work_left(config, full, Standing(2100, 120_000))
+    assert early == pytest.approx(2100 * 1.5 * (0.65 + 1) / 2, rel=1e-3)
+
+
+def test_a_clip_that_fits_nowhere_is_refused_before_reading(sequence, tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"clip: 10000000 frames of 640x512 need 29491\.2 GB, more than half"):
+        FrameStore(10_000_000, 640, 512, 0.0, "clip")
+    write_endonerf(sequence, tmp_path / "clip")
+    few = msgspec.structs.replace(PAPER, sequence=SequenceConfig(memory=1e-4))
+    found = {f.code: f for f in check_sequence(tmp_path / "clip", few).findings}
+    assert found["frames-in-file"].level == "note" and "disk" not in found
+    monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=10))
+    found = {f.code: f for f in check_sequence(tmp_path / "clip", few).findings}
+    assert found["disk"].level == "refusal" and "allowed: fewer --frames" in found["disk"].what
+    with pytest.raises(InputError, match="allowed: fewer --frames"):
+        read_sequence(tmp_path / "clip", few.sequence, 0.2)
+
+
+def test_too_little_memory_is_a_warning(sequence, tmp_path, monkeypatch):
+    write_endonerf(sequence, tmp_path / "clip")
+    monkeypatch.setattr("endotsr.clips.sequences.checks.check.memory_of_machine", lambda: 1e8)
+    found = {f.code: f for f in check_sequence(tmp_path / "clip", PAPER).findings}
+    assert found["memory"].level == "warning" and "this machine has 0.1 GB" in found["memory"].what
+
+
+def test_the_command_writes_json_and_a_page(sequence, tmp_path, capsys):
+    write_endonerf(sequence, tmp_path / "clip")
+    files = [str(tmp_path / "a.json"), str(tmp_path / "a.html")]
+    assert main(["check", str(tmp_path / "clip"), "--json", files[0], "--html", files[1]]) == 0
+    assert "ready for training" in capsys.readouterr().out
+    each(tmp_path / "clip", "images", lambda x: x * 0, [3])
+    cut(tmp_path / "clip/masks/000002.png")
+    assert main(["check", str(tmp_path / "clip"), "--json", files[0], "--html", files[1]]) == 1
+    said = capsys.readouterr().out
+    assert "warning: black-frame" in said and "refused" in said
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert [f["code"] for f in found["findings"]][:1] == ["mask"] and found["facts"]["frames"] == FRAMES
+    page = (tmp_path / "a.html").read_text()
+    assert "black-frame" in page and "<script" not in page and "data:image" in page
+    assert main(["check"]) == 2 and "SEQUENCE is missing" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "nowhere")]) == 2
+
+
+@pytest.mark.data
+def test_a_published_sequence_is_accepted():
+    checked = check_sequence(data_folder("endonerf_pulling"), PAPER)
+    assert not checked.refused, [f.line for f in checked.findings]

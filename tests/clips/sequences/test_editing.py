@@ -1,0 +1,170 @@
+"""Editing a clip: frames by number and second, frames left out, a crop, masks united, a folder replaced."""
+
+import numpy as np
+import pytest
+from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
+from made_videos import CAMERA, UNEVEN, picture, pictures, write
+
+from endotsr.cli.main import main
+from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.common import open_common, read_common
+from endotsr.clips.sequences.editing import chosen_frames, cropped, without
+from endotsr.clips.sequences.recording import Lens, PicturePair, Recording, Rig
+from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
+from endotsr.config import PAPER
+from endotsr.errors import InputError
+
+
+def recording(count=20, **known):
+    """A recording of pictures whose pixels tell where they are."""
+    y, x = np.mgrid[:24, :32]
+
+    def pictures(wanted):
+        for i in wanted:
+            shown = np.stack([x, y, np.full_like(x, i)], 2).astype(np.uint8)
+            yield PicturePair(shown, shown + np.uint8(100) if known.get("rig") else None)
+
+    return Recording("test", __file__, [str(i) for i in range(count)], pictures, **known)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("text", "frames"), [
+    ("", range(20)), ("3:6", [3, 4, 5]), ("0:3,10", [0, 1, 2, 10]), ("10,0:3", [0, 1, 2, 10]), ("0:4,2:6", range(6)),
+    ("::5", [0, 5, 10, 15]), ("-2:", [18, 19]), ("-1", [19]), ("1s:1.5s", range(10, 15)), ("1.8s:", [18, 19]),
+    (":0.2s,5", [0, 1, 5]), (" 1 , 3 : 5 ", [1, 3, 4]),
+])  # fmt: skip
+def test_frames_by_number_and_by_second(text, frames):
+    assert chosen_frames(text, recording(rate=10.0)) == list(frames)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("3:3", "selects nothing"), ("20", "outside"), ("0:21", "outside"), ("a", "not a range"), (",", "not a range"),
+    ("1s", "no span of seconds"), ("1:2s", "no span of seconds"), ("1s:9s", "ends after 1.900"), ("1:2:0", "the step"),
+    ("1:2:3:4", "not a range.*several with commas"), ("5s:", "selects nothing"),
+])  # fmt: skip
+def test_what_is_no_frame_is_refused(text, said):
+    with pytest.raises(InputError, match=said):
+        chosen_frames(text if text != "," else ":,x", recording(rate=10.0))
+
+
+def test_seconds_need_a_rate_and_follow_time_stamps():
+    with pytest.raises(InputError, match="the frame rate is unknown"):
+        chosen_frames("0s:1s", recording())
+    stamps = np.cumsum(np.linspace(0.05, 0.3, 20))
+    found = chosen_frames("1s:2s", recording(rate=5.0, times=stamps))
+    assert found == [i for i in range(20) if 1 <= stamps[i] - stamps[0] < 2]
+
+
+def test_frames_are_left_out():
+    assert without([2, 3, 4, 5], "3,5:7", recording()) == [2, 4]
+    assert without([2, 3], "", recording()) == [2, 3]
+
+
+def test_a_crop_moves_the_principal_point_of_every_camera():
+    lens = Lens(30.0, 31.0, 16.0, 12.0, 32, 24)
+    rig = Rig(lens, lens._replace(cx=15.0), np.eye(3), np.array([-4.0, 0, 0]))
+    found = cropped(recording(lens=lens, rig=rig, depth=lambda i: np.arange(768, dtype=np.float32).reshape(24, 32),
+                              masks=lambda i: None if i else np.ones((24, 32), bool)), (5, 3, 20, 12))  # fmt: skip
+    assert found.lens == Lens(30.0, 31.0, 11.0, 9.0, 20, 12) and found.rig.right.cx == 10.0
+    pair = next(found.pictures([7]))
+    assert pair.left[0, 0].tolist() == [5, 3, 7] and pair.left[-1, -1].tolist() == [24, 14, 7]
+    assert pair.right[0, 0].tolist() == [105, 103, 107]
+    assert found.depth(0)[0, 0] == 3 * 32 + 5 and found.masks(0).shape == (12, 20) and found.masks(1) is None
+
+
+@pytest.mark.parametrize("window", [(0, 0, 33, 4), (30, 0, 4, 4), (-1, 0, 4, 4), (0, 0, 0, 4), (0, 0, 4)])
+def test_a_crop_outside_is_refused(window):
+    with pytest.raises(InputError, match="--crop"):
+        next(cropped(recording(), window).pictures([0]))
+
+
+def test_a_cropped_clip_sees_the_same_world(tmp_path):
+    """A pixel of the crop is the same ray as before: the camera of the crop projects it there."""
+    written(tmp_path / "clip", poses=moving())
+    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--crop", "4", "3", "20", "18"]
+    assert main(words) == 0
+    whole, part = open_common(tmp_path / "clip"), open_common(tmp_path / "o")
+    assert (part.lens.cx, part.lens.cy) == (whole.lens.cx - 4, whole.lens.cy - 3)
+    np.testing.assert_allclose(part.depth(2), whole.depth(2)[3:21, 4:24], atol=0.01)
+    assert (part.masks(2) == whole.masks(2)[3:21, 4:24]).all()
+
+
+def test_seconds_and_dropped_frames_of_a_video(tmp_path, capsys):
+    write(tmp_path / "a.mkv", pictures(), milliseconds=UNEVEN)
+    words = ["prepare", str(tmp_path / "a.mkv"), "--out", str(tmp_path / "o"), *CAMERA]
+    assert main([*words, "--frames", "0:6", "--drop", "2,4"]) == 0
+    found = read_sequence_file(tmp_path / "o")
+    np.testing.assert_allclose(found.times, np.array([UNEVEN[i] for i in (0, 1, 3, 5)]) / 1000, atol=2e-3)
+    for file, i in zip(sorted((tmp_path / "o/images").iterdir()), (0, 1, 3, 5), strict=True):
+        assert np.abs(read_png(file).astype(int) - picture(i)).mean() < 10
+    assert main([*words, "--drop", "0:12"]) == 2 and "exists already" in capsys.readouterr().err
+    assert main([*words, "--drop", "0:12", "--replace"]) == 2 and "no frame is left" in capsys.readouterr().err
+    assert read_sequence_file(tmp_path / "o") == found  # after an error the old folder is there
+
+
+def test_masks_are_united(tmp_path, capsys):
+    written(tmp_path / "clip")
+    border = np.zeros((HEIGHT, WIDTH), np.uint8)
+    border[-3:] = 255
+    write_png(tmp_path / "border.png", border)
+    (tmp_path / "logo").mkdir()
+    for i in range(FRAMES):
+        logo = np.zeros((HEIGHT, WIDTH), np.uint8)
+        logo[15, i] = 255
+        write_png(tmp_path / "logo" / f"{i:03d}.png", logo)
+    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--unite-masks"]
+    assert main([*words, str(tmp_path / "border.png"), str(tmp_path / "logo")]) == 0
+    before, after = open_common(tmp_path / "clip"), open_common(tmp_path / "o")
+    for i in range(FRAMES):
+        expected = before.masks(i).copy()
+        expected[-3:] = expected[15, i] = False
+        assert (after.masks(i) == expected).all()
+    assert "masks: united with border.png, logo" in capsys.readouterr().out
+
+
+def test_a_folder_is_replaced_by_an_edit_of_itself_and_nothing_else_is(tmp_path, capsys):
+    written(tmp_path / "clip", poses=moving())
+    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "clip"), "--replace", "--drop", "1"]
+    assert main(words) == 0
+    assert read_sequence_file(tmp_path / "clip").frames == FRAMES - 1
+    assert [file.name for file in tmp_path.iterdir()] == ["clip"]
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/letter.txt").write_text("dear")
+    words[3] = str(tmp_path / "mine")
+    assert main(words) == 2 and "holds no sequence.toml" in capsys.readouterr().err
+    assert (tmp_path / "mine/letter.txt").exists()
+
+
+def broken(clip, what):
+    """A fault in frame 3."""
+    if what == "pose":
+        text = (clip / FILE_NAME).read_text().replace("-6.0", "nan")
+        assert "nan" in text
+        (clip / FILE_NAME).write_text(text)
+    else:
+        file = clip / what / "000003.png"
+        file.write_bytes(file.read_bytes()[:100])
+
+
+@pytest.mark.parametrize("what", ["images", "masks", "depth", "pose"])
+def test_a_fault_in_one_frame_is_mended_by_dropping_it_as_check_says(what, tmp_path):
+    written(tmp_path / "clip", poses=moving())
+    broken(tmp_path / "clip", what)
+    with pytest.raises(InputError):
+        read_common(tmp_path / "clip", PAPER.sequence, 0.2)
+    found = [f for f in check_sequence(tmp_path / "clip", PAPER).findings if f.level == "refusal"]
+    assert found and all("--replace --drop FRAME" in f.remedy for f in found)
+    clip = str(tmp_path / "clip")
+    assert main(["prepare", clip, "--out", clip, "--replace", "--drop", "3"]) == 0
+    assert len(read_common(tmp_path / "clip", PAPER.sequence, 0.2).images) == FRAMES - 1
+
+
+def test_what_is_assumed_of_the_depth_survives_an_edit(tmp_path):
+    written(tmp_path / "clip", depth=False)
+    clip = str(tmp_path / "clip")
+    file = tmp_path / "clip" / FILE_NAME
+    file.write_text(file.read_text().replace("baseline = 4.0", "baseline = 0.0"))
+    assert main(["depth", clip, "--flat"]) == 0
+    assert main(["prepare", clip, "--out", clip, "--replace", "--drop", "0"]) == 0
+    entry = read_sequence_file(tmp_path / "clip").depth
+    assert entry.assumed == "shape" and entry.method.startswith("assumed: a plane")

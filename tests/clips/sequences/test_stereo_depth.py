@@ -1,0 +1,192 @@
+"""`endotsr depth`: a simulated pair gives its true depth, holes stay holes, other programs' files are read exactly."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from common_folder import FRAMES, HEIGHT, WIDTH, written
+from scipy.ndimage import gaussian_filter, map_coordinates
+from test_common import write_plane
+
+from data_folder import data_folder
+from endotsr.cli.main import main
+from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.common import read_common
+from endotsr.clips.sequences.make_depth import depth_of_values, from_files, write_depth
+from endotsr.clips.sequences.recording import Lens
+from endotsr.clips.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
+from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+
+LENS = Lens(300.0, 310.0, 80.0, 60.0, 160, 120)
+BASELINE = 4.0
+SETTINGS = StereoSettings(nearest=25.0, farthest=120.0)
+PLANE = (22.0, -0.02, 0.03)  # disparity = a + b column + c row: a slanted plane
+
+
+def texture(column, row, seed=0):
+    """A picture without repeats, sampled anywhere."""
+    noise = gaussian_filter(np.random.default_rng(seed).uniform(0, 255, (160, 260, 3)), (1.2, 1.2, 0))
+    noise = (noise - noise.min()) / np.ptp(noise) * 255
+    places = [np.asarray(row) + 20, np.asarray(column) + 50]
+    planes = [map_coordinates(noise[:, :, k], places, order=3, mode="nearest") for k in range(3)]
+    return np.clip(np.rint(np.stack(planes, axis=2)), 0, 255).astype(np.uint8)
+
+
+def slanted_pair(seed=0):
+    """Left and right pictures of a slanted plane, and its true disparity in the left one."""
+    column, row = np.meshgrid(np.arange(160.0), np.arange(120.0))
+    a, b, c = PLANE
+    there = (column + a + c * row) / (1 - b)  # the left column that the right column shows
+    return texture(column, row, seed), texture(there, row, seed), a + b * column + c * row
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_a_slanted_plane(smooth):
+    left, right, disparity = slanted_pair()
+    settings = StereoSettings(nearest=25.0, farthest=120.0, smooth=smooth)
+    found = stereo_depth(left, right, LENS, BASELINE, settings)
+    truth = LENS.fx * BASELINE / disparity
+    inside = np.arange(160)[None, :] - disparity >= 8  # seen by both
+    known = (found > 0) & inside
+    assert known.sum() > 0.95 * inside.sum()
+    apart = np.abs(LENS.fx * BASELINE / found[known] - disparity[known])
+    assert np.median(apart) < 0.15 and np.percentile(apart, 95) < 0.6  # pixels
+    assert np.median(np.abs(found[known] - truth[known])) < 0.5  # mm
+
+
+def test_what_only_one_camera_sees_has_no_depth():
+    left, right, disparity = slanted_pair()
+    left[30:70, 60:100] = texture(*np.meshgrid(np.arange(40.0), np.arange(40.0)), seed=9)
+    depth = stereo_depth(left, right, LENS, BASELINE, SETTINGS)
+    assert (depth[40:60, 70:90] > 0).mean() < 0.2
+    assert not depth[np.arange(160)[None, :] - disparity < -1].any()  # outside of the right picture
+
+
+def test_a_pair_that_does_not_belong_together_has_almost_no_depth():
+    left, right = slanted_pair(0)[0], slanted_pair(5)[1]
+    assert (stereo_depth(left, right, LENS, BASELINE, SETTINGS) > 0).mean() < 0.1
+
+
+def test_the_scale_is_metric():
+    left, right, _ = slanted_pair()
+    near = stereo_depth(left, right, LENS, BASELINE, SETTINGS)
+    twice = StereoSettings(nearest=50.0, farthest=240.0)
+    far = stereo_depth(left, right, LENS, 2 * BASELINE, twice)
+    np.testing.assert_allclose(far, 2 * near, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("nearest", "farthest"), [(30.0, 20.0), (0.5, 100.0), (0.0, 10.0)])
+def test_an_impossible_range_is_refused(nearest, farthest):
+    with pytest.raises(InputError, match="allowed"):
+        disparity_range(StereoSettings(nearest=nearest, farthest=farthest), LENS, BASELINE)
+
+
+def test_every_depth_in_range_is_searched():
+    lowest, count = disparity_range(SETTINGS, LENS, BASELINE)
+    assert lowest <= 1200 / 120 and lowest + count - 1 >= 1200 / 25 and count % 16 == 0
+
+
+def test_the_median_along_the_flow_removes_a_single_wrong_frame():
+    column, row = np.meshgrid(np.arange(160.0), np.arange(120.0))
+    pictures = [texture(column + 2.0 * k, row) for k in range(3)]
+    depths = [(50 + 0.1 * (column + 2.0 * k)).astype(np.float32) for k in range(3)]
+    truth = depths[1].copy()
+    depths[1][50:60, 70:90] += 30
+    depths[1][:10] = 0
+    found = temporal_median(depths, pictures, 1)
+    assert np.abs(found[50:60, 70:90] - truth[50:60, 70:90]).max() < 0.3
+    assert not found[:10].any()  # a hole stays one
+
+
+@pytest.mark.parametrize("ending", [".npy", ".pfm", ".tiff"])
+def test_disparity_of_another_program(tmp_path, ending):
+    written(tmp_path / "clip", depth=False)
+    (tmp_path / "raft").mkdir()
+    column = np.arange(WIDTH, dtype=np.float32)
+    for i in range(FRAMES):
+        plane = np.tile(2 + column / 16, (HEIGHT, 1)).astype(np.float32)
+        plane[0] = np.nan
+        plane[1] = 0
+        write_plane(tmp_path / "raft" / f"{i:06d}{ending}", plane)
+    report = write_depth(tmp_path / "clip", from_files(tmp_path / "clip", tmp_path / "raft", "disparity", 1.0))
+    sequence = read_common(tmp_path / "clip", SequenceConfig(depth_percentiles=(0.0, 100.0)), 0.2)
+    assert not sequence.depth[:, :2].any()
+    expected = 30.0 * 4.0 / (2 + column / 16)
+    np.testing.assert_allclose(sequence.depth[:, 2:], np.broadcast_to(expected, (FRAMES, HEIGHT - 2, WIDTH)), atol=0.01)
+    assert report.coverage[0] == pytest.approx(1 - 2 / HEIGHT) and report.file.depth is not None
+    assert "disparity from raft" in report.file.depth.method
+
+
+def test_disparity_of_another_size_and_sign():
+    lens = Lens(30.0, 33.0, 15.0, 13.0, 32, 24)
+    small = np.full((12, 16), -1.5, np.float32)  # half the size: half the disparity
+    np.testing.assert_allclose(depth_of_values(small, "disparity", 1.0, lens, 4.0, "x"), 30 * 4 / 3.0)
+    with pytest.raises(InputError, match="16x24 pixels, the pictures have 32x24"):
+        depth_of_values(np.ones((24, 16)), "depth", 1.0, lens, 4.0, "x")
+    with pytest.raises(InputError, match="baseline"):
+        depth_of_values(small, "disparity", 1.0, lens, None, "x")
+
+
+def stereo_folder(folder: Path) -> None:
+    """The slanted plane as a sequence of pairs."""
+    written(folder, depth=False, masks=False, right=True)
+    for i, (left, right, _) in enumerate(slanted_pair(i) for i in range(FRAMES)):
+        write_png(folder / "images" / f"{i:06d}.png", left)
+        write_png(folder / "images_right" / f"{i:06d}.png", right)
+    fx, fy, cx, cy, width, height, _ = LENS
+    camera = CameraEntry(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=BASELINE)
+    from endotsr.clips.sequences.sequence_file import SequenceFile, write_sequence_file
+
+    write_sequence_file(SequenceFile(format="endotsr-sequence-1", frames=FRAMES, camera=camera), folder)
+
+
+def test_the_command_makes_a_sequence_that_can_be_trained_on(tmp_path, capsys):
+    stereo_folder(tmp_path / "clip")
+    words = ["depth", str(tmp_path / "clip"), "--nearest", "25", "--farthest", "120"]
+    assert main(words) == 0
+    assert "next: endotsr train" in capsys.readouterr().out
+    sequence = read_common(tmp_path / "clip", SequenceConfig(), 0.2)
+    assert np.median(sequence.depth[sequence.depth > 0]) == pytest.approx(53, abs=3)
+    assert main(words) == 2 and "--replace" in capsys.readouterr().err
+    before = read_png(tmp_path / "clip/depth/000001.png")
+    assert main([*words, "--replace", "--temporal"]) == 0
+    after = read_png(tmp_path / "clip/depth/000001.png")
+    assert ((after > 0) == (before > 0)).all()
+    assert not [p for p in (tmp_path / "clip").iterdir() if p.name.startswith(".")]
+
+
+@pytest.mark.parametrize("case", ["mono", "no baseline", "wrong baseline"])
+def test_what_cannot_be_matched_is_refused_and_nothing_changes(tmp_path, case, capsys):
+    stereo_folder(tmp_path / "clip")
+    file = tmp_path / "clip" / FILE_NAME
+    if case == "mono":
+        for picture in (tmp_path / "clip/images_right").iterdir():
+            picture.unlink()
+        (tmp_path / "clip/images_right").rmdir()
+    else:
+        new = {"no baseline": "baseline = 0.0", "wrong baseline": "baseline = 4000.0"}[case]
+        file.write_text(file.read_text().replace("baseline = 4.0", new))
+    before = file.read_text()
+    assert main(["depth", str(tmp_path / "clip")]) == 2
+    said = capsys.readouterr().err
+    assert {"mono": "no right pictures", "no baseline": "baseline is unknown", "wrong baseline": "right baseline"}[
+        case
+    ] in said
+    assert file.read_text() == before and not (tmp_path / "clip/depth").exists()
+    assert read_sequence_file(tmp_path / "clip").depth is None
+
+
+@pytest.mark.data
+def test_a_real_pair_agrees_with_the_given_depth():
+    """One pair of a public sequence; its baseline is not published and was fitted to the given depth, 4.3 mm."""
+    folder = data_folder("endonerf_pulling")
+    files = [sorted((folder / name).iterdir())[0] for name in ("images", "images_right", "depth", "gt_masks")]
+    left, right, given, mask = (read_png(file) for file in files)
+    lens = Lens(569.468, 569.468, 320.0, 256.0, 640, 512)
+    depth = stereo_depth(left, right, lens, 4.3, StereoSettings(nearest=30.0, farthest=200.0))
+    tissue = (mask if mask.ndim == 2 else mask[:, :, 0]) == 0
+    both = tissue & (given > 0) & (depth > 0)
+    assert both.sum() > 0.7 * (tissue & (given > 0)).sum()
+    assert np.median(np.abs(depth - given.astype(float))[both]) < 1.5  # mm; the given depth is in whole millimetres

@@ -1,0 +1,73 @@
+"""An edited kernel is never stale: compiled code is kept in a folder named after a hash of all kernel sources."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import endotsr
+from endotsr.method.kernels.jit import kernel_sources
+
+PACKAGE = Path(endotsr.__file__).parent
+COMPILES = re.compile(r"^from endotsr\.method\.kernels\.jit import .*\bjit|^from numba\.extending|njit", re.MULTILINE)
+PROGRAM = """
+import numpy as np
+from endotsr.method.equations.deformation import deformation_forward
+weight, centre, width = np.ones((10, 1, 1)), np.zeros((10, 1, 1)), np.ones((10, 1, 1))
+print(repr(deformation_forward(weight, centre, width, 0.9)[0][0, 0].item()))
+"""
+
+
+def process(folder: Path, cache: Path) -> subprocess.CompletedProcess:
+    """A process that finds the package in `folder` and is to keep its kernels in `cache`; prints 2^(-u^2 / ln 2)."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT")}
+    environment |= {"PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(cache)}
+    return subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True)
+
+
+def answer(folder: Path) -> float:
+    """What such a process prints."""
+    return float(process(folder, folder / "cache").stdout)
+
+
+def copy_package(folder: Path) -> None:
+    """The package in `folder`, with no compiled code beside it."""
+    shutil.copytree(PACKAGE, folder / "endotsr", ignore=shutil.ignore_patterns("__pycache__"))
+
+
+def test_an_edit_of_a_file_that_a_kernel_inlines_is_never_stale(tmp_path):
+    """Numba itself looks only at the file that holds the kernel; here another one changes."""
+    copy_package(tmp_path)
+    before = answer(tmp_path)
+    assert before == answer(tmp_path)  # from the kept kernel
+    kept = set((tmp_path / "cache").rglob("*.nbi"))
+    file = tmp_path / "endotsr" / "method" / "kernels" / "exponential.py"
+    text = file.read_text(encoding="utf-8")
+    assert text.count("+ np.float64(1)\n") == 1
+    file.write_text(text.replace("+ np.float64(1)\n", "+ np.float64(3)\n"), encoding="utf-8")
+    u = 0.81 / 1.0001
+    scale = 2.0 ** np.trunc(-u * u / np.log(2))
+    assert answer(tmp_path) - before == 2 * scale
+    assert kept and kept < set((tmp_path / "cache").rglob("*.nbi"))
+
+
+def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_sources(tmp_path):
+    """Numba's own second choice is the folder of the source: a cache that knows nothing of other files."""
+    copy_package(tmp_path)
+    (tmp_path / "no_folder").write_text("a file")
+    done = process(tmp_path, tmp_path / "no_folder")
+    assert float(done.stdout) == answer(tmp_path)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"endotsr: warning: {tmp_path / 'no_folder'}") and "recompiled at every start" in line
+    assert "set NUMBA_CACHE_DIR" in line
+    assert not list((tmp_path / "endotsr").rglob("*.nb?"))
+
+
+def test_every_file_that_compiles_is_under_the_hash():
+    compiling = {file for file in PACKAGE.rglob("*.py") if COMPILES.search(file.read_text(encoding="utf-8"))}
+    assert len(compiling) > 20
+    assert compiling <= set(kernel_sources())

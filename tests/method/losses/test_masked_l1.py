@@ -1,0 +1,87 @@
+"""Masked L1 (B6)."""
+
+import numba
+import numpy as np
+import pytest
+from losses.made_up_images import images, tool_mask
+
+from endotsr.definition import masked_l1 as definition
+from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+
+U32 = 2.0**-24
+
+
+def test_equals_the_definition_and_numpy():
+    rendered, observed = images()
+    mask = tool_mask()
+    loss, saved = masked_l1_forward(rendered, observed, mask)
+    assert loss == pytest.approx(definition.masked_l1_forward(rendered, observed, mask)[0], rel=1e-14)
+    assert loss == pytest.approx(np.abs(rendered - observed)[:, mask].mean(), rel=1e-14)
+    expected = np.where(mask, np.sign(rendered - observed) / (3 * mask.sum()), 0)
+    np.testing.assert_allclose(masked_l1_reverse(2.0, saved), 2 * expected, rtol=1e-15, atol=0)
+
+
+def test_float32_keeps_its_dtype_and_digits():
+    rendered, observed = (a.astype(np.float32) for a in images())
+    loss, saved = masked_l1_forward(rendered, observed, tool_mask())
+    wide, _ = masked_l1_forward(rendered.astype(float), observed.astype(float), tool_mask())
+    assert abs(loss - wide) <= 2 * U32 * 1.0  # one rounding of a difference of size <= 1
+    assert masked_l1_reverse(1.0, saved).dtype == np.float32
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_hard_L6_nothing_under_the_mask_matters(dtype):
+    rendered, observed = (a.astype(dtype) for a in images())
+    mask = tool_mask()
+    loss, saved = masked_l1_forward(rendered, observed, mask)
+    for bad in (np.nan, np.inf, np.finfo(dtype).max):
+        other_loss, other = masked_l1_forward(np.where(mask, rendered, bad), np.where(mask, observed, -bad), mask)
+        assert other_loss == loss
+        assert np.array_equal(masked_l1_reverse(1.0, other), masked_l1_reverse(1.0, saved))
+
+
+def test_hard_L7_equality_has_subgradient_zero():
+    _, observed = images()
+    loss, saved = masked_l1_forward(observed.copy(), observed, tool_mask())
+    assert loss == 0.0
+    assert not masked_l1_reverse(1.0, saved).any()
+
+
+def test_hard_L5_no_tissue_is_zero():
+    rendered, observed = images()
+    loss, saved = masked_l1_forward(rendered, observed, np.zeros(rendered.shape[1:], bool))
+    assert loss == 0.0
+    assert not masked_l1_reverse(1.0, saved).any()
+
+
+def test_one_value_is_an_image():
+    loss, saved = masked_l1_forward(np.full((1, 1, 1), 0.75), np.full((1, 1, 1), 0.25), np.ones((1, 1), bool))
+    assert loss == 0.5
+    assert masked_l1_reverse(3.0, saved) == 3.0
+
+
+def test_nan_on_tissue_is_not_hidden():
+    rendered, observed = images()
+    rendered[0, 0, 0] = np.nan
+    assert np.isnan(masked_l1_forward(rendered, observed, tool_mask())[0])
+
+
+def test_same_bits_for_one_and_two_threads():
+    rendered, observed = (a.astype(np.float32) for a in images((3, 40, 33)))
+    mask = tool_mask((40, 33))
+    found = []
+    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        numba.set_num_threads(threads)
+        loss, saved = masked_l1_forward(rendered, observed, mask)
+        found.append((loss, masked_l1_reverse(1.0, saved)))
+    assert found[0][0] == found[1][0]
+    assert np.array_equal(found[0][1], found[1][1])
+
+
+@pytest.mark.parametrize(
+    "mask", [np.ones((12, 17), np.uint8) * 255, np.ones((12, 16), bool), np.ones((3, 12, 17), bool)]
+)
+def test_refuses_a_mask_that_is_not_boolean_or_does_not_fit(mask):
+    rendered, observed = images()
+    with pytest.raises(ValueError):
+        masked_l1_forward(rendered, observed, mask)

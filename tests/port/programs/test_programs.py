@@ -1,0 +1,38 @@
+"""Existing programs answer the families that they have; a test is skipped where its program is not installed.
+
+ENDOTSR_TORCH_PYTHON names an interpreter that has them, by default this one.
+"""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from endotsr.port.judge.store import golden_folder, read_golden
+
+sys.path.insert(0, str(Path(__file__).parent))
+import survey
+
+PYTHON = os.environ.get("ENDOTSR_TORCH_PYTHON", sys.executable)
+
+
+def test_the_page_is_made_from_the_result():
+    result = json.loads(survey.RESULT.read_text())
+    assert survey.PAGE.read_text() == survey.page(result)
+    assert result["golden"] == read_golden(golden_folder()).manifest.version
+    assert len(result["programs"]) >= 2
+
+
+@pytest.mark.parametrize("file", list(survey.PROGRAMS))
+def test_a_program_passes_what_it_passed_and_deviates_as_it_did(file):
+    name, distribution, _ = survey.PROGRAMS[file]
+    version = survey.version_of(PYTHON, distribution)
+    known = next(p for p in json.loads(survey.RESULT.read_text())["programs"] if p["program"] == name)
+    if version != known["version"]:
+        pytest.skip(f"{name} {known['version']} is not installed (found: {version or 'none'})")
+    report = survey.run(read_golden(golden_folder()), PYTHON, file)
+    assert report is not None
+    found = {row["case"]: (set(row["passed"]), row["named"]) for row in survey.rows_of(report)}
+    assert found == {row["case"]: (set(row["passed"]), row["named"]) for row in known["cases"]}

@@ -1,0 +1,96 @@
+"""Mistakes of a port by hand that no single rewrite of the definition gives: each kind of change finds one of them.
+
+They were written from the port and the specification alone, and none is in the independent set beside that port.
+"""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.search.find import explained, sentences
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "unseen" / "by_hand"))
+import hand_port
+import measure
+
+MISTAKES = {
+    "two numbers of a line": (
+        "matern",
+        "((5 + (length * w) ** 2) / (5 + (length * w.max()) ** 2)) ** 3",
+        "((3 + (length * w) ** 2) / (3 + (length * w.max()) ** 2)) ** 2",
+        "`2` where `3` is right, and `3` where `5` is: equation (4)",
+    ),
+    "a factor at one index": (
+        "covariance", "+ z * (g[1, 0] - g[0, 1]))\n    g_x", "+ z * (g[0, 1] - g[1, 0]))\n    g_x",
+        ("`spin * -1` at [2] where `spin` is right: equation (B2)",  # the product of both is the same
+         "`v * -1` at [2] where `v` is right: equation (B2)"),
+    ),
+    "a factor at one pass of a loop": (
+        "harmonics", "(-K3A * y * (3 * xx - yy), -6 * K3A * x * y,", "(-K3A * y * (3 * xx - yy), -3 * K3A * x * y,",
+        "* 1/2` at row = 9 and c = 3 and axis = 0 where",
+    ),
+    "statements in another order": (
+        "composite", "g_alpha = before * g_alpha", "g_alpha = before * (1 - alpha) * g_alpha",
+        "`rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)` before `passes = ",
+    ),
+    "another expression of the function": (
+        "normalised_depth", "highest = depth[finite].max()", "highest = depth[valid].max()",
+        "`target.valid` where `np.isfinite(rendered_depth)` is right: equation (B8)",
+    ),
+    "one name in a whole statement": (
+        "projection", "[o, fy / z, -fy * y_cut / z**2]", "[o, fx / z, -fx * y_cut / z**2]",
+        "`camera.fx` where `fy` is right: equation (B3)",
+    ),
+    "another convention of samples": (
+        "initialisation", "np.linspace(0, 1, bases)[:, None]", "((np.arange(bases) + 0.5) / bases)[:, None]",
+        "(np.arange(model.bases) + 0.5) / (model.bases)` where `np.linspace(0, 1, model.bases)` is right",
+    ),
+}  # fmt: skip
+SECONDS = 60.0  # the searches end by themselves before
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(golden_folder())
+
+
+def search_on(golden, folder, stage, old, new):
+    """The search on the answers of the port by hand with one edit."""
+    port = hand_port.operations([(old, new)])
+    for case in (case for case in golden.cases if case.operation == stage):
+        found = hand_port.answer(port, stage, golden.inputs(case), case.settings)
+        for name in case.outputs:
+            write_npy(folder / case.name / f"{name}.npy", found[name])
+    return explained(golden, folder, "float64", 3, stage, SECONDS)
+
+
+@pytest.mark.parametrize("kind", MISTAKES)
+def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind):
+    stage, old, new, said = MISTAKES[kind]
+    found = search_on(golden, tmp_path, stage, old, new)
+    text = "\n".join(sentences(found))
+    known = (said,) if isinstance(said, str) else said  # exact words; changes that do the same are found in any order
+    assert any(one in text for one in known) and f"(every output of its {len(found.cases)} cases)" in text
+
+
+def test_none_of_them_is_in_the_independent_set():
+    theirs = [hand_port.sources(entry["edit"]) for entry in measure.mistakes()]
+    assert not any(hand_port.sources([(old, new)]) in theirs for _, old, new, _ in MISTAKES.values())
+
+
+def test_a_change_cannot_write_into_what_the_next_one_starts_from(golden, tmp_path):
+    stage, old, new, _ = MISTAKES["a factor at one index"]
+    one = search_on(golden, tmp_path, stage, old, new).cases[0]
+    with pytest.raises(ValueError, match="read-only"):
+        one.saved[0].quaternion[0] = 1
+    right = one.reverse(_stage(stage), one.inputs, one.saved)
+    assert all((right[name] == one.right[name]).all() for name in right)
+
+
+def _stage(name):
+    from endotsr.port.stages.definition import definition_stages
+
+    return definition_stages()[name]

@@ -1,0 +1,149 @@
+"""The registry of stages: what it says of itself is true, and what does not fit together is refused."""
+
+import importlib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from endotsr.port.contract import all_operations
+from endotsr.port.gradcheck import all_pairs, pair_of
+from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.stages import registry
+from endotsr.port.stages.registry import all_stages
+from endotsr.port.stages.stage import Stage, Variant, real_of, split_blocks
+from makers.registry import JUDGED
+
+STAGES = all_stages()
+OPERATIONS = all_operations()
+STORED = [(case, OPERATIONS[case.operation]) for case in read_golden(golden_folder()).cases]
+
+
+def cubed(inputs, settings):
+    return {"out": settings["factor"] * inputs["x"] ** 3}, settings["factor"] * 3 * inputs["x"] ** 2
+
+
+STAGE = Stage(
+    name="cubed",
+    equation="0",
+    text="a factor times the third power",
+    function="tests.cubed",
+    forward=cubed,
+    reverse=lambda cotangents, saved: {"d_x": cotangents["out"] * saved},
+    variants=(Variant("cubed", lambda rng: {"x": rng.uniform(1, 2, 4)}, {"factor": 2.0}),),
+)
+
+
+@pytest.mark.parametrize("stage", STAGES.values(), ids=lambda stage: stage.name)
+def test_the_function_of_a_stage_exists(stage):
+    dotted = [stage.function, *(variant.function for variant in stage.variants)]
+    for module, _, name in (text.rpartition(".") for text in dotted if text):
+        assert callable(getattr(importlib.import_module(module), name))
+    assert stage.function or not stage.equation
+
+
+@pytest.mark.parametrize("stage", STAGES.values(), ids=lambda stage: stage.name)
+def test_a_stage_is_checked_exactly_if_it_has_a_reverse_pass(stage):
+    assert bool(stage.variants) == (stage.reverse is not None)
+    assert stage.trace is None or stage.variants
+
+
+@pytest.mark.parametrize("stage", [s for s in STAGES.values() if s.variants], ids=lambda stage: stage.name)
+def test_inputs_of_a_check_are_apart_and_their_gradients_are_judged(stage):
+    for variant in stage.variants:
+        inputs = variant.inputs(np.random.default_rng(0))
+        fixed = variant.fixed(np.dtype(np.float64)) if variant.fixed else {}
+        assert not inputs.keys() & fixed.keys()
+        assert {f"d_{name}" for name in inputs} <= JUDGED[stage.name].keys()
+
+
+def test_every_stage_is_judged():
+    assert JUDGED.keys() == OPERATIONS.keys()
+
+
+def test_golden_cases_hold_outputs_of_their_stage_in_order():
+    for case, stage in STORED:
+        assert list(case.outputs) == [name for name in JUDGED[stage.name] if name in case.outputs], case.name
+        assert case.pairs == stage.checks(case.settings), case.name
+
+
+def test_golden_cases_hold_the_unit_that_is_judged():
+    for case, stage in STORED:
+        assert {name: output.unit for name, output in case.outputs.items()} == {
+            name: JUDGED[stage.name][name].unit for name in case.outputs
+        }, case.name
+
+
+def test_gradients_are_answered_where_every_cotangent_is_given():
+    x = np.array([1.0, 2.0])
+    assert set(STAGE.compute({"x": x}, {"factor": 2.0})) == {"out"}
+    found = STAGE.compute({"x": x, "d_out": np.array([1.0, -1.0])}, {"factor": 2.0})
+    np.testing.assert_array_equal(found["d_x"], [6.0, -24.0])
+    loss = STAGE._replace(is_loss=True).compute({"x": np.array(2.0)}, {"factor": 2.0})
+    assert loss["d_x"] == 24.0
+
+
+def test_extra_outputs_are_answered_and_missing_ones_left_out():
+    stage = STAGE._replace(extra=lambda inputs, settings, saved: {"slope": saved, "nothing": None})
+    found = stage.compute({"x": np.array(1.0)}, {"factor": 2.0})
+    assert set(found) == {"out", "slope"} and found["slope"] == 6.0
+
+
+def test_a_pair_holds_settings_and_fixed_inputs():
+    fixed = []
+
+    def weighted(inputs, settings):
+        return {"out": inputs["weight"] * inputs["x"]}, inputs["weight"]
+
+    variant = Variant(
+        "weighted",
+        lambda rng: {"x": np.ones(2)},
+        fixed=lambda dtype: fixed.append(dtype) or {"weight": np.full(2, 3.0, dtype)},
+        covers=lambda settings: settings.get("weighted", False),
+    )
+    stage = STAGE._replace(
+        forward=weighted,
+        reverse=lambda cotangents, saved: {"d_x": saved * cotangents["out"], "d_weight": cotangents["out"]},
+        trace=lambda inputs, settings, saved: {"w": saved},
+        variants=(variant,),
+    )
+    pair = pair_of(stage, variant)
+    one = {"x": np.ones(2, np.float32)}
+    assert pair.forward(one)["out"].dtype == np.float32 and fixed == [np.float32]
+    assert pair.reverse(one, {"out": np.ones(2)}).keys() == {"x"}
+    assert pair.trace is not None and pair.trace(one)["w"][0] == 3.0
+    assert (stage.checks({}), stage.checks({"weighted": True})) == ((), ("weighted",))
+
+
+def test_a_variant_of_a_stage_without_reverse_pass_is_refused():
+    with pytest.raises(ValueError, match="stage cubed has no reverse pass that variant cubed could check"):
+        pair_of(STAGE._replace(reverse=None), STAGE.variants[0])
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [(STAGE, "stage cubed is registered twice"), (STAGE._replace(name="b"), "variant cubed is registered twice")],
+)
+def test_a_name_is_registered_once(monkeypatch, other, message):
+    monkeypatch.setattr(registry, "STAGE_MODULES", ("one",))
+    monkeypatch.setattr(importlib, "import_module", lambda name: SimpleNamespace(STAGES=[STAGE, other]))
+    with pytest.raises(ValueError, match=message):
+        all_stages()
+
+
+def test_the_checks_are_the_variants_in_the_order_of_the_specification():
+    assert list(all_pairs()) == [variant.name for stage in STAGES.values() for variant in stage.variants]
+    labels = [pair.equation for pair in all_pairs().values()]
+    order = ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10)), "B13", "B16", "6"]
+    assert list(dict.fromkeys(labels)) == order
+
+
+def test_blocks_of_some_inputs_and_the_others_whole():
+    blocks = split_blocks({"x": {"x first": slice(0, 1), "x rest": slice(1, None)}})
+    found = blocks({"x": np.zeros(3), "y": np.zeros(2)})
+    assert found == {"x first": ("x", slice(0, 1)), "x rest": ("x", slice(1, None)), "y": ("y", ...)}
+
+
+def test_the_precision_of_a_request_is_that_of_its_first_real_input():
+    assert real_of({"mask": np.ones(2, bool), "x": np.ones(2, np.float32)}) == np.float32
+    assert real_of({"mask": np.ones(2, bool)}) == np.float64

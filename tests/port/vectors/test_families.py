@@ -1,0 +1,60 @@
+"""Every family holds its operations, cases and mistakes together, and the published order is kept."""
+
+import msgspec
+import pytest
+
+from endotsr.port.contract import all_operations
+from endotsr.port.judge.format import Manifest, read_struct
+from endotsr.port.judge.store import golden_folder
+from makers import registry
+from makers.files import rendered_files
+from makers.generate import solve_these
+from makers.registry import FAMILIES, all_specs, all_wrong_ports, families
+from makers.wrong import wrong_ports
+
+PUBLISHED = read_struct(golden_folder() / "manifest.json", Manifest)
+
+
+@pytest.mark.parametrize("family", families(), ids=FAMILIES)
+def test_a_family_has_cases_and_mistakes_of_its_own_operations(family):
+    assert {spec.operation for spec in family.cases()} == set(family.OPERATIONS)
+    for wrong_port in wrong_ports(family.__name__.removeprefix("makers.")):
+        assert set(wrong_port.operations) <= set(all_operations()), wrong_port.flag
+        assert set(wrong_port.operations) & set(family.OPERATIONS), f"{wrong_port.flag} breaks no rule of this family"
+
+
+def test_every_operation_is_in_a_family():
+    assert {name for family in families() for name in family.OPERATIONS} == set(all_operations())
+
+
+def test_the_cases_are_those_of_the_manifest():
+    published = {f"{family}/{case}" for family, cases in PUBLISHED.families.items() for case in cases}
+    assert {spec.name for spec in all_specs()} == published
+
+
+def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):
+    monkeypatch.setattr(registry, "FAMILIES", ("motion", "motion"))
+    with pytest.raises(ValueError, match="a golden case is named twice"):
+        all_specs()
+    with pytest.raises(ValueError, match="motion_cosines_dropped is named twice"):
+        all_wrong_ports()
+
+
+@pytest.mark.slow
+def test_what_is_published_keeps_its_place_and_what_is_new_follows():
+    """Files, flags and mistakes, for a manifest that lists one of two cases of `laplacian` and two flags."""
+    three = ("motion/generic", "laplacian/co_sited", "laplacian/tiny")
+    ports = [port for family in ("motion", "laplacian") for port in wrong_ports(family)]
+    solved = solve_these([spec for spec in all_specs() if spec.name in three],
+                         [port for port in ports if not set(port.operations) & {"masked_l1"}])  # fmt: skip
+    names = ("laplacian/tiny", "motion/generic")
+    files = tuple(next(f for f in PUBLISHED.files if f.path == f"cases/{name}/case.json") for name in names)
+    flags = {flag: PUBLISHED.flags[flag] for flag in ("upsampling_swapped", "mask_before_pyramid")}
+    before = msgspec.structs.replace(PUBLISHED, files=files, flags=flags)
+    fresh = rendered_files(solved, all_wrong_ports(), "1.0.0", before)
+    manifest = msgspec.json.decode(fresh["manifest.json"], type=Manifest)
+    assert manifest.families == {"laplacian": ("tiny", "co_sited"), "motion": ("generic",)}
+    assert list(manifest.flags)[:2] == list(flags) and set(manifest.flags) == set(all_wrong_ports())
+    case = msgspec.json.decode(fresh["cases/laplacian/co_sited/case.json"])
+    assert list(case["mistakes"])[:2] == ["upsampling_swapped", "mask_before_pyramid"]
+    assert next(iter(fresh)).startswith("cases/laplacian/tiny/")

@@ -1,0 +1,266 @@
+"""The vectors themselves: complete, small, rebuilt from their recipes, and every changed byte is noticed."""
+
+import re
+import shutil
+from typing import get_args, get_type_hints
+
+import msgspec
+import numpy as np
+import pytest
+
+import make
+from endotsr.errors import InputError
+from endotsr.method.splatting.fast.blocks import supports
+from endotsr.port.contract import all_operations
+from endotsr.port.gradcheck import all_pairs
+from endotsr.port.judge.format import FLIP_BUDGET, SCHEMAS, Rule, schema_text
+from endotsr.port.judge.npy import npy_bytes
+from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.judge.words import fnv1a, words
+from endotsr.port.reference import reference
+from endotsr.port.stages.requests import raster_of
+from makers.generate import check, moved, solve_all
+from makers.making import single
+from makers.solve import MARGIN
+
+FOLDER = golden_folder()
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(FOLDER)
+
+
+@pytest.mark.slow
+def test_the_folder_equals_a_fresh_computation():
+    lines, summary = check(FOLDER, bitwise=False)
+    assert not lines, (summary, lines[:10])
+
+
+WHOLE = ("objective", "render_exact", "render_paper", "render_blocks")  # what level 3 is about
+
+
+@pytest.mark.parametrize("pair", list(all_pairs()))
+def test_every_registered_pair_has_a_case_forward_and_in_reverse(pair, golden):
+    levels = (3,) if pair in WHOLE else (1, 2)
+    outputs = [(n, o.level) for case in golden.cases if pair in case.pairs for n, o in case.outputs.items()]
+    forward = {level for name, level in outputs if not name.startswith("d_")}
+    reverse = {level for name, level in outputs if name.startswith("d_")}
+    assert levels[0] in forward and levels[-1] in reverse
+
+
+def test_no_case_names_a_pair_that_does_not_exist(golden):
+    assert {pair for case in golden.cases for pair in case.pairs} == set(all_pairs())
+
+
+def test_every_operation_and_level_has_a_case(golden):
+    assert {case.operation for case in golden.cases} == set(all_operations())
+    assert {o.level for case in golden.cases for o in case.outputs.values()} == {0, 1, 2, 3, 4, 5}
+
+
+def test_the_choices_of_the_method_are_all_there(golden):
+    def chosen(*keys):
+        found = set()
+        for case in golden.cases:
+            value = case.settings
+            for key in keys:
+                value = value.get(key) if isinstance(value, dict) else None
+            found.add(value)
+        return found - {None}
+
+    assert chosen("basis") == {"quartic", "gaussian"}
+    assert chosen("upsampling") == chosen("loss", "upsampling") == {"co_sited", "half_pixel"}
+    assert chosen("degree") == {0, 1, 2, 3}
+    assert chosen("raster", "support") == {"everywhere", "ellipse", "three_sigma_tiles"}
+
+
+def test_the_folder_is_small():
+    assert sum(p.stat().st_size for p in FOLDER.rglob("*") if p.is_file()) < 10_000_000
+
+
+def test_raw_reading_needs_no_header(golden):
+    for entry in golden.manifest.files:
+        if entry.offset is None:
+            continue
+        raw = (FOLDER / entry.path).read_bytes()[entry.offset :]
+        assert entry.dtype is not None and entry.shape is not None
+        array = np.frombuffer(raw, entry.dtype).reshape(entry.shape)
+        assert npy_bytes(array) == (FOLDER / entry.path).read_bytes()
+
+
+def test_numpy_reads_the_files_to_the_same_arrays(golden):
+    for case in golden.cases[::7]:
+        for name, output in case.outputs.items():
+            path = FOLDER / "cases" / case.name / output.file
+            loaded = np.load(path, allow_pickle=False)
+            assert np.array_equal(loaded, golden.array(case, output.file)), name
+
+
+def test_real_inputs_are_float32_numbers(golden):
+    for case in golden.cases:
+        for array in case.inputs.values():
+            value = golden.array(case, array.file)
+            if array.dtype == "real":
+                assert np.array_equal(value, single(value), equal_nan=True), (case.name, array.file)
+
+
+def test_uniform_inputs_are_rebuilt_with_integers_alone(golden):
+    """The generator written once more, in Python integers, from the text of the README."""
+    rebuilt = 0
+    for case in golden.cases:
+        for array in case.inputs.values():
+            recipe = re.fullmatch(r"uniform\((.+), (.+)\) seed (\S+)", array.recipe)
+            if not recipe:
+                continue
+            seed = 0xCBF29CE484222325
+            for byte in recipe[3].encode():
+                seed = (seed ^ byte) * 0x100000001B3 % 2**64
+            value, low, high = [], float(recipe[1]), float(recipe[2])
+            for k in range(int(np.prod(array.shape))):
+                z = (seed + (k + 1) * 0x9E3779B97F4A7C15) % 2**64
+                z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9 % 2**64
+                z = (z ^ z >> 27) * 0x94D049BB133111EB % 2**64
+                z ^= z >> 31
+                value.append(low + (high - low) * ((z >> 40) / 2**24))
+            wanted = np.float32(np.array(value)).reshape(array.shape)
+            assert np.array_equal(golden.array(case, array.file), wanted), (case.name, array.file)
+            rebuilt += 1
+    assert rebuilt > 100
+
+
+def test_first_words_of_splitmix64():
+    """Published first outputs of splitmix64 for seed 1234567."""
+    assert words(1234567, 3).tolist() == [6457827717110365317, 3203168211198807973, 9817491932198370423]
+    assert fnv1a("a") == 0xAF63DC4C8601EC8C
+
+
+def test_tolerances_lie_far_below_the_mistakes(golden):
+    for case in golden.cases:
+        for flag in case.flags:
+            shown = case.mistakes[flag].shown("float32")
+            assert any(
+                one.distance is None
+                or case.outputs[name].compare.kind in ("exact", "identical", FLIP_BUDGET)
+                or one.distance >= 0.99 * MARGIN * case.outputs[name].compare.float32
+                for name, one in shown.items()
+            ), (case.name, flag)
+        for name, output in case.outputs.items():
+            if output.because is not None:
+                smallest = output.because.smallest_mutant
+                assert (
+                    smallest is None
+                    or output.compare.kind in (FLIP_BUDGET, "identical")
+                    or (output.compare.float64 <= output.compare.float32 <= 1.01 * smallest / MARGIN)
+                ), (case.name, name)
+                assert output.compare.float32 >= output.because.spread_float32, (case.name, name)
+                assert output.compare.float64 >= output.because.spread_float64, (case.name, name)
+
+
+RASTERISED = ("composite", "render", "objective")
+
+
+def test_no_decision_hangs_on_rounding(golden):
+    """Thresholds moved by 1e-5 either way leave every image as it is, but in the case that stands on the cutoff."""
+    operations = all_operations()
+    for case in golden.cases:
+        if case.operation not in RASTERISED or case.case in ("on_the_cutoff", "one_on_the_cutoff"):
+            continue
+        inputs = {name: golden.array(case, a.file) for name, a in case.inputs.items()}
+        for factor in (1 - 1e-5, 1 + 1e-5):
+            moved_to = {name: case.settings["raster"][name] * factor
+                        for name in ("alpha_cutoff", "transmittance_stop", "near")}  # fmt: skip
+            settings = case.settings | {"raster": case.settings["raster"] | moved_to}
+            found = reference(operations[case.operation], inputs, settings, "float64", "definition")
+            for name in ("colour_image", "depth_image"):
+                expected = golden.array(case, case.outputs[name].file)
+                assert np.abs(found[name] - expected).max() < 1e-6, (case.name, name)
+
+
+def test_no_densification_hangs_on_rounding(golden):
+    """Thresholds moved by 1e-5 leave every decision as it is; what stands exactly on one counts, as it should."""
+    operation = all_operations()["density"]
+    for case in golden.cases:
+        if case.operation != "density":
+            continue
+        inputs = {name: golden.array(case, a.file) for name, a in case.inputs.items()}
+        ups = ("prune_opacity", "dense_fraction") if case.case != "on_the_thresholds" else ()
+        for moved_to in ({n: case.settings["density"][n] * f for n in ups} | {"gradient_threshold": 0.25 * (1 - 1e-5)}
+                         for f in (1 - 1e-5, 1 + 1e-5)):  # fmt: skip
+            settings = case.settings | {"density": case.settings["density"] | moved_to}
+            found = reference(operation, inputs, settings, "float64", "definition")
+            for name in ("pruned", "cloned", "split", "parent"):
+                assert np.array_equal(found[name], golden.array(case, case.outputs[name].file)), (case.name, name)
+
+
+def test_the_contract_explains_every_operation_and_rule(golden):
+    text = (FOLDER / "README.md").read_text()
+    kinds = {o.compare.kind for case in golden.cases for o in case.outputs.values()}
+    assert kinds == set(get_args(get_type_hints(Rule)["kind"]))
+    assert [word for word in kinds | set(all_operations()) if f"`{word}`" not in text] == []
+
+
+def test_schemas_describe_the_files():
+    for name, kind in SCHEMAS.items():
+        assert (FOLDER / "schemas" / f"{name}.schema.json").read_text() == schema_text(kind)
+    assert "$ref" in schema_text(SCHEMAS["case"]) and msgspec.json.decode(schema_text(SCHEMAS["case"]))
+
+
+@pytest.fixture
+def copy(tmp_path):
+    target = tmp_path / "golden"
+    shutil.copytree(FOLDER, target)
+    return target
+
+
+def test_the_manifest_has_the_checksum_of_every_generated_file(golden):
+    there = {p.relative_to(FOLDER).as_posix() for r in ("cases", "schemas") for p in (FOLDER / r).rglob("*.*")}
+    assert {entry.path for entry in golden.manifest.files} == there | {"negative/flags.json"}
+
+
+def test_one_changed_byte_is_noticed(copy):
+    for entry in read_golden(copy, verify=False).manifest.files[::97]:
+        path = copy / entry.path
+        data = bytearray(path.read_bytes())
+        data[-1] ^= 1
+        path.write_bytes(data)
+        with pytest.raises(InputError, match="checksum"):
+            read_golden(copy)
+        data[-1] ^= 1
+        path.write_bytes(data)
+    read_golden(copy)
+
+
+def test_a_missing_file_is_noticed(copy):
+    (copy / "cases/motion/generic/expected/translation.npy").unlink()
+    with pytest.raises(InputError, match="incomplete"):
+        read_golden(copy)
+
+
+def test_regeneration_says_what_moved(copy):
+    one = next(s for s in solve_all(mistakes=False) if s.case.name == "motion/generic")
+    assert moved(copy, one) == []
+    path = copy / "cases/motion/generic/expected/translation.npy"
+    path.write_bytes(npy_bytes(one.expected[0]["translation"] * 1.001))
+    (line,) = moved(copy, one)
+    assert line.startswith("motion/generic/translation: ") and "e-0" in line and "tolerance" not in line
+
+
+@pytest.mark.slow
+def test_writing_ends_with_exit_code_1(copy):
+    (copy / "cases/motion/generic/expected/translation.npy").unlink()
+    assert make.main(["write", "--golden", str(copy)]) == 1
+    assert make.main(["check", "--golden", str(copy)]) == 0
+
+
+@pytest.mark.parametrize("operation", ["composite", "render"])
+def test_the_reference_answers_by_two_paths(golden, operation):
+    """They differ in their last bits; a name that no path has is refused."""
+    cases = [case for case in golden.cases if case.operation == operation]
+    case = next(case for case in cases if supports(raster_of(case.settings)))
+    inputs = {name: golden.array(case, array.file) for name, array in case.inputs.items()}
+    answers = [
+        reference(all_operations()[operation], inputs, case.settings, "float32", p) for p in ("definition", "blocks")
+    ]
+    assert any(answers[0][name].tobytes() != answers[1][name].tobytes() for name in answers[0])
+    with pytest.raises(ValueError, match="'rows' is not known; allowed: definition, blocks"):
+        reference(all_operations()[operation], inputs, case.settings, "float32", "rows")

@@ -1,0 +1,139 @@
+"""The evaluation dictionary: right frames, right means, valid JSON whatever happens."""
+
+import json
+
+import numpy as np
+import pytest
+from made_up_sequence import made_up
+
+from data_folder import data_folder
+from endotsr.results.evaluation import evaluate
+from endotsr.results.evaluation.baselines import two_neighbours, unit_image
+
+
+@pytest.fixture
+def sequence():
+    rng = np.random.default_rng(5)
+    still = rng.integers(60, 180, (3, 24, 32))
+    images = np.stack([np.clip(still + 4 * i + rng.integers(-3, 4, still.shape), 0, 255) for i in range(12)])
+    masks = np.ones((12, 24, 32), bool)
+    masks[:, :, :5] = False
+    return made_up(images.astype(np.uint8), [1, 9], masks)
+
+
+def strict(data):
+    """Through JSON, where NaN and Infinity are errors."""
+    return json.loads(json.dumps(data, allow_nan=False))
+
+
+def test_constant_error_gives_the_known_decibels(sequence):
+    result = evaluate.evaluate_frames(sequence, [1, 9], lambda i: unit_image(sequence, i) + np.float32(0.1))
+    share = sequence.masks[1].mean()
+    assert result["mean"]["psnr_tissue"] == pytest.approx(20.0, abs=1e-4)
+    assert result["mean"]["psnr_full"] == pytest.approx(20.0 - 10 * np.log10(share), abs=1e-4)
+    assert [row["frame"] for row in result["per_frame"]] == [1, 9]
+    assert result["per_frame"][1]["name"] == "frame-000009.png"
+    assert result["per_frame"][1]["time"] == pytest.approx(9 / 12)
+
+
+def test_mean_is_the_mean_of_the_frames(sequence):
+    noise = {1: 0.01, 9: 0.05}
+    result = evaluate.evaluate_frames(sequence, [1, 9], lambda i: unit_image(sequence, i) + np.float32(noise[i]))
+    first, second = (row["psnr_tissue"] for row in result["per_frame"])
+    assert first == pytest.approx(40, abs=0.01)
+    assert result["mean"]["psnr_tissue"] == pytest.approx((first + second) / 2)
+
+
+def test_without_weights_lpips_is_null_with_a_reason(sequence):
+    result = strict(evaluate.evaluate_model(sequence, lambda i: two_neighbours(sequence, i)))
+    assert result["lpips_reason"].startswith("no LPIPS weights")
+    for row in (result["held_out"], result["training"], *result["baselines"].values()):
+        assert row["mean"]["lpips"] is None and row["mean"]["lpips_symmetric"] is None
+
+
+def test_perfect_render_is_null_and_counted(sequence):
+    result = evaluate.evaluate_frames(sequence, [1, 9], lambda i: unit_image(sequence, i))
+    assert result["mean"]["psnr_full"] is None and result["mean"]["psnr_tissue"] is None
+    assert result["not_finite"] == 8 and result["excluded"]["psnr_full"] == result["excluded"]["psnr_tissue_8bit"] == 2
+    assert result["mean"]["ssim_full"] == pytest.approx(1.0)
+    strict(result)
+
+
+def test_render_that_is_not_finite_does_not_reach_the_json(sequence):
+    def render(index):
+        image = unit_image(sequence, index) + np.float32(0.1)
+        if index == 9:
+            image[1, 4, 8] = np.nan
+        return image
+
+    result = evaluate.evaluate_frames(sequence, [1, 9], render)
+    strict(result)
+    assert result["per_frame"][1]["psnr_tissue"] is None
+    assert result["mean"]["psnr_tissue"] == pytest.approx(20.0, abs=1e-4)
+    assert result["not_finite"] > 0
+
+
+def test_an_empty_mask_has_no_tissue_value(sequence):
+    sequence.masks[9] = False
+    result = evaluate.evaluate_frames(sequence, [1, 9], lambda i: unit_image(sequence, i) + np.float32(0.1))
+    assert result["per_frame"][1]["psnr_tissue"] is None
+    assert result["mean"]["psnr_tissue"] == pytest.approx(20.0, abs=1e-4)
+    strict(result)
+
+
+def test_render_of_a_wrong_size_is_refused(sequence):
+    with pytest.raises(ValueError, match=r"frame 1: the render is \(3, 5, 5\)"):
+        evaluate.evaluate_frames(sequence, [1], lambda i: np.zeros((3, 5, 5)))
+
+
+def test_no_frames_have_no_mean(sequence):
+    result = evaluate.evaluate_frames(sequence, [], lambda i: unit_image(sequence, i))
+    assert result["per_frame"] == [] and result["mean"] == {}
+
+
+def test_training_frames_stand_beside_the_held_out_ones(sequence):
+    asked = []
+
+    def render(index):
+        asked.append(index)
+        return unit_image(sequence, index) + np.float32(0.1 if index in (1, 9) else 0.01)
+
+    result = strict(evaluate.evaluate_model(sequence, render, training=[0, 4]))
+    assert asked == [1, 9, 0, 4]
+    assert result["temporal_gap"]["psnr_tissue"] == pytest.approx(20.0, abs=0.01)
+    assert result["frames"] == {
+        "total": 12,
+        "training": 10,
+        "held_out": [1, 9],
+        "training_sample": [0, 4],
+        "tissue_fraction": pytest.approx(27 / 32),
+    }
+
+
+def test_training_sample_takes_training_frames_only(sequence):
+    assert evaluate.training_sample(sequence) == [0, 7]
+
+
+def test_baseline_rows_rank_as_the_data_says(sequence):
+    """Brightness rises linearly: the two-neighbour blend beats the copy, the copy beats the mean over time."""
+    table = evaluate.baseline_table(sequence)
+    assert list(table) == ["temporal_mean", "nearest_frame", "two_neighbours", "flow_interpolation"]
+    values = [table[k]["mean"]["psnr_tissue"] for k in ("temporal_mean", "nearest_frame", "two_neighbours")]
+    assert values == sorted(values) and values[2] > values[1] + 1
+    assert all(len(row["per_frame"]) == 2 and row["label"] for row in table.values())
+    strict(table)
+
+
+@pytest.mark.data
+def test_known_row_on_pulling_with_lpips():
+    from endotsr.clips.sequences.endonerf import read_endonerf
+    from endotsr.config import SequenceConfig
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+
+    sequence = read_endonerf(data_folder("endonerf_pulling"), SequenceConfig())
+    weights = load_lpips_weights(data_folder("lpips_alex") / "lpips_alex_v0_1.npz")
+    result = evaluate.evaluate_frames(sequence, sequence.test_index, lambda i: two_neighbours(sequence, i), weights)
+    assert result["mean"]["psnr_full"] == pytest.approx(40.51, abs=0.01)
+    assert result["mean"]["psnr_tissue"] == pytest.approx(38.73, abs=0.01)
+    assert result["mean"]["lpips"] == pytest.approx(0.0177, abs=2e-4)
+    assert result["mean"]["lpips_symmetric"] == pytest.approx(0.0248, abs=2e-4)

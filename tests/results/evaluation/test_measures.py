@@ -1,0 +1,209 @@
+"""Depth, flicker and the right view: made-up renders with known errors."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from data_folder import data_folder
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.simulator.folder import write_sequence
+from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.render import RenderOut
+from endotsr.results.evaluation.depth import held_out_depth
+from endotsr.results.evaluation.measures import MEASURES, flicker, measure_lines, measured
+from endotsr.results.evaluation.right_view import moved_left, right_camera, right_view, stereo_baseline
+
+LEVEL = np.float32(1 / 255)
+
+
+def sequence_of(images: np.ndarray, depth: float = 50.0, static: bool = True) -> Sequence:
+    """Frames (n, 3, H, W) uint8 of resting tissue at one depth; frames 1 and 5 are held out."""
+    n, _, height, width = images.shape
+    camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, width / 2, height / 2, width, height)
+    test = np.array([1, 5])
+    return Sequence(
+        images, np.ones((n, height, width), bool), np.full((n, height, width), depth, np.float32), np.arange(n) / n,
+        [camera] * n, [f"f{i}" for i in range(n)], "mm", static, np.setdiff1d(np.arange(n), test), test,
+    )  # fmt: skip
+
+
+def textured(noise: float, n: int = 9, size: int = 64) -> np.ndarray:
+    """Smooth strong texture that rests, with camera noise of a standard deviation in grey levels."""
+    rng = np.random.default_rng(2)
+    y, x = np.indices((size, size)) / size
+    still = 128 + 50 * np.sin(19 * x + 3 * y) * np.cos(23 * y)
+    frames = still + noise * rng.standard_normal((n, 3, size, size))
+    return np.clip(np.rint(frames), 0, 255).astype(np.uint8)
+
+
+def render_of(colour: np.ndarray, depth: float = 50.0, opacity: float = 1.0) -> RenderOut:
+    shape = colour.shape[1:]
+    flat = lambda value: np.full(shape, value, np.float32)
+    return RenderOut(colour.astype(np.float32), flat(depth * opacity), flat(opacity))
+
+
+def rows_of(found: dict) -> dict[str, dict]:
+    return {row["label"]: row for row in found["rows"]}
+
+
+def test_depth_is_divided_by_opacity_and_compared_with_the_prior():
+    sequence = sequence_of(textured(0.0))
+    sequence.depth[5] = 60.0  # held out: its neighbours have 50
+    sequence.depth[1, :8] = 0.0  # no prior
+    sequence.masks[1, :, :8] = False
+    found = rows_of(held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 52.0, 0.8)))
+    counted = np.array([56 * 56, 64 * 64])
+    model, blend = found["this model"], found["blend of the neighbouring priors"]
+    assert model["mean_absolute"] == pytest.approx(np.average([2.0, 8.0], weights=counted), rel=1e-6)
+    assert model["root_mean_square"] == pytest.approx(np.sqrt(np.average([4.0, 64.0], weights=counted)), rel=1e-6)
+    assert model["relative"] == pytest.approx(np.average([2 / 50, 8 / 60], weights=counted), rel=1e-6)
+    assert blend["mean_absolute"] == pytest.approx(np.average([0.0, 10.0], weights=counted))
+    assert model["covered"] == 1.0
+
+
+def test_errors_of_depth_are_those_of_pixels_that_every_row_covers():
+    sequence = sequence_of(textured(0.0))
+    sequence.depth[[0, 2], :32] = 0.0  # no neighbouring prior in half of frame 1
+    found = rows_of(held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 53.0)))
+    assert found["this model"]["mean_absolute"] == pytest.approx(3.0)
+    assert found["this model"]["covered"] == 1.0
+    assert found["blend of the neighbouring priors"]["covered"] == pytest.approx(0.75)
+
+
+def test_a_render_of_background_has_no_depth():
+    sequence = sequence_of(textured(0.0))
+    found = held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 50.0, 0.3))
+    assert found == {"reason": "no held-out frame has a prior depth on tissue"}
+
+
+def test_flicker_of_noise_is_its_standard_deviation_and_that_of_a_still_render_is_zero():
+    sequence = sequence_of(textured(3.0))
+    still = textured(0.0)[0] * LEVEL
+    found = rows_of(flicker(sequence, lambda i, camera: render_of(still)))
+    assert found["the recorded frames"]["all_frames"] == pytest.approx(3.0, rel=0.05)
+    assert found["this model"] == {"label": "this model", "all_frames": 0.0, "held_out": 0.0}
+
+
+def test_a_model_that_jumps_at_held_out_times_is_seen_there():
+    sequence = sequence_of(textured(0.0))
+    still = textured(0.0)[0] * LEVEL
+    found = rows_of(flicker(sequence, lambda i, camera: render_of(still + 6 * LEVEL * (i in (1, 5)))))
+    assert found["this model"]["held_out"] == pytest.approx(2 * 6 / np.sqrt(6), rel=1e-4)
+    assert 0 < found["this model"]["all_frames"] < found["this model"]["held_out"]
+
+
+def test_a_steady_change_of_light_is_no_flicker():
+    sequence = sequence_of(textured(0.0))
+    still = textured(0.0)[0] * LEVEL * np.float32(0.5)
+    found = rows_of(flicker(sequence, lambda i, camera: render_of(still + i * LEVEL)))
+    assert found["this model"]["all_frames"] < 1e-4
+
+
+def test_flicker_needs_a_resting_camera_and_resting_tissue():
+    render = lambda i, camera: render_of(np.zeros((3, 64, 64)))
+    assert "camera moves" in flicker(sequence_of(textured(0.0), static=False), render)["reason"]
+    moving = np.stack([np.roll(textured(0.0)[0], 4 * i, axis=2) for i in range(9)])
+    assert "static pixels" in flicker(sequence_of(moving), render)["reason"]
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """A simulated stereo sequence in a folder, and its settings."""
+    folder = tmp_path_factory.mktemp("pair")
+    size = SimulatorSettings(width=128, height=96, frames=9)
+    settings = with_effects(size, "stereo", "depth_rounding", "instrument")
+    write_sequence(folder, settings)
+    return folder, read_endonerf(folder, SequenceConfig()), settings
+
+
+def right_pictures(folder):
+    files = sorted((folder / "images_right").iterdir())
+    return lambda i: read_png(files[i]).transpose(2, 0, 1)
+
+
+def test_the_baseline_of_a_pair_follows_from_disparity_and_depth(pair):
+    folder, sequence, settings = pair
+    found = stereo_baseline(sequence, right_pictures(folder))
+    assert found is not None
+    assert found[0] == pytest.approx(settings.stereo.baseline, rel=0.05) and found[1] < 0.15
+
+
+def test_the_true_right_view_is_better_than_the_moved_left_picture_and_that_than_the_unmoved(pair):
+    folder, sequence, settings = pair
+    right, asked = right_pictures(folder), []
+
+    def render(index, camera):
+        asked.append(camera)
+        return render_of(right(index) * LEVEL + np.float32(0.01))
+
+    found = right_view(sequence, str(folder), SequenceConfig(), render)
+    rows = rows_of(found)
+    assert rows["this model"]["held_out_psnr"] == pytest.approx(40.0, abs=0.5)  # a constant error of 0.01
+    order = [rows[label]["held_out_psnr"] for label in rows]
+    assert list(rows) == ["this model", "left picture moved by the prior depth", "left picture as it is"]
+    assert order == sorted(order, reverse=True) and order[1] > order[2] + 1
+    assert asked[0].translation[0] == pytest.approx(-settings.stereo.baseline, rel=0.05)
+    assert rows["this model"]["training_psnr"] == pytest.approx(40.0, abs=0.5)
+
+
+def test_the_instrument_does_not_count_in_the_right_view(pair):
+    _, sequence, settings = pair
+    moved = moved_left(sequence, 4, settings.stereo.baseline)
+    assert 0.2 < moved.counted.mean() < sequence.masks[4].mean()
+    none = moved_left(sequence_of(textured(0.0), depth=0.0), 0, 4.0)
+    assert not none.counted.any()
+
+
+def test_excluded_pixels_are_moved_with_the_tissue():
+    sequence = sequence_of(textured(0.0))
+    sequence.masks[0, 20:40, 30:50] = False
+    counted = moved_left(sequence, 0, 5.0).counted  # f B / z = 6 px
+    assert not counted[20:40, 24:44].any()
+    assert counted[5:15, 5:50].all() and counted[25:35, 5:20].all()
+
+
+def test_the_right_camera_stands_to_the_right():
+    camera = Camera(np.eye(3), np.array([0.0, 0.0, 5.0]), 60.0, 60.0, 32, 32, 64, 64)
+    from endotsr.method.splatting.camera import project
+
+    point = np.array([[0.0], [0.0], [45.0]])
+    left, right = project(camera, point)[0], project(right_camera(camera, 4.0), point)[0]
+    assert float(left[0] - right[0]) == pytest.approx(60.0 * 4.0 / 50.0)  # disparity f B / z
+
+
+def test_without_a_right_picture_there_is_a_reason(tmp_path):
+    sequence = sequence_of(textured(0.0))
+    found = right_view(sequence, str(tmp_path), SequenceConfig(), lambda i, camera: pytest.fail("rendered"))
+    assert "no images_right/" in found["reason"]
+
+
+def test_a_pair_without_one_baseline_is_not_measured(pair):
+    folder, sequence, _ = pair
+    wrong = msgspec.structs.replace(SequenceConfig(), scale=1.0)
+    rng = np.random.default_rng(1)
+    sequence = read_endonerf(folder, wrong)
+    sequence.depth[:] = np.where(sequence.depth > 0, rng.uniform(20, 200, sequence.depth.shape), 0)
+    found = right_view(sequence, str(folder), wrong, lambda i, camera: pytest.fail("rendered"))
+    assert "give no consistent baseline" in found["reason"]
+
+
+def test_unknown_measures_are_refused_and_lines_are_plain():
+    with pytest.raises(InputError, match=f"allowed: {', '.join(MEASURES)}"):
+        measured(["beauty"], None, None, "")  # pyright: ignore[reportArgumentType]
+    lines = measure_lines(
+        {"depth": {"unit": "mm", "rows": [{"label": "this model", "covered": 0.5}]}, "flicker": {"reason": "no"}}
+    )
+    assert lines == ["depth: this model: covered 0.5", "flicker: not measured: no"]
+
+
+@pytest.mark.data
+def test_the_pair_of_endonerf_is_calibrated():
+    folder = data_folder("endonerf_pulling")
+    sequence = read_endonerf(folder, SequenceConfig(frames="0:9"))
+    found = stereo_baseline(sequence, right_pictures(folder))
+    assert found is not None and found[0] > 0 and found[1] < 0.15

@@ -1,0 +1,165 @@
+"""Pictures of any method, paired with the frames and measured as the baselines are."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from endotsr.clips.opencv import write_png
+from endotsr.clips.sequences.film_file import write_video
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.errors import InputError
+from endotsr.results.evaluation.baselines import BASELINES, flow_interpolation
+from endotsr.results.evaluation.metrics import round_8bit
+from endotsr.results.evaluation.pictures import find_pictures, measure_pictures, read_picture
+
+HELD_OUT = [1, 9]
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    found = simulate(SimulatorSettings(width=48, height=32, frames=12)).sequence
+    assert list(found.test_index) == HELD_OUT
+    return found
+
+
+def bytes_of(picture):
+    """(3, H, W) in display units as the pixels of an 8-bit file."""
+    return (round_8bit(picture) * 255 + 0.5).astype(np.uint8).transpose(1, 2, 0)
+
+
+def write_folder(folder, names):
+    folder.mkdir(parents=True, exist_ok=True)
+    for k, name in enumerate(names):
+        if name.endswith(".npy"):
+            np.save(folder / name, np.full((3, 32, 48), k / 10, np.float32))
+        else:
+            write_png(folder / name, np.full((32, 48, 3), k, np.uint8))
+    return folder
+
+
+@pytest.mark.parametrize("baseline", BASELINES)
+def test_float_pictures_of_a_baseline_equal_its_row_to_the_last_digit(baseline, sequence, tmp_path):
+    make = BASELINES[baseline][1](sequence)
+    for i in HELD_OUT:
+        np.save(tmp_path / f"{sequence.names[i]}.npy", make(i))
+    found = measure_pictures(find_pictures(tmp_path, sequence), sequence)
+    row = found["baselines"][baseline]
+    assert found["held_out"] == {key: row[key] for key in found["held_out"]}
+
+
+def test_8bit_pictures_of_the_flow_equal_the_8bit_columns_of_its_row(sequence, tmp_path):
+    for i in HELD_OUT:
+        write_png(tmp_path / f"{sequence.names[i]}.png", bytes_of(flow_interpolation(sequence, i)))
+    found = measure_pictures(find_pictures(tmp_path, sequence), sequence)
+    rows = zip(found["held_out"]["per_frame"], found["baselines"]["flow_interpolation"]["per_frame"])
+    for ours, row in rows:
+        for key in ("psnr_full_8bit", "psnr_tissue_8bit", "ssim_full_8bit", "ssim_tissue_8bit"):
+            assert ours[key] == row[key]
+        assert ours["psnr_full"] == pytest.approx(row["psnr_full_8bit"], abs=1e-4)
+
+
+@pytest.mark.parametrize("frames", [HELD_OUT, list(range(12))])
+def test_a_video_of_renders_is_measured(frames, sequence, tmp_path):
+    """Without loss in the file, the numbers are those of the same pictures as PNG."""
+    shown = {i: bytes_of(flow_interpolation(sequence, i) if i in HELD_OUT else sequence.frame(i).image) for i in frames}
+    write_video(tmp_path / "a.mp4", shown.values(), 25.0, lossless=True)
+    (tmp_path / "png").mkdir()
+    for i, picture in shown.items():
+        write_png(tmp_path / "png" / f"{sequence.names[i]}.png", picture)
+    video, folder = (measure_pictures(find_pictures(tmp_path / name, sequence), sequence) for name in ("a.mp4", "png"))
+    assert video["held_out"] == folder["held_out"] and video["training"] == folder["training"]
+    assert "as many pictures as " + ("frames" if len(frames) == 12 else "held-out") in video["pictures"]["pairing"]
+
+
+def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
+    write_video(tmp_path / "a.mp4", [np.zeros((32, 48, 3), np.uint8)] * 3, 25.0, lossless=True)
+    with pytest.raises(
+        InputError, match=r"a video of 3 pictures; allowed: one for each of the 12 frames or of the 2 held"
+    ):
+        find_pictures(tmp_path / "a.mp4", sequence)
+    write_video(tmp_path / "b.mp4", [np.zeros((16, 48, 3), np.uint8)] * 2, 25.0, lossless=True)
+    with pytest.raises(InputError, match=r"an array of 3x16x48; allowed: a picture of 48x32"):
+        measure_pictures(find_pictures(tmp_path / "b.mp4", sequence), sequence)
+
+
+@pytest.mark.parametrize(
+    ("names", "expected", "words"),
+    [
+        (["simulated-000001.png", "simulated-000009.png", "other.png"], (0, 1), "names"),
+        (["simulated-000009.render.png", "simulated-000001.render.png"], (1, 0), "names"),
+        (["r_9.png", "r_1.png", "r_2.png"], (1, 0), "frame numbers"),
+        (["00000.png", "00001.png"], (0, 1), "as many files as held-out frames"),
+        ([f"{i:03d}.png" for i in range(1, 13)], (1, 9), "frame numbers"),
+        ([f"{10 * i}.png" for i in range(1, 13)], (1, 9), "as many files as frames"),
+        (["a10.npy", "a9.npy", "a3.png"], (1, 0), "as many files as held-out frames"),
+    ],
+)
+def test_files_are_paired_with_frames(names, expected, words, sequence, tmp_path):
+    found = find_pictures(write_folder(tmp_path, names), sequence)
+    files = sorted(names) if len(names) == 12 and "numbers" not in words else names
+    if len(names) == 12:
+        numbered = sorted(names, key=lambda name: int(name.split(".")[0]))
+        files = ["", *numbered] if "numbers" in words else numbered
+    assert [found.files[i].name for i in HELD_OUT] == [files[k] for k in expected] and words in found.pairing
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ([], "contains no picture; allowed: one file per frame, .npy, .png, .tif, .tiff, .bmp"),
+        (["a.png", "b.png"], "cannot be paired"),
+        (["1.png", "2.png", "3.png"], "3 .png files cannot be paired with the 2 held-out frames (simulated-000001, "),
+    ],
+)
+def test_folders_that_cannot_be_paired_are_refused(names, said, sequence, tmp_path):
+    with pytest.raises(InputError) as refused:
+        find_pictures(write_folder(tmp_path, names), sequence)
+    assert said in str(refused.value) and str(tmp_path) in str(refused.value)
+
+
+def test_a_missing_folder_is_refused(sequence, tmp_path):
+    with pytest.raises(InputError, match="folder of pictures, or video, not found"):
+        find_pictures(tmp_path / "none", sequence)
+
+
+@pytest.mark.parametrize(
+    ("array", "said"),
+    [
+        (np.zeros((3, 32, 47), np.float32), "3x32x47; allowed: a picture of 48x32"),
+        (np.zeros((32, 48, 3), np.uint8), "uint8; allowed: an array of float32 or float64"),
+        (np.full((3, 32, 48), 128.0), "128; allowed: display units, from 0 to 1"),
+        (np.full((3, 32, 48), np.nan), "not finite"),
+    ],
+)
+def test_arrays_that_are_no_pictures_are_refused(array, said, tmp_path):
+    np.save(tmp_path / "0.npy", array)
+    with pytest.raises(InputError) as refused:
+        read_picture(tmp_path / "0.npy", (3, 32, 48))
+    assert said in str(refused.value) and "0.npy" in str(refused.value)
+
+
+def test_a_file_that_is_no_array_is_refused(tmp_path):
+    (tmp_path / "0.npy").write_bytes(b"not an array")
+    with pytest.raises(InputError, match=r"0\.npy: not a plain NumPy array file"):
+        read_picture(tmp_path / "0.npy", (3, 32, 48))
+
+
+def test_planes_last_and_16_bits_are_the_same_picture(tmp_path):
+    levels = np.random.default_rng(0).integers(0, 256, (32, 48, 3))
+    write_png(tmp_path / "a.png", levels.astype(np.uint8))
+    write_png(tmp_path / "b.png", (levels * 257).astype(np.uint16))
+    np.save(tmp_path / "c.npy", levels / 255)
+    a, b, c = (read_picture(tmp_path / name, (3, 32, 48)) for name in ("a.png", "b.png", "c.npy"))
+    assert np.array_equal(a, b) and np.abs(a - c).max() < 1e-7 and c.dtype == np.float64
+
+
+def test_training_frames_are_measured_where_the_folder_holds_them(sequence, tmp_path):
+    for i in range(sequence.count):
+        write_png(tmp_path / f"{sequence.names[i]}.png", np.full((32, 48, 3), 90, np.uint8))
+    found = measure_pictures(find_pictures(tmp_path, sequence), sequence, "grey")
+    assert [row["frame"] for row in found["training"]["per_frame"]] == list(sequence.train_index)
+    assert found["label"] == "grey" and found["pictures"]["files"]["simulated-000003"] == "simulated-000003.png"
+    fewer = dataclasses.replace(sequence, test_index=np.array([9]), train_index=np.arange(9))
+    assert find_pictures(tmp_path, fewer).files.keys() == set(range(12))

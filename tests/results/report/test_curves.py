@@ -1,0 +1,83 @@
+"""Charts from a log that may be short, cut or lack keys."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from endotsr.results.report import curves
+from endotsr.training.runs.log import log_until
+
+
+def log_of(count):
+    return [
+        {
+            "iteration": k + 1,
+            "loss": 1 / (k + 1),
+            "l1": 0.5 / (k + 1),
+            "matern_penalty": 0.0,
+            "psnr": 20 + k,
+            "gaussians": 100 + k,
+        }
+        for k in range(count)
+    ]
+
+
+def test_cut_and_foreign_lines_of_a_log_are_left_out(tmp_path):
+    path = tmp_path / "log.jsonl"
+    path.write_text(json.dumps({"iteration": 1, "loss": 2.0}) + '\n[3]\n{"iteration": 2, "lo')
+    assert log_until(path, 5) == [{"iteration": 1, "loss": 2.0}] and log_until(path, 0) == []
+    assert log_until(tmp_path / "absent", 5) == []
+
+
+def test_missing_and_null_values_leave_gaps():
+    log = [{"iteration": 5, "loss": 1.0}, {"iteration": 6, "loss": None}, {"iteration": 7}, {"iteration": 8, "loss": 3}]
+    iterations, values = curves.series(log, "loss")
+    assert iterations.tolist() == [5, 8] and values.tolist() == [1, 3]
+    assert curves.series(log, "other")[0].shape == (0,)
+    assert curves.series([{"loss": float("nan")}, {"loss": 1.0}], "loss")[0].tolist() == [2]
+
+
+def test_smoothing_keeps_constants_and_length():
+    np.testing.assert_allclose(curves.smoothed(np.full(7, 3.0), 5), 3.0)
+    np.testing.assert_allclose(curves.smoothed(np.arange(5.0), 3), [0.5, 1, 2, 3, 3.5])
+    np.testing.assert_array_equal(curves.smoothed(np.arange(4.0), 1), np.arange(4.0))
+
+
+def test_only_charts_with_data_appear():
+    assert curves.charts([]) == []
+    assert curves.curves_png([]) is None
+    assert [c.title for c in curves.charts([{"loss": 1.0}])] == ["Loss"]
+    assert len(curves.charts(log_of(3))) == 4
+
+
+@pytest.mark.parametrize("count", [1, 2, 300])
+def test_charts_are_drawn_in_both_themes(count):
+    evaluation = {"held_out": {"mean": {"psnr_full": 30.0}}, "training": {"mean": {"psnr_full": None}}}
+    for chart in curves.charts(log_of(count), evaluation):
+        pictures = [np.asarray(Image.open(io.BytesIO(curves.chart_png(chart, t, dots=40)))) for t in curves.THEMES]
+        assert pictures[0].shape[2] == 4 and (pictures[0][0, 0, 3] == 0)  # transparent ground
+        assert (pictures[0] != pictures[1]).any()
+    Image.open(io.BytesIO(curves.curves_png(log_of(count), evaluation) or b"")).load()
+
+
+def test_loss_that_is_zero_or_negative_everywhere_is_still_drawn():
+    for value in (0.0, -1.0):
+        chart = curves.charts([{"iteration": k, "loss": value} for k in range(3)])[0]
+        assert curves.chart_png(chart, "light", dots=40)
+
+
+def test_frame_chart_leaves_out_null_values():
+    rows = [{"frame": 1, "psnr_tissue": 30.0}, {"frame": 9, "psnr_tissue": None}]
+    evaluation = {"held_out": {"per_frame": rows}, "baselines": {"two_neighbours": {"per_frame": rows[1:]}}}
+    (line,) = curves.frame_lines(evaluation, "psnr_tissue")
+    assert line[0] == "Model" and line[1].tolist() == [1]
+    assert curves.frame_chart({}, "psnr_tissue") is None
+
+
+def test_similarity_is_drawn_as_what_is_minimised():
+    assert curves.minimised({"ssim": 0.75}, "ssim") == 0.25
+    assert curves.minimised({"l1": 0.75}, "l1") == 0.75
+    assert curves.minimised({"l1": None}, "l1") is None

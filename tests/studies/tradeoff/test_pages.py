@@ -1,0 +1,89 @@
+"""Pictures whose words can be read, and sentences with the figures of the measurement."""
+
+import json
+from pathlib import Path
+
+import pytest
+from made_up import moving_scene
+from tradeoff_figures import dials_figure, draw, main_figure
+from tradeoff_study import run_whole_study
+from tradeoff_text import advice, error_over_cutoff
+
+from endotsr.studies.tradeoff.settings import CUTOFFS
+from endotsr.studies.tradeoff.study import described
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[3]
+COMMITTED = sorted((ROOT / "docs" / "results").glob("tradeoff*.json"))
+
+
+@pytest.fixture(scope="module")
+def result():
+    return described(run_whole_study(moving_scene(count=24, width=24), repeats=1))
+
+
+def overlaps(figure) -> list[tuple[str, str]]:
+    """Pairs of words in one panel that cover each other."""
+    from matplotlib.text import Text
+
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    found = []
+    for axes in figure.axes:
+        boxes = [(t.get_text(), Text.get_window_extent(t, renderer)) for t in axes.texts]
+        found += [(a, b) for i, (a, one) in enumerate(boxes) for b, other in boxes[:i] if one.overlaps(other)]
+    return found
+
+
+def figures(result):
+    if result["joint"]:
+        yield main_figure(result)
+    yield dials_figure(result, "forward")
+    yield dials_figure(result, "visits")
+    yield dials_figure(result, "both", "gradient")
+
+
+def test_no_word_covers_another(result):
+    for figure in figures(result):
+        assert sum(len(axes.texts) for axes in figure.axes) > 10
+        assert overlaps(figure) == []
+
+
+@pytest.mark.parametrize("file", COMMITTED, ids=lambda file: file.stem)
+def test_no_word_covers_another_in_the_committed_pictures(file):
+    committed = json.loads(file.read_text(encoding="utf-8"))
+    if "points" in committed:
+        assert all(overlaps(figure) == [] for figure in figures(committed))
+
+
+def test_pictures_are_drawn(result, tmp_path):
+    """Of the whole study, and of the measurement of the command, which has no dials."""
+    stems = draw(result, tmp_path)
+    assert stems == ["tradeoff", "tradeoff_dials", "tradeoff_dials_visits", "tradeoff_dials_gradients"]
+    for stem in stems:
+        assert (tmp_path / f"{stem}.png").read_bytes()[:4] == b"\x89PNG"
+        assert "<svg" in (tmp_path / f"{stem}.svg").read_text()
+    assert draw({key: value for key, value in result.items() if key != "dials"}, tmp_path) == ["tradeoff"]
+
+
+def test_equal_results_give_equal_pictures(result, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        draw(result, tmp_path / name)
+    for file in (tmp_path / "a").iterdir():
+        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes(), file.name
+
+
+def test_three_sentences_with_the_figures_of_the_measurement(result):
+    sentences = advice(result)
+    assert len(sentences) == 3 and all(s.endswith(".") for s in sentences)
+    paper = next(p for p in result["points"] if p["name"] == "paper")
+    assert f"{paper['error']['max'] * 255:.2g}/255 at the worst pixel" in sentences[0]
+
+
+def test_the_factor_of_the_cutoff_is_the_largest_of_the_sweep(result):
+    """And not that of a point where the stop decides."""
+    by_name = {p["name"]: p for p in result["points"]}
+    ratios = [by_name[f"float64, cutoff {name}, stop 1e-6"]["error"]["max"] / value for name, value in CUTOFFS.items()]
+    assert error_over_cutoff(result) == pytest.approx(max(ratios)) and max(ratios) <= 5
