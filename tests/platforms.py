@@ -3,7 +3,7 @@
 uv (`pip install uv`) chooses wheels for each system and version of Python, without installing anything. It needs the
 network and is run by hand before a release:
 
-    python tests/platforms.py --json docs/results/platforms.json && python docs/pages/systems.py
+    python tests/platforms.py --json docs/results/platforms.json && python docs/make.py book.systems
 
 A combination is `complete` where every dependency has a wheel of a final version, so that a user needs no compiler. The
 exit code is 1 if a combination is not as SYSTEMS says.

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "reference" / "endotsr"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 MAKERS = [ROOT / "golden" / "make.py", *sorted((ROOT / "golden" / "makers").glob("*.py"))]
-PAGES = sorted((ROOT / "docs" / "pages").glob("*.py"))
+PAGES = sorted((ROOT / "docs" / "pages").rglob("*.py"))
 ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
@@ -22,9 +22,7 @@ CONTRACTING = {  # the fast compositing, and the peak of the machine beside it
     *("method/splatting/fast/blocks.py", "method/splatting/fast/tiles.py"),
     "studies/bench/peaks.py",
 }
-PEERS = [
-    ROOT / "docs" / "pages" / name for name in ("bench_gsplat.py", "bench_peers.py")
-]  # another program beside ours
+PEERS = [ROOT / "docs" / "pages" / "bench" / name for name in ("gsplat.py", "peers.py")]  # another program beside ours
 
 # Pieces of the method that tests reach beside its public functions: compiled code that no argument selects.
 PIECES = {

@@ -4,4 +4,4 @@ import sys
 from pathlib import Path
 
 DOCS = Path(__file__).parents[2] / "docs"
-sys.path[:0] = [str(DOCS / "_extensions"), str(DOCS / "pages")]
+sys.path[:0] = [str(DOCS / "_extensions"), str(DOCS)]

@@ -3,11 +3,11 @@
 import json
 import re
 
-import bench
-import bench_start
 import pytest
-from bench_parts import MAIN
-from marks import replaced
+from pages.bench import page as bench
+from pages.bench import start as bench_start
+from pages.bench.parts import MAIN
+from pages.store.marks import replaced
 
 from endotsr.errors import InputError
 
@@ -57,7 +57,7 @@ def test_page_names_what_is_missing(tmp_path):
         bench.main([], page)
     with pytest.raises(SystemExit, match=r"bench_stages\.json: cannot be read.*bench\.py measure"):
         bench.main([str(tmp_path)], page)
-    with pytest.raises(SystemExit, match=r"python docs/pages/bench\.py"):
+    with pytest.raises(SystemExit, match=r"python docs/make\.py bench"):
         bench.main(["one", "two"], page)
 
 

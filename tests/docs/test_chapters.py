@@ -2,9 +2,9 @@
 
 import re
 
-import chapters
 import pytest
-from marks import read_json, replaced
+from pages.book import chapters
+from pages.store.marks import read_json, replaced
 
 TEXTS = {file.stem: file.read_text(encoding="utf-8") for file in sorted(chapters.NOTEBOOKS.glob("*.py"))}
 CUTS = {

@@ -4,14 +4,14 @@ import json
 import re
 from itertools import pairwise
 
-import claims
 import numpy as np
 import pytest
-from claims_parts import planned_hours, protocols, tables
-from claims_power import least_size, pairs_needed
-from claims_protocols import MOVED, right_eye
-from claims_verdicts import NOT_YET, increment_verdict, level_verdict, student, verdicts
-from marks import replaced
+from pages.claims import page as claims
+from pages.claims.parts import planned_hours, protocols, tables
+from pages.claims.power import least_size, pairs_needed
+from pages.claims.protocols import MOVED, right_eye
+from pages.claims.verdicts import NOT_YET, increment_verdict, level_verdict, student, verdicts
+from pages.store.marks import replaced
 from scipy import stats
 
 from endotsr.cli.ablate import AblateOptions

@@ -3,13 +3,13 @@
 import math
 import re
 
-import effects
-import effects_parts
-import effects_study
 import pytest
-from effects_parts import ANSWERED
-from marks import replaced
-from over_seeds import interval, shown
+from pages.effects import page as effects
+from pages.effects import parts as effects_parts
+from pages.effects import study as effects_study
+from pages.effects.parts import ANSWERED
+from pages.store.intervals import interval, shown
+from pages.store.marks import replaced
 
 from endotsr.clips.effects.inspect import EFFECTS
 from endotsr.clips.effects.savings import MEASURED
@@ -32,7 +32,7 @@ def test_every_effect_has_its_row():
 def test_false_positives_are_at_most_five_percent():
     measured = effects.read()
     if "detect" not in measured:
-        pytest.skip("not measured yet: python docs/pages/effects.py detect 5")
+        pytest.skip("not measured yet: python docs/make.py effects detect 5")
     for name, counts in measured["detect"]["effects"].items():
         assert counts["false"] <= 0.05 * counts["negatives"], name
 
@@ -59,7 +59,7 @@ def test_interval_of_a_mean():
 
 
 def test_unknown_words_and_missing_results_are_refused(tmp_path):
-    with pytest.raises(SystemExit, match="docs/pages/effects"):
+    with pytest.raises(SystemExit, match=r"docs/make\.py effects"):
         effects.main(["paint"])
     with pytest.raises(InputError, match="made by"):
         effects.read(tmp_path)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from effects_truth import SCENES, VARIANTS, depth_error, light_courses, light_scores, table
+from pages.effects.truth import SCENES, VARIANTS, depth_error, light_courses, light_scores, table
 
 from endotsr.api import train
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects

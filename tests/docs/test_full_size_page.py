@@ -4,13 +4,13 @@ import json
 import re
 from pathlib import Path
 
-import full_size
-import full_size_pictures
-import full_size_text
 import numpy as np
 import pytest
-from full_size_text import psnr
-from marks import read_json, replaced
+from pages.full_size import page as full_size
+from pages.full_size import pictures as full_size_pictures
+from pages.full_size import text as full_size_text
+from pages.full_size.text import psnr
+from pages.store.marks import read_json, replaced
 
 from endotsr.errors import InputError
 

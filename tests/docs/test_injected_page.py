@@ -4,7 +4,7 @@ import importlib
 import re
 
 import pytest
-from marks import read_json, replaced
+from pages.store.marks import read_json, replaced
 
 made = importlib.import_module("injected")
 

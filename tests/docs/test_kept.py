@@ -2,8 +2,8 @@
 
 import json
 
-import kept
 import pytest
+from pages.store import kept
 
 from endotsr.errors import InputError
 

@@ -2,8 +2,8 @@
 
 import json
 
-import minutes
 import pytest
+from pages.bench import minutes
 
 from endotsr.errors import InputError
 

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-import paper
 import pytest
-from marks import replaced
+from pages.claims import paper
+from pages.store.marks import replaced
 
 from endotsr import __version__
 from endotsr.errors import InputError

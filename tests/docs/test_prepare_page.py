@@ -18,9 +18,9 @@ SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_is_what_its_result_says(name):
-    made = importlib.import_module(name)
+    made = importlib.import_module(f"pages.recordings.{name}")
     if not made.FILE.exists():
-        pytest.skip(f"not measured yet: python docs/pages/{name}.py")
+        pytest.skip(f"not measured yet: python docs/make.py recordings.{name}")
     found = json.loads(made.FILE.read_text(encoding="utf-8"))
     assert made.table(found["rows"] if name == "long_clip" else found) in PAGE.read_text(encoding="utf-8")
 

@@ -4,8 +4,8 @@ import json
 import re
 
 import pytest
-import reliability
-from marks import replaced
+from pages.book import reliability
+from pages.store.marks import replaced
 
 
 def test_the_tables_are_those_of_the_results():

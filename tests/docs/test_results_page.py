@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from statistics import fmean
 
-import levers
 import pytest
+from pages.full_size import levers
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 

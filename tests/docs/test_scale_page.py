@@ -2,7 +2,7 @@
 
 import json
 
-import scale
+from pages.bench import scale
 
 
 def test_the_table_and_the_recorded_runs_are_those_of_the_page():

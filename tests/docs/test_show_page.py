@@ -10,7 +10,7 @@ made = importlib.import_module("show")
 
 def test_table_is_what_the_measurement_says():
     if not made.FILE.exists():
-        pytest.skip("not measured yet: python docs/pages/show.py RUN")
+        pytest.skip("not measured yet: python docs/make.py recordings.show RUN")
     found = json.loads(made.FILE.read_text(encoding="utf-8"))
     assert set(found["commands"]) == set(made.COMMANDS)
     assert made.table(found) in made.PAGE.read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ made = importlib.import_module("simulate")
 
 def test_table_is_what_the_measurement_says():
     if not made.FILE.exists():
-        pytest.skip("not measured yet: python docs/pages/simulate.py times")
+        pytest.skip("not measured yet: python docs/make.py recordings.simulate times")
     found = json.loads(made.FILE.read_text(encoding="utf-8"))
     assert set(found["scenes"]) == set(SCENES)
     assert made.table(found) in made.PAGE.read_text(encoding="utf-8")

@@ -4,9 +4,9 @@ import json
 import re
 
 import pytest
-import systems
-from marks import replaced
 from packaging.requirements import Requirement
+from pages.book import systems
+from pages.store.marks import replaced
 
 import platforms
 

@@ -4,9 +4,9 @@ import json
 import re
 
 import pytest
-import tradeoff
-from marks import replaced
-from tradeoff_parts import fragments
+from pages.store.marks import replaced
+from pages.tradeoff import page as tradeoff
+from pages.tradeoff.parts import fragments
 
 MARKED = re.compile(r"<!-- tradeoff:(\w+):start -->")
 
@@ -53,7 +53,7 @@ def test_a_measurement_of_the_command_is_drawn(result, tmp_path, capsys):
 def test_command_refuses_words_that_it_does_not_know(monkeypatch):
     monkeypatch.setattr(tradeoff, "write_page", lambda: pytest.fail("wrote the page"))
     for words in (["page"], ["train"], ["measure", "x"]):
-        with pytest.raises(SystemExit, match=r"python docs/pages/tradeoff\.py render"):
+        with pytest.raises(SystemExit, match=r"python docs/make\.py tradeoff render"):
             tradeoff.main(words)
 
 

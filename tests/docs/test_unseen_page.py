@@ -2,7 +2,7 @@
 
 import importlib
 
-from marks import read_json, replaced
+from pages.store.marks import read_json, replaced
 
 made = importlib.import_module("unseen")
 

@@ -11,9 +11,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 RESULTS, PAGE = ROOT / "docs" / "results", ROOT / "docs" / "hard_cases.md"
 sys.path.insert(0, str(RESULTS))
-from gallery import CASES, DTYPES  # noqa: E402
-from hard_cases import END, FIRST, LAST, START, gallery, measure, plain, promise  # noqa: E402
-from hard_cases_pictures import measured  # noqa: E402
+from pages.hard_cases.gallery import CASES, DTYPES  # noqa: E402
+from pages.hard_cases.page import END, FIRST, LAST, START, gallery, measure, plain, promise  # noqa: E402
+from pages.hard_cases.pictures import measured  # noqa: E402
 
 UNITS = {"float64": 2.0**-53, "float32": 2.0**-24}
 IDS = [case.run.__name__ for case in CASES]

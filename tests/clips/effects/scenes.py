@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from effects_study import settings_of
+from pages.effects.study import settings_of
 
 from endotsr.clips.effects.inspect import Inspection, inspect_sequence
 from endotsr.clips.sequences.sequence import Sequence

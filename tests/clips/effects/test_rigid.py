@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effects_sinus import read_sinus
-from effects_study import settings_of
+from pages.effects.sinus import read_sinus
+from pages.effects.study import settings_of
 from scenes import clip
 
 from data_folder import data_folder

@@ -1,7 +1,7 @@
 """The study of the tests: its clips are known, its seeds are fresh, its counts are those of the answers."""
 
 import pytest
-from effects_study import (
+from pages.effects.study import (
     ANSWERS,
     FIRST_SEED,
     FOUND,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from effects_study import blurred, smoky
+from pages.effects.study import blurred, smoky
 from scenes import clip, inspected
 
 from endotsr.clips.effects.clip import training_clip, with_clear_reference

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effects_study import blurred, expectation, settings_of, smoky
+from pages.effects.study import blurred, expectation, settings_of, smoky
 from scenes import clip, inspected
 
 from endotsr.clips.effects.clip import training_clip

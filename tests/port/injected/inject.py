@@ -6,7 +6,7 @@ PORT is c99, reference or torch; all of them by default. The port in PyTorch is 
 ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. The mistakes are those
 of `mistakes.toml`, and each is made alone. It is named rightly if the first mistake that the report names is this one.
 The right ports are judged as well: they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16
-are named. The result is a table of docs/guides/port.md, which docs/pages/injected.py writes. In the file, the
+are named. The result is a table of docs/guides/port.md, which docs/pages/ports/injected.py writes. In the file, the
 outcomes of mistakes that were not made stay as they are if they are of the same version.
 """
 

@@ -3,14 +3,14 @@
 import json
 from pathlib import Path
 
-import bench
-import bench_charts
-import bench_peers
-import bench_scaling
-import bench_start
-import bench_suite
 import numpy as np
 import pytest
+from pages.bench import charts as bench_charts
+from pages.bench import page as bench
+from pages.bench import peers as bench_peers
+from pages.bench import scaling as bench_scaling
+from pages.bench import start as bench_start
+from pages.bench import suite as bench_suite
 
 from endotsr.cli.bench import BenchOptions, cases_of
 from endotsr.cli.main import main

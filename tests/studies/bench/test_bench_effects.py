@@ -1,10 +1,10 @@
-"""`bench.py measure effects`: a part that is off holds and allocates what a build without the part does."""
+"""`python docs/make.py bench measure effects`: a part that is off holds and allocates what a build without the part does."""
 
-import bench_effects
 import numba
 import numpy as np
 import pytest
-from bench_effects import PARTS, benchmark_effects, table
+from pages.bench import effects as bench_effects
+from pages.bench.effects import PARTS, benchmark_effects, table
 
 from endotsr.method.kernels.threads import use_threads
 from endotsr.training.fitting import objective

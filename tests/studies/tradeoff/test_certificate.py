@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from made_up import moving_scene
-from tradeoff_certificate import certify
+from pages.tradeoff.certificate import certify
 
 from endotsr.studies.tradeoff.measure import frame, prepare
 from endotsr.studies.tradeoff.settings import ACCURATE, CLOSE

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from tradeoff_text import KEPT, dominates, judge_presets
+from pages.tradeoff.text import KEPT, dominates, judge_presets
 
 from endotsr.studies.tradeoff.study import Ranked, non_dominated, run_study
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tradeoff_labels import Label, _line_points, _text_box, place_labels
+from pages.tradeoff.labels import Label, _line_points, _text_box, place_labels
 
 from endotsr.results.report.style import new_figure
 

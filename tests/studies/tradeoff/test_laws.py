@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from made_up import moving_scene
-from tradeoff_dials import EXPONENTIALS, TILES
-from tradeoff_kernels import Variant, exponential_coefficients
+from pages.tradeoff.dials import EXPONENTIALS, TILES
+from pages.tradeoff.kernels import Variant, exponential_coefficients
 
 from endotsr.method.splatting.render import render_forward
 from endotsr.method.splatting.settings import EXACT

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 from made_up import moving_scene
-from tradeoff_dials import TILES
-from tradeoff_kernels import Variant
-from tradeoff_study import run_whole_study
+from pages.tradeoff.dials import TILES
+from pages.tradeoff.kernels import Variant
+from pages.tradeoff.study import run_whole_study
 
 from endotsr.method.splatting import compositing
 from endotsr.method.splatting.fast import blocks as compositing_blocks

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from tradeoff_figures import dials_figure, draw, main_figure
-from tradeoff_study import run_whole_study
-from tradeoff_text import advice, error_over_cutoff
+from pages.tradeoff.figures import dials_figure, draw, main_figure
+from pages.tradeoff.study import run_whole_study
+from pages.tradeoff.text import advice, error_over_cutoff
 
 from endotsr.studies.tradeoff.settings import CUTOFFS
 from endotsr.studies.tradeoff.study import described

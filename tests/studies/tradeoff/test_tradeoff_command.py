@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
+from pages.tradeoff.train import run as run_training
 from test_splat_file import write_npz
-from tradeoff_train import run as run_training
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 import tradeoff_training as training
-from tradeoff_text import summary, training_lines, training_rows
-from tradeoff_training import changed, configurations, measured, run_training_study
+from pages.tradeoff.text import summary, training_lines, training_rows
+from pages.tradeoff.training import changed, configurations, measured, run_training_study
 
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse

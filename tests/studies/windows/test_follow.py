@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from seam_errors import STEP, seam_errors
+from pages.recordings.seam_errors import STEP, seam_errors
 from small_recording import trained, write_recording
 
 from endotsr.clips.sequences.sequence import Sequence

@@ -1,13 +1,13 @@
 """Time and memory of a configuration relative to the published one, from which a plan derives savings.
 
 Memory is the count of parameters per Gaussian, each stored three times (value and two moments). Time is a table of
-measured differences, scaled with the size of each component. `python docs/pages/bench.py measure effects` repeats the
+measured differences, scaled with the size of each component. `python docs/make.py bench measure effects` repeats the
 measurement.
 """
 
 from endotsr.config import PAPER, Config
 
-# Fraction of an iteration of the published settings that each component takes: `docs/pages/bench_effects.py`, file
+# Fraction of an iteration of the published settings that each component takes: `docs/pages/bench/effects.py`, file
 # docs/results/bench_effects.json (a test compares the two).
 MEASURED = {
     "deformation": 0.47,

@@ -1,0 +1,51 @@
+"""Programs that measure and write the generated parts of the documentation: python docs/make.py [NAME [WORDS ...]]
+
+Without a name: the list of all programs. `claims` runs `docs/pages/claims/page.py`; `claims.paper` runs
+`docs/pages/claims/paper.py`. The words that follow go to the program, whose docstring says what it takes. Each folder
+of `docs/pages` belongs to one page or one group of pages, and has a program that measures (its records are files in
+`docs/results`), and one that writes the page from the records.
+"""
+
+import ast
+import sys
+from importlib import import_module
+from pathlib import Path
+
+HERE = Path(__file__).parent
+PAGES = HERE / "pages"
+
+
+def programs() -> dict[str, Path]:
+    """Every program by name: a file of a folder of `docs/pages` that can be run."""
+    found = {}
+    for file in sorted(PAGES.glob("*/*.py")):
+        if "\ndef main(words: list[str]" in file.read_text(encoding="utf-8"):
+            found[file.parent.name if file.stem == "page" else f"{file.parent.name}.{file.stem}"] = file
+    return found
+
+
+def first_line(file: Path) -> str:
+    """The first line of the docstring."""
+    return (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").split("\n")[0]
+
+
+def main(words: list[str]) -> int:
+    """Run a program, or list all. Returns: the exit code."""
+    found = programs()
+    if not words or words[0] in ("-h", "--help"):
+        width = max(map(len, found))
+        print(__doc__)
+        print("\n".join(f"    {name:{width}}  {first_line(file)}" for name, file in found.items()))
+        return 0
+    name, *rest = words
+    if name not in found:
+        print(f"docs/make.py: {name!r} is not a program; use one of: {', '.join(found)}", file=sys.stderr)
+        return 2
+    sys.path.insert(0, str(HERE))
+    sys.argv = [f"docs/make.py {name}", *rest]  # the name that argparse prints
+    import_module("pages." + ".".join(found[name].relative_to(PAGES).with_suffix("").parts)).main(rest)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,1 @@
+"""docs/bench.md: time by stage, peers, start, scale."""

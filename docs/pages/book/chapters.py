@@ -1,0 +1,121 @@
+"""The elements of every chapter of the book: motive, derivation, figures, exercises and run time.
+
+    python docs/make.py book.chapters measure   run every notebook at its small size, one after the other, on one thread
+    python docs/make.py book.chapters           rewrite the table in notebooks/index.md
+
+The times are docs/results/chapters.json. Everything else is read from the text of the notebooks. A test checks every
+chapter with `missing`.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from datetime import date
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
+from pages.store.marks import read_json, write_marked
+
+ROOT = Path(__file__).parents[3]
+NOTEBOOKS, PAGE = ROOT / "notebooks", ROOT / "notebooks" / "index.md"
+FILE = ROOT / "docs" / "results" / "chapters.json"
+COMMAND = "docs/pages/book/chapters.py measure"
+MEASURES = {"00_why", "16_tradeoff", "17_effects"}
+"""Chapters that measure the results of other derivations and have none of their own."""
+LEAST_WORDS, EXERCISES, LONGEST = 12, 3, 600.0  # words of a motive; exercises; seconds of all chapters together
+
+
+class Chapter(NamedTuple):
+    """The elements of a notebook."""
+
+    title: str
+    motive: str  # the first sentences before the first section
+    steps: int  # numbered steps of a derivation
+    derived: bool  # a section on the reverse pass
+    figures: int  # shown by matplotlib
+    plays: int  # figures that respond to the reader
+    exercises: int
+    judged: int  # exercises that golden cases judge
+
+
+def chapter_of(text: str) -> Chapter:
+    """The elements of a notebook in the percent format."""
+    prose = "\n".join(line.removeprefix("#").removeprefix(" ") for line in text.splitlines() if line.startswith("#"))
+    title, _, rest = prose.partition("\n# ")[2].partition("\n")
+    opening = re.split(r"\n## |\n%%|\n\$\$", rest)[0].strip()
+    sentences = re.split(r"(?<=[.?!])\s+", " ".join(opening.split("\n\n")[0].split()))
+    last = prose.partition("\n## Exercise")[2]
+    return Chapter(
+        title, " ".join(sentences[:2]), len(re.findall(r"^\*\*\(\d+\.\d+\)", prose, re.M)),
+        "\n## The reverse pass" in prose, text.count("plt.show()"), text.count("data-widget="),
+        len(re.findall(r"^\d\. ", last, re.M)), len(re.findall(r"`--only \w+`", last)),
+    )  # fmt: skip
+
+
+def missing(name: str, chapter: Chapter) -> list[str]:
+    """The missing elements of a chapter."""
+    wanted = {
+        "motive": len(chapter.motive.split()) >= LEAST_WORDS,
+        "derivation": name in MEASURES or chapter.derived or chapter.steps > 0,
+        "figure": chapter.figures > 0,
+        "exercises": chapter.exercises >= EXERCISES and chapter.judged > 0,
+    }
+    return [element for element, there in wanted.items() if not there]
+
+
+def chapters() -> dict[str, Chapter]:
+    """Every notebook by the stem of its file."""
+    return {file.stem: chapter_of(file.read_text(encoding="utf-8")) for file in sorted(NOTEBOOKS.glob("*.py"))}
+
+
+def measured() -> dict[str, Any]:
+    """Processor time and elapsed time of every notebook, run as a script on one thread."""
+    environment = os.environ | {"ENDOTSR_NOTEBOOK_SIZE": "small", "MPLBACKEND": "Agg", "NUMBA_NUM_THREADS": "1"}
+    found = {}
+    for file in sorted(NOTEBOOKS.glob("*.py")):
+        before, began = os.times(), time.monotonic()
+        done = subprocess.run([sys.executable, str(file)], env=environment, capture_output=True, text=True)
+        if done.returncode:
+            raise InputError(f"{file}: failed: {done.stderr[-500:]}")
+        after = os.times()
+        spent = after.children_user + after.children_system - before.children_user - before.children_system
+        found[file.stem] = {"processor_seconds": spent, "seconds": time.monotonic() - began}
+        print(f"{file.stem}: {spent:.0f} s", flush=True)
+    return {"date": date.today().isoformat(), "machine": machine(), "chapters": found}
+
+
+def table(found: dict[str, Chapter], times: dict[str, Any]) -> str:
+    """One row per chapter, and the total run time."""
+    rows = []
+    for name, chapter in found.items():
+        spent = times["chapters"].get(name, {}).get("processor_seconds")
+        steps = f"{chapter.steps} steps" if chapter.steps else "reverse pass" if chapter.derived else "measures only"
+        figures = f"{chapter.figures}" + (f", {chapter.plays} interactive" if chapter.plays else "")
+        exercises = f"{chapter.exercises}, {chapter.judged} judged"
+        cells = [steps, figures, exercises, "not measured" if spent is None else f"{spent:.0f} s"]
+        rows.append([f"{{doc}}`{name}`", chapter.motive, *cells])
+    total = sum(row["processor_seconds"] for row in times["chapters"].values())
+    about = times["machine"]
+    return (
+        markdown(("Chapter", "Motive", "Derivation", "Figures", "Exercises", "Run"), rows)
+        + f"\n\nRun: processor time at the small size on one thread, kernels compiled before; {total / 60:.1f} minutes "
+        f"together ({about['processor']}, {about['cores']} cores, {times['date']}). *Judged*: by golden cases."
+    )
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    try:
+        if words == ["measure"]:
+            write_json(FILE, measured())
+        elif words:
+            sys.exit(__doc__)
+        write_marked(PAGE, {"table": table(chapters(), read_json(FILE, COMMAND))}, "chapters")
+    except InputError as error:
+        sys.exit(f"error: {error}")

@@ -1,0 +1,115 @@
+"""Write the generated parts of docs/claims.md and docs/guides/sweep.md, and pictures, from the existing results.
+
+    python docs/make.py claims            from docs/results
+    python docs/make.py claims FOLDER     from the files of another folder
+
+The differences are recomputed from the stored runs each time, and written to the file of the ablation.
+
+To measure, on an otherwise idle machine (each command continues where it was interrupted):
+
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
+        --json docs/results/ablation_pulling.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_half --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --splits every_second --configurations base A+S+L --no-fixed-count \
+        --measures right_view --json docs/results/ablation_pulling_half.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_blocks --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --splits "blocks 2" "end 8" --configurations base A+S+L --no-fixed-count \
+        --json docs/results/ablation_pulling_half_blocks.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_fixed --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --configurations A+S A+S+L --json docs/results/ablation_pulling_half_fixed.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --collect --json ...   what is finished
+    endotsr ablate simulated --preset demo --out runs/ablation_simulated --json docs/results/ablation_simulated.json
+    endotsr ablate simulated --preset paper --iterations 1500 --no-fixed-count --out runs/ablation_simulated_paper \
+        --configurations base A S L A+S A+S+L --json docs/results/ablation_simulated_paper.json
+
+A missing result is shown as "not measured yet"; a result of some seeds is shown with their number.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.studies.sweeps.ablation_page import ablation_record, draw
+from endotsr.studies.sweeps.execute import FINISHED
+from endotsr.training.runs.files import write_json
+from pages.claims import parts as claims_parts
+from pages.claims import power as claims_power
+from pages.claims import protocols as claims_protocols
+from pages.claims import verdicts as claims_verdicts
+from pages.store.marks import read_json, write_marked
+
+DOCS = Path(__file__).parents[2]
+PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
+FILES = {
+    "pulling": "ablation_pulling.json",
+    "pulling_half": "ablation_pulling_half.json",
+    "pulling_half_blocks": "ablation_pulling_half_blocks.json",
+    "pulling_half_fixed": "ablation_pulling_half_fixed.json",
+    "simulated": "ablation_simulated.json",
+    "simulated_paper": "ablation_simulated_paper.json",
+}
+COST = "sweep_cost.json"  # by docs/pages/claims/sweep_cost.py
+RUNS = "pulling*.json"  # records of single runs, by docs/pages/full_size/record.py
+
+
+def read(folder: Path) -> dict[str, Any]:
+    """The ablations by name; None if there is no result yet. Raises: InputError for an unreadable file."""
+    found = {name: folder / file for name, file in FILES.items()}
+    return {
+        name: compared(read_json(path, "endotsr ablate")) if path.exists() else None for name, path in found.items()
+    }
+
+
+def compared(record: Any) -> Any:
+    """The record of an ablation with the differences listed in `COMPARISONS`."""
+    rows: Any = [{**row, "status": FINISHED} for row in record["rows"]]
+    again = ablation_record(rows, record["command"])
+    return {**record, "levels": again["levels"], "increments": again["increments"]}
+
+
+def read_runs(folder: Path) -> list[dict[str, Any]]:
+    """The records of single runs in the same folder."""
+    return [read_json(path, "docs/pages/full_size/record.py") for path in sorted(folder.glob(RUNS))]
+
+
+def parts(folder: Path = RESULTS) -> dict[str, str]:
+    """Every generated part of both pages by name."""
+    found, runs, cost = read(folder), read_runs(folder), folder / COST
+    half = [found[name] for name in FILES if name.startswith("pulling_half")]
+    return {
+        "verdicts": claims_verdicts.verdicts(found["pulling"], half, runs),
+        "right_eye": claims_protocols.right_eye(found["pulling_half"]),
+        "power": claims_power.sentences(found["pulling"]),
+        "pulling": claims_parts.tables(found["pulling"]),
+        "pulling_half": claims_parts.tables(found["pulling_half"]),
+        "pulling_half_blocks": claims_parts.tables(found["pulling_half_blocks"]),
+        "pulling_half_fixed": claims_parts.tables(found["pulling_half_fixed"]),
+        "simulated": claims_parts.tables(found["simulated"]),
+        "simulated_paper": claims_parts.tables(found["simulated_paper"]),
+        "protocols": claims_parts.protocols([found["pulling"], *half], runs),
+        "cost": claims_parts.cost(found["pulling"], runs),
+        "divided": claims_parts.divided(read_json(cost, "docs/pages/claims/sweep_cost.py") if cost.exists() else None),
+    }
+
+
+def draw_ablations(folder: Path) -> None:
+    """Write the differences of every ablation to its file NAME.json, and a figure of their intervals to NAME.svg."""
+    for name, found in read(folder).items():
+        if found is not None and found["increments"]:
+            write_json(folder / FILES[name], found)
+            draw(found, (folder / FILES[name]).with_suffix(".svg"))
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    if len(words) > 1:
+        sys.exit(__doc__)
+    try:
+        folder = Path(words[0]) if words else RESULTS
+        made = parts(folder)
+        for page in (PAGE, GUIDE):
+            write_marked(page, made, "claims")
+        draw_ablations(folder)
+    except InputError as error:
+        sys.exit(f"error: {error}")

@@ -1,0 +1,201 @@
+"""Write the generated parts of docs/paper.md: the method sentence by sentence, and the compared systems.
+
+    python docs/make.py claims.paper
+
+Every sentence is in our own words. Its functions, checks and notebooks come from the map of the equations, its ruling
+is a row of docs/specification/rulings.md, and its verdict a row of docs/claims.md. A name that does not exist is an
+error.
+"""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pages.claims.verdicts import student
+from pages.store.marks import read_json, write_marked
+from pages.store.published import PUBLISHED
+
+DOCS = Path(__file__).parents[2]
+sys.path.append(str(DOCS / "_extensions"))
+
+from book_map import Equation, equations  # noqa: E402  # pyright: ignore[reportMissingImports]
+from package_names import definitions  # noqa: E402  # pyright: ignore[reportMissingImports]
+
+from endotsr.errors import InputError  # noqa: E402
+from endotsr.results.report.tables import markdown  # noqa: E402
+
+PAGE, CLAIMS, RULINGS = DOCS / "paper.md", DOCS / "claims.md", DOCS / "specification" / "rulings.md"
+RESULTS = DOCS / "results"
+OURS, BASELINES = "ablation_pulling.json", "pulling_paper_seed0.json"
+SURGICALGS = 38.03  # dB, full image, EndoNeRF pulling, as published
+
+
+class Sentence(NamedTuple):
+    """One statement of the method."""
+
+    says: str
+    label: str  # of the equation
+    rulings: tuple[str, ...] = ()  # first cells of rows of the rulings
+    verdict: str = ""  # start of the first cell of a row of the verdicts
+
+
+SECTIONS: dict[str, tuple[Sentence, ...]] = {
+    "The scene": (
+        Sentence("Gaussians in 3-D have a centre, a rotation, three axes, an opacity and harmonics of colour.", "b2",
+                 ("quaternion", "harmonics")),
+        Sentence("The first Gaussians are pixels of the training views, lifted by their depth.", "b12",
+                 ("initial points", "depth zeros")),
+        Sentence("Bases over time deform centre, rotation and axes of each Gaussian.", "b1",
+                 ("FDM basis", "FDM composition", "initial FDM width")),
+        Sentence("The Gaussians are projected and blended from front to back; depth is blended like colour.", "b5",
+                 ("off-axis clamp of $J$", "support", "depth image", "depth gradient")),
+    ),
+    "Temporal dictionary": (
+        Sentence("Both residuals share sines and cosines of a few log-spaced frequencies.", "1",
+                 ("frequencies", "atom order")),
+        Sentence("For colour, each atom is centred and scaled to RMS 1 over the training stamps.", "1b",
+                 ("atom statistics",)),
+    ),
+    "A: appearance": (
+        Sentence("The degree-0 harmonic changes by a hyperbolic tangent of a sum of atoms, at most by a bound.", "2",
+                 ("colour residual",), "Temporal appearance improves"),
+        Sentence("Appearance is the largest of the three gains.", "2", (), "Temporal appearance is the largest"),
+    ),
+    "S: spectral motion": (
+        Sentence("A sum of raw atoms translates each Gaussian, in addition to the deformation.", "3",
+                 ("atoms of the motion residual",), "Spectral motion improves"),
+        Sentence("A Matérn-5/2 spectrum weights a quadratic penalty on the coefficients.", "4", ("Matérn weights",),
+                 "The Matérn prior changes PSNR"),
+        Sentence("The prior changes nothing at a fixed representation either.", "4", (),
+                 "The same with a fixed representation"),
+    ),
+    "L: Laplacian detail": (
+        Sentence("Three bands of a Laplacian pyramid of render and frame are compared by L1.", "5",
+                 ("pyramid filter", "pyramid up-sampling", "empty level"), "Laplacian detail improves"),
+        Sentence("The mask propagates through the pyramid, so that no excluded pixel enters a band value.", "5",
+                 ("pyramid mask",)),
+        Sentence("The weight of L makes its gradient a given fraction of the photometric one.", "7",
+                 ("calibration", "degenerate calibration")),
+    ),
+    "Training": (
+        Sentence("The photometric loss combines masked L1 and masked D-SSIM.", "b7",
+                 ("photometric loss", "mean of L1", "SSIM")),
+        Sentence("Rendered depth, divided by its maximum, is compared with the normalised prior.", "b8",
+                 ("depth loss", "gradient of the max")),
+        Sentence("Depth is smooth on tissue; total variation is small under instruments.", "b9", ("smoothness",)),
+        Sentence("All terms are added; A and S begin at iteration 3000, L ramps up from 1000 to 2500.", "6",
+                 ("Laplacian weight", "residual activation", "view sampling")),
+        Sentence("Adam steps all parameters; the rates of A and S are derived from that of the deformation.", "b10",
+                 ("residual schedule", "Adam on density iterations")),
+        Sentence("Gaussians with large screen gradients are cloned or split; transparent ones are removed.", "b11",
+                 ("density extent", "children")),
+    ),
+    "Results": (
+        Sentence("Held-out frames are every eighth; pulling has 39.34 dB.", "m1", ("split", "metrics"), "PSNR full"),
+        Sentence("Pulling reaches an SSIM of 0.967.", "m2", ("metrics",), "SSIM full"),
+        Sentence("Pulling reaches an LPIPS of 0.035.", "m3", ("metrics",), "LPIPS, if its input is in [0, 1]"),
+        Sentence("With a fixed number of Gaussians, appearance and detail improve on motion alone.", "6", (),
+                 "With a fixed number of Gaussians"),
+        Sentence("Over SurgicalGS with matched input PSNR gains 0.31 to 0.66 dB, and LPIPS falls by 0.0035 to 0.0096.",
+                 "6", (), "PSNR full, over SurgicalGS"),
+        Sentence("The view of the right eye is measured too.", "m1", (), "The view of the right eye"),
+        Sentence("A second split holds out every second frame.", "m1", ("split",), "Every second frame held out"),
+        Sentence("A third split holds out blocks of two frames.", "m1", ("split",), "Blocks of 2 frames held out"),
+        Sentence("A fourth split holds out the end of the clip.", "m1", ("split",), "The end of the clip held out"),
+    ),
+}  # fmt: skip
+
+
+def parts() -> dict[str, str]:
+    """Every generated part of the page by name."""
+    return {"method": method(), "systems": systems()}
+
+
+def method() -> str:
+    """A heading and a table for each section."""
+    rows = {row.label: row for row in equations()}
+    heads = ("In our words", "Equation", "Function", "Definition", "Check", "Notebook", "Ruling", "Verdict")
+    made = []
+    for section, sentences in SECTIONS.items():
+        cells = [[s.says, *links(rows[s.label]), rulings(s.rulings), verdict(s.verdict)] for s in sentences]
+        made.append(f"### {section}\n\n{markdown(heads, cells)}")
+    return "\n\n".join(made)
+
+
+def links(row: Equation) -> list[str]:
+    """Equation, compiled functions, their definitions, gradient check and notebook."""
+    functions = [name for name in row.functions if name.rpartition(".")[2] != "calibrate_on"]
+    texts = [text for name in functions if (text := definition_of(name))]
+    checks = [f"{{ref}}`{row.pairs[0].name} <check-{row.pairs[0].name}>`"] if row.pairs else ["none"]
+    chapters = [f"{{doc}}`{int(name[:2])} </notebooks/{name}>`" for name in row.notebooks]
+    shown = [f"{{eq}}`eq-{row.label}`", ", ".join(link(name) for name in functions)]
+    return [*shown, ", ".join(link(text, "text") for text in texts) or "none", *checks, ", ".join(chapters) or "none"]
+
+
+def link(dotted: str, words: str = "") -> str:
+    """Raises: InputError for a function that does not exist."""
+    if dotted not in definitions():
+        raise InputError(f"docs/pages/claims/paper.py: {dotted} is not a public function")
+    return f"{{py:obj}}`{words or dotted.rpartition('.')[2]} <{dotted}>`"
+
+
+def definition_of(function: str) -> str:
+    """The function of the same name in `endotsr.definition`, or ""."""
+    name = function.rpartition(".")[2]
+    found = [d for d in definitions() if d.startswith("endotsr.definition.") and d.rpartition(".")[2] == name]
+    return found[0] if found else ""
+
+
+def rulings(names: tuple[str, ...]) -> str:
+    """Questions and answers, from the tables of the rulings. Raises: InputError for a missing question."""
+    known = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|", RULINGS.read_text(encoding="utf-8"), re.MULTILINE))
+    if missing := [name for name in names if name not in known]:
+        raise InputError(f"docs/specification/rulings.md: no row: {', '.join(missing)}")
+    return ", ".join(f"{{doc}}`{re.sub('[$]', '', name)} </specification/rulings>`" for name in names) or "-"
+
+
+def verdict(start: str) -> str:
+    """The verdict of the claim with this start, from the page of claims. Raises: InputError if there is none."""
+    if not start:
+        return "-"
+    verdicts = CLAIMS.read_text(encoding="utf-8").partition("<!-- claims:verdicts:start -->")[2].partition("<!--")[0]
+    rows = [line.strip("| ").split(" | ") for line in verdicts.splitlines()]
+    found = [row[3] for row in rows if row[0].startswith(start)]
+    if not found:
+        raise InputError(f"docs/claims.md: no verdict on '{start}'")
+    return f"{{doc}}`{found[0].split(':')[0]} <claims>`"
+
+
+def systems() -> str:
+    """PSNR of the whole image on pulling, every eighth frame held out: published, and measured here."""
+    ablation = read_json(RESULTS / OURS, "endotsr ablate")
+    recorded = read_json(RESULTS / BASELINES, "docs/pages/full_size/record.py")["baselines"]
+    given = lambda name: f"{recorded[name]['mean']['psnr_full']:.2f}"
+    rows = [
+        ["SurgicalGS", f"{SURGICALGS:.2f}", level(ablation, "base"), "configuration `base`: matched input, no A, S, L"],
+        ["Endo-TSR", f"{PUBLISHED['pulling']['psnr_full']:.2f}", level(ablation, "A+S+L"), "preset `paper`"],
+        ["seven others of its table", "not at hand", "-", "scored from their pictures, see below"],
+        ["copy of the nearest training frame", "-", given("nearest_frame"), "no model"],
+        ["blend of the two neighbours", "-", given("two_neighbours"), "no model"],
+        ["optical-flow interpolation (DIS)", "-", given("flow_interpolation"), "no model"],
+    ]
+    return markdown(("System", "Published, dB", "Here, dB", "State here"), rows)
+
+
+def level(ablation: dict[str, Any], configuration: str) -> str:
+    """Mean and 95 % interval (Student) of a configuration of the ablation over its seeds."""
+    rows = [r for r in ablation["rows"] if (r["configuration"], r["split"]) == (configuration, "every_eighth")]
+    values = [row["psnr_full"] for row in rows if row.get("psnr_full") is not None]
+    if not values:
+        return "not measured yet"
+    mean, low, high = student(values)
+    return f"{mean:.2f}" if low is None or high is None else f"{mean:.2f} ({low:.2f} to {high:.2f})"
+
+
+def main(words: list[str]) -> None:
+    """Write the part of the page; takes no words."""
+    try:
+        write_marked(PAGE, parts(), "paper")
+    except InputError as error:
+        sys.exit(f"error: {error}")

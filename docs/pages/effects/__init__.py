@@ -1,0 +1,1 @@
+"""docs/effects.md: tests for effects, and what they are worth."""

@@ -1,0 +1,1 @@
+"""docs/full_size.md and docs/results: runs at full size."""

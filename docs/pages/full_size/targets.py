@@ -1,0 +1,89 @@
+"""PSNR of the targets between the frames (B14) against held-out frames, which they do not read.
+
+    python docs/make.py full_size.targets SEQUENCE [--scale S]   write docs/results/targets.json, then the table
+    python docs/make.py full_size.targets                        rewrite the table of the last result
+
+The table is in docs/specification/b14_between.md between its marks.
+"""
+
+import argparse
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import endotsr
+from endotsr.clips.opencv import warp_cubic
+from endotsr.clips.sequences.between import Flows, flows_between, frame_between, motion_between
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.results.evaluation.baselines import neighbours, two_neighbours, unit_image
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from pages.store.marks import read_json, write_marked
+
+DOCS = Path(__file__).parents[2]
+PAGE, FILE = DOCS / "specification/b14_between.md", DOCS / "results/targets.json"
+SPLITS: dict[str, dict[str, Any]] = {
+    "every eighth frame": {},
+    "blocks of 4 frames": {"split": "blocks", "block_length": 4},
+    "blocks of 8 frames": {"split": "blocks", "block_length": 8},
+    "blocks of 16 frames": {"split": "blocks", "block_length": 16},
+}
+KINDS = {"still": "both frames as they are", "moved": "both frames moved", "target": "the target"}
+
+
+def measured(sequence: Sequence) -> dict[str, float]:
+    """PSNR in dB over the tissue with a target, for every kind; `covered` is the fraction of such tissue."""
+    flows: dict[tuple[int, int], Flows] = {}
+    error, covered, tissue = dict.fromkeys(KINDS, 0.0), 0, 0
+    for index in (int(i) for i in sequence.test_index):
+        near = neighbours(sequence, index)
+        if near.before == near.after:
+            continue
+        pair = (near.before, near.after)
+        if pair not in flows:
+            flows[pair] = flows_between(sequence, *pair)
+        frame = frame_between(sequence, *pair, near.fraction, flows[pair])
+        pictures = {"still": two_neighbours(sequence, index), "target": frame.image}
+        pictures["moved"] = _moved(sequence, pair, near.fraction, flows[pair])
+        mask = sequence.masks[index] & frame.mask
+        covered, tissue = covered + int(mask.sum()), tissue + int(sequence.masks[index].sum())
+        for kind in KINDS:
+            squared = np.square(np.clip(pictures[kind], 0, 1) - unit_image(sequence, index)).mean(axis=0)
+            error[kind] += float(squared[mask].sum(dtype=np.float64))
+    return {kind: -10 * np.log10(e / covered) for kind, e in error.items()} | {"covered": covered / tissue}
+
+
+def _moved(sequence: Sequence, pair: tuple[int, int], fraction: float, flows: Flows) -> np.ndarray:
+    """The blend of both frames moved by the motion field, without the static pair and without masks."""
+    field, a = motion_between(flows, fraction), np.float32(fraction)
+    before, after = (unit_image(sequence, i) for i in pair)
+    return (1 - a) * warp_cubic(before, -a * field) + a * warp_cubic(after, (1 - a) * field)
+
+
+def table(result: dict[str, Any]) -> str:
+    """One row per split."""
+    rows = [
+        [split, *(f"{row[kind]:.2f}" for kind in KINDS), f"{100 * row['covered']:.1f} %"]
+        for split, row in result["splits"].items()
+    ]
+    head = ["Held out", *(f"{label}, dB" for label in KINDS.values()), "tissue with a target"]
+    about = f"PSNR over the tissue with a target; {result['sequence']}, scale {result['scale']:g}, {result['date']}."
+    return markdown(head, rows) + "\n\n" + about
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("sequence", nargs="?")
+    parser.add_argument("--scale", type=float, default=1.0)
+    options = parser.parse_args(words)
+    if options.sequence:
+        splits = {
+            name: measured(endotsr.load_sequence(options.sequence, scale=options.scale, **settings))
+            for name, settings in SPLITS.items()
+        }
+        about = {"date": date.today().isoformat(), "sequence": Path(options.sequence).name, "scale": options.scale}
+        write_json(FILE, about | {"splits": splits})
+    write_marked(PAGE, {"table": table(read_json(FILE, "python docs/make.py full_size.targets SEQUENCE"))}, "targets")

@@ -1,0 +1,1 @@
+"""docs/hard_cases.md: the gallery of hard cases."""

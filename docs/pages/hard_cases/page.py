@@ -1,0 +1,102 @@
+"""The gallery of hard cases: naive formula, truth and endotsr, in float64 and float32.
+
+python docs/make.py hard_cases     rewrites hard_cases.json, hard_cases.png, and the sentence and the gallery in
+                                      docs/hard_cases.md, in a few seconds
+
+Every naive formula is executed, on the same rounded inputs as ours; the truth is exact or has 60 digits (mpmath).
+"""
+
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endotsr.results.report.style import save
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine, now, versions
+from pages.hard_cases.gallery import CASES, DTYPES
+from pages.hard_cases.pictures import PICTURE, drawn, measured
+
+DOCS = Path(__file__).parents[2]
+RECORD, PAGE = DOCS / "results" / "hard_cases.json", DOCS / "hard_cases.md"
+START, END = "<!-- gallery:start (made by docs/pages/hard_cases/page.py) -->", "<!-- gallery:end -->"
+FIRST, LAST = "<!-- promise:start (made by docs/pages/hard_cases/page.py) -->", "<!-- promise:end -->"
+
+
+def error(value: float, truth: float) -> float:
+    """Relative, or absolute where the truth is 0."""
+    return abs(value - truth) / (abs(truth) or 1.0)
+
+
+def measure() -> list[dict[str, Any]]:
+    """All cases with the values and errors of both precisions."""
+    rows = []
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the naive formulas overflow and divide by zero: that is the point
+        for entry in CASES:
+            row: dict[str, Any] = {**entry._asdict(), "run": entry.run.__name__}
+            for label, dtype in DTYPES.items():
+                truth, naive, ours = (float(x) for x in entry.run(dtype))
+                row[label] = {"truth": truth, "naive": naive, "ours": ours}
+                row[label] |= {"naive_error": error(naive, truth), "ours_error": error(ours, truth)}
+            rows.append(row)
+    return rows
+
+
+def cell(value: float, miss: float) -> str:
+    """A value and its error."""
+    return f"{value:.7g} ({f'{miss:.0e}' if miss else 'exact'})" if math.isfinite(value) else f"**{value}**"
+
+
+def gallery(rows: list[dict[str, Any]], about: str) -> str:
+    """The gallery as Markdown."""
+    lines = []
+    for row in rows:
+        lines += [f"### {row['name']}: {row['title']}", "", row["why"], "", "| | float64 | float32 |", "|---|---|---|"]
+        lines.append("| right | " + " | ".join(f"{row[d]['truth']:.7g}" for d in DTYPES) + " |")
+        for label, key in ((row["naive"], "naive"), ("endotsr", "ours")):
+            lines.append(f"| {label} | " + " | ".join(cell(row[d][key], row[d][f"{key}_error"]) for d in DTYPES) + " |")
+        lines.append("")
+    return "\n".join([*lines, about])
+
+
+def promise(rows: list[dict[str, Any]]) -> str:
+    """What the page shows, in one sentence: the worst error in float32 of both ways of computing."""
+    usual = [row["float32"]["naive_error"] for row in rows]
+    none = sum(not math.isfinite(value) for value in usual)
+    coarse = sum(math.isfinite(value) and value >= 0.01 for value in usual)
+    ours = max(row["float32"]["ours_error"] for row in rows)
+    return (
+        f"**In {len(rows)} hard cases the usual formula, in float32, gives no number {none} times and is wrong by 1 % "
+        f"or more {coarse} times; endotsr is wrong by {ours:.0e} at most.**"
+    )
+
+
+def between(text: str, start: str, end: str, made: str) -> str:
+    """The text with what lies between two marks replaced."""
+    head, tail = text.split(start)[0], text.split(end)[1]
+    return f"{head}{start}\n\n{made}\n{end}{tail}"
+
+
+def plain(data: Any) -> Any:
+    """The same with words in place of numbers that JSON does not have."""
+    if isinstance(data, dict):
+        return {key: plain(value) for key, value in data.items()}
+    return str(data) if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    rows, computer, made = measure(), machine(), now()
+    libraries = {name: version for name, version in versions().items() if name in ("python", "numpy", "numba")}
+    about = (
+        f"Made by `python docs/make.py hard_cases` on {made[:10]}, {computer['processor']} "
+        f"({computer['cores']} cores), {', '.join(f'{name} {v}' for name, v in libraries.items())}."
+    )
+    text = between(PAGE.read_text(encoding="utf-8"), START, END, gallery(rows, about))
+    PAGE.write_text(between(text, FIRST, LAST, promise(rows) + "\n"), encoding="utf-8")
+    save(drawn(measured()), PICTURE)
+    record = {"made": made, "machine": computer, "versions": libraries, "cases": [plain(row) for row in rows]}
+    write_json(RECORD, record)

@@ -1,0 +1,1 @@
+"""Tables of docs/guides/port.md."""

@@ -1,0 +1,40 @@
+"""Rates at which the judge recognises unlisted mistakes: part of docs/guides/port.md, by
+
+    python docs/make.py ports.unseen
+
+The counts are those of `python tests/port/unseen/by_hand/measure.py --record now`.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from endotsr.results.report.tables import markdown
+from pages.effects.parts import machine
+from pages.store.marks import read_json, write_marked
+
+ROOT = Path(__file__).parents[3]
+PAGE = ROOT / "docs" / "guides" / "port.md"
+FILE = ROOT / "tests" / "port" / "unseen" / "by_hand" / "record.json"
+MADE_BY = "python tests/port/unseen/by_hand/measure.py --record now"
+
+
+def fragments(runs: dict[str, Any]) -> dict[str, str]:
+    """The rates of every run of the record, with their intervals."""
+    titles = {"before": "when the set was written", "now": "now"}
+    names = [name for name in titles if name in runs]
+    last = runs[names[-1]]
+    rows = [(what, *(_share(runs[name]["rates"][what]) for name in names)) for what in last["rates"]]
+    table = markdown(("Of mistakes that are on no list", *(titles[name] for name in names)), rows)
+    note = f"Version {last['golden']}, {last['rates']['refused'][1]} mistakes, float64 ({machine(last)})."
+    return {"rates": f"{table}\n\n{note}"}
+
+
+def _share(rate: list[float]) -> str:
+    """Per cent with the interval of 95 %."""
+    good, of, low, high = rate
+    return f"{100 * good / of:.1f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def main(words: list[str]) -> None:
+    """Write the part of the page; takes no words."""
+    write_marked(PAGE, fragments(read_json(FILE, MADE_BY)), "unseen")

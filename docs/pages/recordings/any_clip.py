@@ -1,0 +1,170 @@
+"""One simulated scene through two layouts, one command per step, and the table of the cost of each input route.
+
+    python docs/make.py recordings.any_clip                measure, a few minutes on two cores
+    python docs/make.py recordings.any_clip --ways stereo  repeat the measurement of one route
+    python docs/make.py recordings.any_clip --table        rewrite the table of the last result
+
+A scene with a moving camera and an instrument is written as a lossless EndoNeRF folder, and as raw recordings in the
+layout of StereoMIS. A recording is processed by prepare, depth, check, train and render. Two intermediate routes, the
+EndoNeRF folder with depth from its stereo pairs and a recording with lossless video, separate the cost of the depth, of
+the layout and of the compression.
+The result is docs/results/any_clip.json; the table is in docs/guides/prepare.md.
+"""
+
+import argparse
+import json
+import tempfile
+from collections.abc import Callable, Iterator
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endotsr.cli.main import main as endotsr
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.common import open_common
+from endotsr.clips.simulator.truth import read_truth
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
+from pages.store.marks import read_json, write_marked
+
+DOCS = Path(__file__).parents[2]
+FILE, PAGE = DOCS / "results" / "any_clip.json", DOCS / "guides" / "prepare.md"
+SCENE = ["moving-camera", "--instrument.on", "--width", "240", "--height", "192", "--frames", "25"]
+TRAINING = ["--preset", "demo", "--iterations", "600"]
+DEPTH = ["--nearest", "25", "--farthest", "120"]
+WAYS = {
+    "endonerf": "EndoNeRF layout, given depth",
+    "stereo": "EndoNeRF layout, depth from its stereo pairs",
+    "lossless": "StereoMIS layout, video without loss, `prepare`, `depth`",
+    "stereomis": "StereoMIS layout, compressed video, `prepare`, `depth`",
+}
+
+
+def said(*words: object) -> None:
+    """Run a command. Raises SystemExit if it fails."""
+    command = [str(word) for word in words]
+    print("endotsr", *command, flush=True)
+    if endotsr(command) != 0:
+        raise SystemExit(f"failed: endotsr {' '.join(command)}")
+
+
+def made(root: Path, way: str) -> list[object]:
+    """Create the folder of a route; returns its arguments of `train`."""
+    clean, clip = root / "clean", root / way
+    if way == "endonerf":
+        return [clean, "--masks", "gt_masks"]
+    if way == "stereo":
+        said("prepare", clean, "--out", clip, "--masks", clean / "gt_masks", "--baseline", "4")
+        said("depth", clip, *DEPTH, "--replace")
+        return [clip]
+    raw = root / f"raw-{way}"
+    said("simulate", *SCENE, "--out", raw, "--layout", "stereomis", *(["--lossless"] if way == "lossless" else []))
+    said("prepare", raw, "--out", clip)
+    said("depth", clip, *DEPTH)
+    said("check", clip)
+    return [clip]
+
+
+def measured(root: Path, way: str) -> dict[str, float]:
+    """Held-out metrics of a route, metrics of its renders against the lossless pictures, and its input."""
+    clean, run, report = root / "clean", root / f"run-{way}", root / f"{way}.json"
+    said("train", *made(root, way), "--out", run, *TRAINING)
+    said("render", run, "--film", root / f"{way}.mp4")
+    said("render", run, "--frames", "test", "--out", root / f"renders-{way}")
+    said(
+        "evaluate", "--pictures", root / f"renders-{way}" / "colour", "--sequence", clean,
+        "--sequence.masks", "gt_masks", "--json", report,
+    )  # fmt: skip
+    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    found = {
+        "own": metrics["held_out"]["mean"]["psnr_tissue"],
+        "lossless": json.loads(report.read_text(encoding="utf-8"))["held_out"]["mean"]["psnr_tissue"],
+        "ssim": metrics["held_out"]["mean"]["ssim_full"],
+        "flow": metrics["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
+    }
+    if way == "endonerf":
+        return found
+    truth = read_truth(clean)
+    depth = depth_error(root / way, lambda frame: truth.frame(frame).depth)
+    return found | depth | {"video": video_psnr(clean, root / way)}
+
+
+def frames_of(clean: Path, other: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The pictures of two folders, frame by frame, (H, W, 3) in [0, 255]."""
+    for file in sorted((clean / "images").iterdir()):
+        yield read_png(file).astype(np.float64), read_png(other / "images" / file.name).astype(np.float64)
+
+
+def video_psnr(clean: Path, prepared: Path) -> float:
+    """PSNR in dB of the prepared pictures against the lossless ones, over all frames; infinite if equal."""
+    error = np.mean([((a - b) ** 2).mean() for a, b in frames_of(clean, prepared)])
+    return float(10 * np.log10(255**2 / error)) if error else float("inf")
+
+
+def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> dict[str, float]:
+    """Median absolute error in mm of the depth on tissue, and the fraction of the tissue that has depth.
+
+    wanted    frame -> reference depth, (H, W) in mm; 0 = not compared
+    """
+    recording = open_common(prepared)
+    errors, covered = [], []
+    assert recording.depth is not None and recording.masks is not None
+    for i in range(recording.count):
+        depth, tissue, known = recording.depth(i), recording.masks(i), wanted(i)
+        assert depth is not None and tissue is not None and known is not None
+        compared = tissue & (known > 0)
+        errors.append(np.abs(depth - known)[compared & (depth > 0)])
+        covered.append((depth > 0)[compared].mean())
+    return {"depth_mm": float(np.median(np.concatenate(errors))), "coverage": float(np.mean(covered))}
+
+
+def table(result: dict[str, Any]) -> str:
+    """One row per route, and the differences between them."""
+    ways, rows = result["ways"], []
+    for way, label in WAYS.items():
+        if way not in ways:
+            continue
+        row = ways[way]
+        video = row.get("video", np.inf)
+        depth = f"{row['depth_mm']:.2f}, {row['coverage']:.0%}" if "depth_mm" in row else "given"
+        rows.append(
+            [label, f"{row['own']:.2f}", f"{row['lossless']:.2f}", f"{row['ssim']:.4f}", f"{row['flow']:.2f}",
+             "-" if video is None or not np.isfinite(video) else f"{video:.1f}", depth]
+        )  # fmt: skip
+    headings = ["Way", "PSNR tissue, dB", "against the lossless pictures, dB", "SSIM full", "optical flow, dB",
+                "PSNR of the prepared pictures, dB", "depth: error in mm, coverage"]  # fmt: skip
+    steps = {
+        "the depth from stereo": ("stereo", "endonerf"),
+        "the raw layout": ("lossless", "stereo"),
+        "the compression of the video": ("stereomis", "lossless"),
+    }
+    if "lossless" not in ways:
+        steps = {"the depth from stereo": ("stereo", "endonerf"), "layout and video": ("stereomis", "stereo")}
+    changes = [f"{what} {ways[a]['lossless'] - ways[b]['lossless']:+.2f} dB" for what, (a, b) in steps.items()]
+    about = (
+        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR"
+        f" against the lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A"
+        " compressed video loses sensor noise, which makes its own held-out frames easier to predict."
+        f" {result['date']}."
+    )
+    return markdown(headings, rows) + "\n\n" + about
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--table", action="store_true")
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
+    options = parser.parse_args(words)
+    if not options.table:
+        about = {"scene": " ".join(SCENE), "training": " ".join(TRAINING)}
+        known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+        ways = known["ways"] if {key: known.get(key) for key in about} == about else {}
+        with tempfile.TemporaryDirectory() as root:
+            said("simulate", *SCENE, "--out", Path(root) / "clean")
+            ways |= {way: measured(Path(root), way) for way in options.ways}
+        write_json(FILE, about | {"date": date.today().isoformat(), "machine": machine(), "ways": ways})
+    write_marked(PAGE, {"ways": table(read_json(FILE, "python docs/make.py recordings.any_clip"))}, "any_clip")

@@ -1,0 +1,127 @@
+"""Measure the memory of a training on a long clip that repeats the frames of a short one.
+
+    python docs/make.py recordings.long_clip --frames 2000 --memory 4     an 8 GB machine: half of its memory is the limit
+    python docs/make.py recordings.long_clip --frames 300 --memory 0.6    the same proportions, in a few minutes
+    python docs/make.py recordings.long_clip --table                      rewrite the table of the measured clips
+
+The frames of the source (--source, by default ../shared/data/endonerf_pulling) are linked repeatedly into a temporary
+folder. The training has as many iterations as training frames, so every frame is used about once, and ends with the
+whole evaluation. Meanwhile /proc reports its own memory (RssAnon) and pages of files that the system can drop at any
+time (RssFile). Results are added to docs/results/long_clip.json; the table is in docs/guides/prepare.md.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.checks.cost import estimated_cost
+from endotsr.config import config_from_dict, with_iterations
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
+from pages.store.marks import write_marked
+
+DOCS = Path(__file__).parents[2]
+FILE, PAGE = DOCS / "results" / "long_clip.json", DOCS / "guides" / "prepare.md"
+NAMES = ("images", "masks", "depth")
+
+
+def repeated(source: Path, clip: Path, frames: int) -> tuple[int, int]:
+    """A folder of links in the layout of EndoNeRF; returns width and height."""
+    files = {name: sorted((source / name).iterdir()) for name in NAMES}
+    for name, known in files.items():
+        (clip / name).mkdir(parents=True)
+        for i in range(frames):
+            os.symlink(known[i % len(known)].resolve(), clip / name / f"{i:06d}.png")
+    rows = np.load(source / "poses_bounds.npy")
+    np.save(clip / "poses_bounds.npy", rows[np.arange(frames) % len(rows)])
+    height, width = read_png(files["images"][0]).shape[:2]
+    return width, height
+
+
+def peaks(command: list[str]) -> dict[str, float]:
+    """Run a command to its end; the largest values of RssAnon, RssFile and their sum, in bytes."""
+    found = {"own": 0.0, "file": 0.0, "both": 0.0}
+    process = subprocess.Popen(command)
+    while process.poll() is None:
+        try:
+            lines = Path(f"/proc/{process.pid}/status").read_text(encoding="ascii").splitlines()
+        except (OSError, UnicodeDecodeError):
+            lines = []
+        values = {line.split(":")[0]: float(line.split()[1]) * 1024 for line in lines if line.startswith("Rss")}
+        own, file = values.get("RssAnon", 0.0), values.get("RssFile", 0.0) + values.get("RssShmem", 0.0)
+        for key, value in (("own", own), ("file", file), ("both", own + file)):
+            found[key] = max(found[key], value)
+        time.sleep(0.2)
+    if process.returncode:
+        raise SystemExit(f"failed: {' '.join(command)}")
+    return found
+
+
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """One training."""
+    with tempfile.TemporaryDirectory() as root:
+        clip, run = Path(root) / "clip", Path(root) / "run"
+        width, height = repeated(options.source, clip, options.frames)
+        iterations = options.frames - (options.frames + 6) // 8
+        words = ["train", str(clip), "--out", str(run), "--preset", options.preset, "--iterations", str(iterations)]
+        limit = ["--sequence.memory", f"{options.memory:g}"]
+        begun = time.monotonic()
+        found = peaks([sys.executable, "-m", "endotsr", *words, *limit])
+        metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    config = config_from_dict({"preset": options.preset, "sequence": {"memory": options.memory}})
+    cost = estimated_cost(options.frames, width, height, with_iterations(config, iterations))
+    about = {"frames": options.frames, "width": width, "height": height, "preset": options.preset}
+    return about | {
+        "memory": options.memory,
+        "iterations": iterations,
+        "gaussians": metrics["run"]["gaussians"],
+        "seconds": time.monotonic() - begun,
+        "own_bytes": found["own"],
+        "file_bytes": found["file"],
+        "both_bytes": found["both"],
+        "estimated_bytes": cost.total_bytes,
+        "estimated_file_bytes": cost.file_bytes,
+        "date": date.today().isoformat(),
+        "machine": machine(),
+    }
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """One row per measured training."""
+    headings = ["Frames", "Size", "Preset", "`sequence.memory`, GB", "estimated, GB", "own memory, GB",
+                "file of the frames, GB"]  # fmt: skip
+    cells = [
+        [f"{row['frames']}", f"{row['width']}x{row['height']}", f"`{row['preset']}`", f"{row['memory']:g}",
+         f"{row['estimated_bytes'] / 1e9:.2f}", f"{row['own_bytes'] / 1e9:.2f}",
+         f"{row['estimated_file_bytes'] / 1e9:.2f}"]
+        for row in rows
+    ]  # fmt: skip
+    return markdown(headings, cells)
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--source", type=Path, default=DOCS.parents[1] / "shared" / "data" / "endonerf_pulling")
+    parser.add_argument("--frames", type=int, default=300)
+    parser.add_argument("--memory", type=float, default=0.6)
+    parser.add_argument("--preset", default="paper")
+    parser.add_argument("--table", action="store_true")
+    options = parser.parse_args(words)
+    rows = json.loads(FILE.read_text(encoding="utf-8"))["rows"] if FILE.exists() else []
+    if not options.table:
+        key = (options.frames, options.memory, options.preset)
+        rows = [row for row in rows if (row["frames"], row["memory"], row["preset"]) != key] + [measured(options)]
+        write_json(FILE, {"rows": sorted(rows, key=lambda row: row["frames"])})
+    write_marked(PAGE, {"memory": table(rows)}, "long_clip")

@@ -1,0 +1,1 @@
+"""The store of experiments: records, stored answers of long measurements, intervals, published values."""

@@ -1,0 +1,1 @@
+"""docs/tradeoff.md: accuracy against time."""

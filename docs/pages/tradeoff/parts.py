@@ -1,0 +1,177 @@
+"""Generated parts of docs/tradeoff.md as Markdown, from the JSON of `endotsr tradeoff` and `tradeoff_train.py`."""
+
+from typing import Any
+
+from endotsr.results.report.tables import markdown
+from endotsr.studies.tradeoff.text import COLUMNS, front_rows, levels, made
+from pages.tradeoff.dials import OMITTED
+from pages.tradeoff.text import (
+    advice,
+    eight_bit_setting,
+    error_over_cutoff,
+    float32_floor,
+    judge_presets,
+    summary,
+    training_rows,
+)
+
+TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
+
+
+def fragments(
+    result: dict[str, Any], others: dict[str, dict[str, Any]], trainings: dict[str, dict[str, Any]]
+) -> dict[str, str]:
+    """Every generated part by name; a missing measurement is marked.
+
+    result      tradeoff.json of the simulated scene
+    others      the same of trained real scenes, by name
+    trainings   training.json by name
+    """
+    omitted = result["omitted"] | OMITTED  # reasons are facts of the present program, not of the measurement
+    return {
+        "promise": promise(result, others),
+        "advice": _numbered(advice(result)),
+        "made": made(result),
+        "front": markdown(COLUMNS, front_rows(result)),
+        "presets": _bullets(preset_lines(result)),
+        "certificate": certificate_line(result),
+        "omitted": _bullets([f"{what}: {why}." for what, why in omitted.items()]),
+        "scenes": scenes(result, others),
+        "training": "\n\n".join(training(name, t) for name, t in trainings.items()) or "Not measured yet.",
+    }
+
+
+def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """The cost of a smaller error in one sentence, and the setting that is right to 8 bits on every scene."""
+    by_name, chosen = {p["name"]: p for p in result["points"]}, eight_bit_setting(result)
+    if chosen is None:
+        return "No setting of float32 is right to the last of 8 bits."
+    paper, exact = (by_name[result["presets"][name]] for name in ("paper", "exact"))
+    smaller = paper["error"]["max"] / chosen["error"]["max"]
+    more = 100 * (_seconds(result, chosen) / _seconds(result, paper) - 1)
+    return (
+        f"**On the simulated scene {more:.0f} % more time per frame makes the largest error {smaller:.0f} times "
+        f"smaller than with `paper`; the exact picture takes "
+        f"{_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
+        f"{_everywhere(result, others)}"
+    )
+
+
+def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """The float32 setting with the fewest visits that is right to half a step of 8 bit on every measured scene."""
+    every = {"simulated": result} | others
+    found: dict[str, list[tuple[float, float]]] = {}  # setting -> (time, visits) relative to `paper`, by scene
+    for scene in every.values():
+        by_name = {p["name"]: p for p in scene["points"]}
+        paper = by_name[scene["presets"]["paper"]]
+        for point in (by_name[name] for name in scene["joint"]):
+            if point["setting"]["precision"] == "float32" and point["error"]["max"] <= scene["lines"]["eight_bit"]:
+                ratios = _seconds(scene, point) / _seconds(scene, paper), point["visits"] / paper["visits"]
+                found.setdefault(point["name"], []).append(ratios)
+    kept = {name: ratios for name, ratios in found.items() if len(ratios) == len(every)}
+    if len(every) < 2 or not kept:
+        return ""
+    best = min(kept, key=lambda name: (sum(visits for _, visits in kept[name]), name))
+    listed = ", ".join(f"{100 * (r - 1):.0f} % ({scene})" for scene, (r, _) in zip(every, kept[best], strict=True))
+    return (
+        f" The setting *{best}* is right to the last of 8 bits on all {len(every)} scenes of this page. Extra time "
+        f"per frame against `paper`: {listed}."
+    )
+
+
+def _seconds(scene: dict[str, Any], point: dict[str, Any]) -> float:
+    """Shortest time of a frame among the settings of the sweep with the same largest error."""
+    same = [p for p in scene["points"] if p["name"] in scene["joint"] and p["error"]["max"] == point["error"]["max"]]
+    return min(p["forward"]["median"] for p in (point, *same))
+
+
+def preset_lines(result: dict[str, Any]) -> list[str]:
+    """Status of each preset: on the front, or dominated by other settings and kept for a reason."""
+    lines = []
+    for name, verdict in judge_presets(result["points"], result["presets"]).items():
+        better, reason = verdict["dominated_by"], verdict["reason"]
+        if not better:
+            lines.append(f"`{name}`: no measured setting dominates it.")
+        else:
+            stays = f" It is kept because it {reason}." if reason else " No reason to keep it is listed."
+            lines.append(f"`{name}`: dominated by {better[0]}{_more(len(better) - 1)}.{stays}")
+    return lines
+
+
+def _more(count: int) -> str:
+    return f" and {count} more" if count else ""
+
+
+def certificate_line(result: dict[str, Any]) -> str:
+    """The figures of the certificate."""
+    c = result["reference"]["certificate"]
+    return (
+        f"Reference: differs from a cutoff of 1e-14 by {c['exact_against_1e14']:.1e}, from mpmath (30 digits) at "
+        f"{c['pixels']} pixels by {c['pixels_against_mpmath']:.1e}; cutoffs 1e-12 and 1e-14 differ by "
+        f"{c['cut_1e12_against_1e14']:.1e}. {'The certificate holds.' if c['holds'] else 'THE CERTIFICATE FAILS.'}"
+    )
+
+
+def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """The advice of the simulated scene, checked on every other."""
+    columns = (
+        "Scene",
+        "Gaussians",
+        "`paper`: RMS",
+        "`paper`: largest",
+        "error over cutoff, at most",
+        "smallest error of float32",
+        "8-bit setting: largest",
+        "its visits",
+        "verdict",
+    )
+    rows = [_scene_row(result, result), *(_scene_row(other, result) for other in others.values())]
+    about = [f"`{name}`: {made(other)} {certificate_line(other)}" for name, other in others.items()]
+    return "\n\n".join([markdown(columns, rows), _bullets(about)]) if others else "Not measured yet."
+
+
+def _scene_row(scene: dict[str, Any], simulated: dict[str, Any]) -> list[str]:
+    by_name = {p["name"]: p for p in scene["points"]}
+    paper = by_name[scene["presets"]["paper"]]
+    advised = eight_bit_setting(simulated)
+    here = by_name.get(advised["name"]) if advised else None
+    row = [scene["scene"]["name"], str(scene["scene"]["gaussians"]), levels(paper["error"]["rms"])]
+    row += [levels(paper["error"]["max"]), f"{error_over_cutoff(scene):.1f}", levels(float32_floor(scene))]
+    if here is None:
+        return [*row, "-", "-", "no such setting"]
+    ratio = f"{here['visits'] / paper['visits']:.1f}x"
+    return [*row, levels(here["error"]["max"]), ratio, _verdict(scene, paper, here)]
+
+
+def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any]) -> str:
+    """Whether the first two sentences of advice are right on a scene, and otherwise the alternative."""
+    wrong = []
+    if paper["error"]["rms"] > scene["lines"]["eight_bit"]:
+        wrong.append("the average error of `paper` exceeds half a step of 8 bit")
+    if here["error"]["max"] > scene["lines"]["eight_bit"]:
+        better = eight_bit_setting(scene)
+        instead = f"take {better['name']}" if better else "no float32 setting keeps it"
+        wrong.append(f"the 8-bit setting misses half a step: {instead}")
+    return "holds" if not wrong else "does not hold: " + "; ".join(wrong)
+
+
+def training(name: str, result: dict[str, Any]) -> str:
+    """One study of training: its conditions, its picture, the table, and the dominated trainings."""
+    m = result["machine"]
+    head = (
+        f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "
+        f"`{result['preset']}` stretched to {result['iterations']} iterations, measured {result['date'][:10]} on "
+        f"{result['threads']} threads of {m['processor']} ({m['cores']} cores)."
+    )
+    left = [f"{name}: {reason}" for name, reason in result["left_out"].items()]
+    picture = f"![Held-out PSNR against minutes of training](results/tradeoff_training_{name}.svg)"
+    table = markdown(TRAINING_COLUMNS, training_rows(result))
+    return "\n\n".join(part for part in (head, picture, table, _bullets(summary(result)), _bullets(left)) if part)
+
+
+def _numbered(sentences: list[str]) -> str:
+    return "\n".join(f"{i}. {sentence}" for i, sentence in enumerate(sentences, 1))
+
+
+def _bullets(lines: list[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)
