@@ -55,7 +55,7 @@ def test_page_names_what_is_missing(tmp_path):
     page.write_text("<!-- bench:colour:start -->\n<!-- bench:colour:end -->")
     with pytest.raises(SystemExit, match=r"page\.md: mark bench:colour has no end or no meaning; allowed: machine,"):
         bench.main([], page)
-    with pytest.raises(SystemExit, match=r"bench_stages\.json: cannot be read.*bench\.py measure"):
+    with pytest.raises(SystemExit, match=r"bench_stages\.json: cannot be read.*make\.py bench measure"):
         bench.main([str(tmp_path)], page)
     with pytest.raises(SystemExit, match=r"python docs/make\.py bench"):
         bench.main(["one", "two"], page)

@@ -6,7 +6,7 @@ import re
 import pytest
 from pages.store.marks import read_json, replaced
 
-made = importlib.import_module("injected")
+made = importlib.import_module("pages.ports.injected")
 
 
 def test_page_is_what_the_measurement_says():

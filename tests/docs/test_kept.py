@@ -71,7 +71,9 @@ def test_a_changed_source_is_another_measurement(tmp_path, monkeypatch):
     (package / "__init__.py").write_text("", encoding="utf-8")
     monkeypatch.setattr("endotsr.__file__", str(package / "__init__.py"))
     whole, room = kept.sources(""), kept.sources("effects")
-    assert kept.sources("") == whole != room and kept.sources("simulator") != room
+    assert kept.sources("") == whole != room
+    with pytest.raises(FileNotFoundError, match="simulator"):
+        kept.sources("simulator")
     (package / "effects" / "one.py").write_text("x = 2\n", encoding="utf-8")
     assert kept.sources("") != whole and kept.sources("effects") != room
-    assert kept.sources("effects", beside=("marks",)) != kept.sources("effects", beside=("kept",))
+    assert kept.sources("effects", beside=("store/marks",)) != kept.sources("effects", beside=("kept",))

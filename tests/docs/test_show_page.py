@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-made = importlib.import_module("show")
+made = importlib.import_module("pages.recordings.show")
 
 
 def test_table_is_what_the_measurement_says():

@@ -7,7 +7,7 @@ import pytest
 
 from endotsr.clips.simulator.scenes import SCENES
 
-made = importlib.import_module("simulate")
+made = importlib.import_module("pages.recordings.simulate")
 
 
 def test_table_is_what_the_measurement_says():

@@ -4,7 +4,7 @@ import importlib
 
 from pages.store.marks import read_json, replaced
 
-made = importlib.import_module("unseen")
+made = importlib.import_module("pages.ports.unseen")
 
 
 def test_the_rates_are_those_of_the_record():

@@ -1,4 +1,4 @@
-"""`python docs/make.py bench measure effects`: the cost of each optional component, and proof that a disabled component is free.
+"""`docs/make.py bench measure effects`: the cost of each optional component; a disabled one is free.
 
 For each component, iterations of two states of the common workload alternate, one with everything and one with the
 component off. Other work on the machine then disturbs both equally. A third build alternates with them: the second

@@ -1,4 +1,4 @@
-"""Generated parts of docs/bench.md, one function per part, as Markdown; the input is the JSON of `python docs/make.py bench measure`."""
+"""Generated parts of docs/bench.md, one function per part; the input is the JSON of `docs/make.py bench measure`."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""`python docs/make.py bench measure peers`: gsplat's pure-torch reference on the same arrays in the same run.
+"""`docs/make.py bench measure peers`: gsplat's pure-torch reference on the same arrays in the same run.
 
 One view of the common workload without time: colour and depth forward, then the gradients of a fixed random
 combination of the two images, one renderer after the other in one process. A substitute computes the lists of pairs,

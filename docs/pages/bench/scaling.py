@@ -1,4 +1,4 @@
-"""`python docs/make.py bench measure scaling`: growth of cost with each size alone, with fitted exponents.
+"""`docs/make.py bench measure scaling`: growth of cost with each size alone, with fitted exponents.
 
 Every point is measured in a separate process, so its peak memory belongs to its size. It is measured twice, with sizes
 ascending and descending, and the faster time is used: a temporary load of the machine does not distort the curve. An

@@ -1,4 +1,4 @@
-"""`python docs/make.py bench measure start`: from the call of the interpreter to the end of the first training iteration.
+"""`docs/make.py bench measure start`: from the call of the interpreter to the end of the first training iteration.
 
 A cold start begins with an empty kernel cache, a warm start with a full one. Each runs in a fresh process with the
 initialisation of a real run, and ends with one iteration with all components active, which needs the remaining kernels.

@@ -1,4 +1,4 @@
-"""`python docs/make.py bench measure`: every measurement in one call, as JSON in one folder.
+"""`docs/make.py bench measure`: every measurement in one call, as JSON in one folder.
 
 The measurements run one after the other, each in separate processes, on an otherwise idle machine.
 """

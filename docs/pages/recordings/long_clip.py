@@ -1,6 +1,6 @@
 """Measure the memory of a training on a long clip that repeats the frames of a short one.
 
-    python docs/make.py recordings.long_clip --frames 2000 --memory 4     an 8 GB machine: half of its memory is the limit
+    python docs/make.py recordings.long_clip --frames 2000 --memory 4     half the memory of an 8 GB machine
     python docs/make.py recordings.long_clip --frames 300 --memory 0.6    the same proportions, in a few minutes
     python docs/make.py recordings.long_clip --table                      rewrite the table of the measured clips
 

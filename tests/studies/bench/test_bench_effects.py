@@ -1,4 +1,4 @@
-"""`python docs/make.py bench measure effects`: a part that is off holds and allocates what a build without the part does."""
+"""`docs/make.py bench measure effects`: a part that is off costs what a build without it does."""
 
 import numba
 import numpy as np
