@@ -30,7 +30,7 @@ def test_every_file_of_the_package_is_in_the_wheel(wheel):
         for file in PACKAGE.rglob("*")
         if file.is_file() and "__pycache__" not in file.parts
     }
-    assert {"endotsr/views/viewer.html", "endotsr/views/viewer.js", "endotsr/py.typed"} <= {*wanted}
+    assert {"endotsr/results/views/viewer.html", "endotsr/results/views/viewer.js", "endotsr/py.typed"} <= {*wanted}
     assert {name: content for name, content in wheel.items() if name.startswith("endotsr/")} == wanted
 
 

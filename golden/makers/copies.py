@@ -28,8 +28,8 @@ from endotsr.port.stages.stage import Stage
 
 PACKAGE = Path(endotsr.__file__).parent
 ROOT = "endotsr"
-SHARED = {ROOT, f"{ROOT}.errors", f"{ROOT}.kernels.jit"}  # the same objects in every copy
-REGISTRY, CONTRACT = f"{ROOT}.stages.registry", f"{ROOT}.golden.contract"
+SHARED = {ROOT, f"{ROOT}.errors", f"{ROOT}.method.kernels.jit"}  # the same objects in every copy
+REGISTRY, CONTRACT = f"{ROOT}.port.stages.registry", f"{ROOT}.port.contract"
 
 
 class Edit(NamedTuple):

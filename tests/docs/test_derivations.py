@@ -8,13 +8,13 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "reference/endotsr"
 OPTIONS = (
-    "sequences/between",
-    "sequences/tracks",
-    "sequences/smaller",
-    "scene/tracked_motion",
-    "fitting/coarse_start",
-    "windows/scene",
-    "windows/carry",
+    "clips/sequences/between",
+    "clips/sequences/tracks",
+    "clips/sequences/smaller",
+    "training/scene/tracked_motion",
+    "training/fitting/coarse_start",
+    "studies/windows/scene",
+    "studies/windows/carry",
 )
 FILES = [*sorted((SOURCE / "definition").glob("*.py")), *(SOURCE / f"{name}.py" for name in OPTIONS)]
 DEFINITION = "\n".join(file.read_text("utf-8") for file in FILES)

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
+import house
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import (
@@ -189,7 +190,7 @@ def test_no_identifier_uses_a_replaced_word(file):
     found = {name: forbidden(name) for name in identifiers(ast.parse(file.read_text(encoding="utf-8")))}
     wrong = {name: instead for name, instead in found.items() if instead}
     assert not wrong, f"write instead: {wrong}"
-    room = file.relative_to(PACKAGE).parts[0]
+    room = house.room(".".join(file.relative_to(PACKAGE).parts)).rpartition(".")[2]
     assert [name for name in found if out_of_place(name, room)] == []
 
 

@@ -8,15 +8,24 @@ from collections.abc import Callable
 MODULES = (
     "method.kernels.exponential",
     "method.kernels.gather",
-    *(f"equations.{name}" for name in ("dictionary", "atom_sums", "appearance", "motion", "matern")),
-    *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation", "exposure", "pose")),
-    *(f"splatting.{name}" for name in ("camera", "camera_model", "covariance", "projection")),
-    *(f"splatting.{name}" for name in ("projection_formulas", "projection_kernels", "harmonics", "harmonics_formulas")),
+    *(f"method.equations.{name}" for name in ("dictionary", "atom_sums", "appearance", "motion", "matern")),
+    *(
+        f"method.equations.{name}"
+        for name in ("pyramid", "laplacian", "calibration", "deformation", "exposure", "pose")
+    ),
+    *(f"method.splatting.{name}" for name in ("camera", "camera_model", "covariance", "projection")),
+    *(
+        f"method.splatting.{name}"
+        for name in ("projection_formulas", "projection_kernels", "harmonics", "harmonics_formulas")
+    ),
     "method.kernels.sums",
-    *(f"splatting.{name}" for name in ("records", "binning", "compositing", "fast.blocks", "fast.tiles", "render")),
-    *(f"losses.{name}" for name in ("rows", "masked_l1", "masked_ssim", "depth", "smoothness")),
+    *(
+        f"method.splatting.{name}"
+        for name in ("records", "binning", "compositing", "fast.blocks", "fast.tiles", "render")
+    ),
+    *(f"method.losses.{name}" for name in ("rows", "masked_l1", "masked_ssim", "depth", "smoothness")),
     "training.scene.density_control",
-    *(f"fitting.{name}" for name in ("adam", "fused.coefficients", "fused.deformation", "model", "objective")),
+    *(f"training.fitting.{name}" for name in ("adam", "fused.coefficients", "fused.deformation", "model", "objective")),
     "training.fitting.schedules",
 )
 # functions in which only a named defect is planted

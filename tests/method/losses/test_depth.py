@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from losses.made_up_images import tool_mask
 
 from endotsr.definition import depth as definition
 from endotsr.method.losses.depth import FEWEST_VALID, depth_target, normalised_depth_forward, normalised_depth_reverse
+from method.losses.made_up_images import tool_mask
 
 
 def depths(seed=0):

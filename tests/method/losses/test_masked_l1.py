@@ -3,10 +3,10 @@
 import numba
 import numpy as np
 import pytest
-from losses.made_up_images import images, tool_mask
 
 from endotsr.definition import masked_l1 as definition
 from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from method.losses.made_up_images import images, tool_mask
 
 U32 = 2.0**-24
 

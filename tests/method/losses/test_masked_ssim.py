@@ -3,7 +3,6 @@
 import numba
 import numpy as np
 import pytest
-from losses.made_up_images import images, tool_mask
 from scipy import ndimage
 
 from endotsr.definition import masked_ssim as definition
@@ -18,6 +17,7 @@ from endotsr.method.losses.masked_ssim import (
     ssim_target,
     window,
 )
+from method.losses.made_up_images import images, tool_mask
 from oracle.complex_step import derivative
 
 U32, U64 = 2.0**-24, 2.0**-53

@@ -3,10 +3,10 @@
 import numba
 import numpy as np
 import pytest
-from losses.made_up_images import images, tool_mask
 
 from endotsr.definition import smoothness as definition
 from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
+from method.losses.made_up_images import images, tool_mask
 
 FACTOR = 30.0
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from report.test_report import Reader, without_pictures
-from views.browser import seen
 
 from endotsr.clips.effects.clip import Clip
 from endotsr.clips.effects.inspect import Inspection
@@ -13,6 +11,8 @@ from endotsr.clips.effects.plan import Change, Dictionary, Plan
 from endotsr.clips.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.method.equations.dictionary import AtomReport
 from endotsr.results.report.inspection import inspection_html, inspection_text
+from results.report.test_report import Reader, without_pictures
+from results.views.browser import seen
 
 WIDTHS = """<pre id="probe"></pre><script>document.getElementById("probe").textContent = JSON.stringify(
 {"cut": [...document.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length});</script>"""
