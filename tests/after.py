@@ -1,0 +1,123 @@
+"""What to run after a change: python tests/after.py [REVISION] [--run]
+
+Compares the working tree with REVISION (the last commit by default; with a clean tree, the commit before it), and
+prints the commands in order: lint, types of the changed files, the programs whose output depends on the change, and the
+tests of the rooms that it touches. `--run` runs them and stops at the first that fails.
+"""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = "reference/endotsr/"
+FORMATTED = ("reference", "golden", "tests", "notebooks", "docs/_extensions", "docs/pages", "docs/make.py")
+# Hold for the whole package: names, words, layers. Less than a minute together.
+ALWAYS = ("tests/test_layout.py", "tests/test_conventions.py", "tests/docs/test_glossary.py")
+# Beginning of a changed path -> command whose output depends on it.
+MAKERS = {
+    "notebooks/": "python docs/make.py book.chapters",
+    f"{PACKAGE}config.py": "python tests/port/unseen/by_hand/constants.py",
+    "golden/cases/": "python tests/port/unseen/by_hand/constants.py",
+}
+# Beginning of a changed path -> tests beside those of its room.
+MORE = {
+    f"{PACKAGE}definition/": ("tests/definition", "tests/test_specification.py"),
+    f"{PACKAGE}method/": ("tests/test_gradcheck.py", "tests/definition/test_twins.py"),
+    f"{PACKAGE}port/stages/": ("tests/test_gradcheck.py", "tests/definition/test_twins.py"),
+    f"{PACKAGE}config.py": ("tests/test_specification.py", "tests/cli/test_cli_options.py", "tests/port/vectors"),
+    f"{PACKAGE}api.py": ("tests/test_api.py",),
+    f"{PACKAGE}cli/": ("tests/cli",),
+    "golden/": ("tests/port/vectors",),
+    "docs/specification/": ("tests/test_specification.py", "tests/docs/test_derivations.py"),
+    "docs/": ("tests/docs",),
+    "README.md": ("tests/docs/test_readme.py",),
+}
+
+
+def git(*words: str) -> list[str]:
+    """Lines of the output."""
+    done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+def changed(revision: str | None) -> list[str]:
+    """Paths that differ from the revision, files that git does not know included; deleted files left out."""
+    new = git("ls-files", "--others", "--exclude-standard")
+    base = revision or ("HEAD" if git("diff", "--name-only", "HEAD") or new else "HEAD~1")
+    return sorted({*git("diff", "--name-only", "--diff-filter=d", base), *new})
+
+
+def makers(paths: list[str]) -> list[str]:
+    """Programs whose output depends on the paths; a record belongs to the programs that name it."""
+    found = [command for start, command in MAKERS.items() if any(path.startswith(start) for path in paths)]
+    records = {Path(path).name for path in paths if path.startswith("docs/results/") and path.endswith(".json")}
+    for file in sorted((ROOT / "docs" / "pages").glob("*/*.py")):
+        text = file.read_text(encoding="utf-8")
+        if "\ndef main(words: list[str]" in text and any(f'"{name}"' in text for name in records):
+            name = file.parent.name if file.stem == "page" else f"{file.parent.name}.{file.stem}"
+            found.append(f"python docs/make.py {name}")
+    return list(dict.fromkeys(found))
+
+
+def tests_of(path: str) -> list[str]:
+    """Tests of a path: the file itself, the folder of its room, and what `MORE` names."""
+    if path.startswith("tests/") and Path(path).name.startswith("test_"):
+        return [path]
+    found = [name for start, names in MORE.items() if path.startswith(start) for name in names]
+    if path.startswith(PACKAGE):
+        parts = Path(path.removeprefix(PACKAGE)).parts[:-1]
+        for depth in (2, 1):
+            folder = "/".join(("tests", *parts[:depth]))
+            if len(parts) >= depth and (ROOT / folder).is_dir():
+                return [folder, *found]
+    if path.startswith("notebooks/") and path.endswith(".py"):
+        found.append("tests/test_notebooks.py")
+    return found
+
+
+def importing(paths: list[str]) -> list[str]:
+    """Files of tests that import a changed module of the package by its full name."""
+    names = {path.removeprefix("reference/").removesuffix(".py").replace("/", ".") for path in paths}
+    found = []
+    for file in sorted((ROOT / "tests").rglob("test_*.py")):
+        nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if names & {node.module for node in nodes if isinstance(node, ast.ImportFrom)}:
+            found.append(file.relative_to(ROOT).as_posix())
+    return found
+
+
+def commands(paths: list[str]) -> list[str]:
+    """All commands, in the order in which they fail fastest."""
+    typed = [
+        p for p in paths if p.endswith(".py") and p.startswith(("reference/", "golden/make", "docs/make", "docs/pages"))
+    ]
+    tests = [*ALWAYS, *(test for path in paths for test in tests_of(path)), *importing(paths)]
+    folders = {test for test in tests if not test.endswith(".py")}
+    kept = [test for test in dict.fromkeys(tests) if not any(str(up) in folders for up in Path(test).parents)]
+    rooms = " ".join(FORMATTED)
+    return [
+        f"ruff check {rooms}",
+        f"ruff format --check {rooms}",
+        "lint-imports",
+        *([f"pyright {' '.join(typed)}"] if typed else []),
+        *makers(paths),
+        f"pytest -q {' '.join(kept)}",
+    ]
+
+
+def main(words: list[str]) -> int:
+    """Print the commands; with --run, run them. Returns: the exit code of the first that fails, or 0."""
+    given = [word for word in words if word != "--run"]
+    for command in commands(changed(given[0] if given else None)):
+        print(command, flush=True)
+        if "--run" in words:
+            code = subprocess.run(command.split(), cwd=ROOT, check=False).returncode
+            if code:
+                return code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,29 @@
+"""The commands after a change: every file that they name exists, and a change reaches its tests and its pages."""
+
+import after
+
+
+def test_a_kernel_reaches_its_room_its_gradients_and_its_twin():
+    found = after.commands(["reference/endotsr/method/losses/depth.py"])
+    assert "pyright reference/endotsr/method/losses/depth.py" in found
+    for test in ("tests/method/losses", "tests/test_gradcheck.py", "tests/definition/test_twins.py"):
+        assert test in found[-1].split()
+
+
+def test_a_record_reaches_the_pages_that_read_it():
+    assert after.makers(["docs/results/levers.json"]) == ["python docs/make.py full_size.levers"]
+    assert "python docs/make.py book.chapters" in after.makers(["notebooks/03_deformation.py"])
+    assert after.makers(["README.md"]) == []
+
+
+def test_a_folder_takes_the_place_of_its_files():
+    path = "reference/endotsr/clips/sequences/splits.py"
+    words = after.commands([path, "tests/clips/sequences/test_splits.py"])[-1].split()
+    assert "tests/clips/sequences" in words and "tests/clips/sequences/test_splits.py" not in words
+
+
+def test_every_path_of_the_tables_exists():
+    tests = {test for names in after.MORE.values() for test in names} | {*after.ALWAYS, *after.FORMATTED}
+    starts = {*after.MAKERS, *after.MORE}
+    programs = {command.split()[1] for command in after.MAKERS.values()}
+    assert not [path for path in tests | starts | programs if not (after.ROOT / path).exists()]
