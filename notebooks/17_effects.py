@@ -27,7 +27,7 @@ import matplotlib.pyplot as plt
 import msgspec
 import numpy as np
 
-from endotsr.clips.effects.clip import TILE, training_clip
+from endotsr.clips.effects.frames import TILE, reduced_frames
 from endotsr.clips.effects.inspect import inspect_sequence
 from endotsr.clips.effects.noise import temporal_noise
 from endotsr.clips.effects.plan import apply_plan, make_plan
@@ -71,7 +71,7 @@ def noise_text(x, mask):
 
 
 # %%
-whole = training_clip(made["still"].sequence)
+whole = reduced_frames(made["still"].sequence)
 run = slice(1, 8)  # frames 2 to 8: between two that are held out, at equal steps
 part = whole._replace(images=whole.images[run], masks=whole.masks[run], times=whole.times[run])
 assert np.ptp(np.diff(part.times)) < 1e-12
@@ -145,7 +145,7 @@ def seen_at_text(camera, start, x, y, rho):
 change = msgspec.structs.replace
 settings = with_effects(SimulatorSettings(frames=9, seed=7), "noise", "camera_motion")
 swing = simulate(change(settings, camera_motion=change(settings.camera_motion, amplitude=5.0)))
-clip = training_clip(swing.sequence)
+clip = reduced_frames(swing.sequence)
 start, reference = clip.cameras[clip.reference], int(swing.sequence.train_index[clip.reference])
 row, column = 3 * TILE, 5 * TILE
 place = np.array([[column + 0.5], [row + 0.5]])

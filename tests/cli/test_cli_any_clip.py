@@ -46,22 +46,22 @@ def test_the_raw_folder_is_in_the_published_layout(chain):
 def test_prepare_finds_cameras_pictures_masks_and_depth_of_the_scene(chain):
     said("simulate", *SCENE, "--out", chain / "clean")
     clean = read_endonerf(chain / "clean", SequenceConfig(masks="gt_masks", depth_percentiles=(0.0, 100.0)))
-    recording = open_common(chain / "clip")
+    clip = open_common(chain / "clip")
     truth = read_truth(chain / "clean")
-    assert recording.lens and recording.poses and recording.masks and recording.depth
+    assert clip.intrinsics and clip.poses and clip.masks and clip.depth
     camera = clean.cameras[0]
-    np.testing.assert_allclose(recording.lens[:4], (camera.fx, camera.fy, camera.cx, camera.cy), rtol=1e-6)
-    assert recording.baseline == pytest.approx(4.0)
+    np.testing.assert_allclose(clip.intrinsics[:4], (camera.fx, camera.fy, camera.cx, camera.cy), rtol=1e-6)
+    assert clip.baseline == pytest.approx(4.0)
     errors, covered = [], []
-    for i, pair in enumerate(recording.pictures(list(range(9)))):
-        pose, expected = recording.poses[i], clean.cameras[i]
+    for i, pair in enumerate(clip.pictures(list(range(9)))):
+        pose, expected = clip.poses[i], clean.cameras[i]
         assert pose is not None
         np.testing.assert_allclose(pose.rotation, expected.rotation, atol=1e-12)
         np.testing.assert_allclose(pose.translation, expected.translation, atol=1e-9)
         apart = np.abs(pair.left.astype(float) - clean.images[i].transpose(1, 2, 0))
         assert apart.mean() < 6  # grey levels: what the video loses
-        np.testing.assert_array_equal(recording.masks(i), clean.masks[i])
-        depth, tissue = recording.depth(i), clean.masks[i]
+        np.testing.assert_array_equal(clip.masks(i), clean.masks[i])
+        depth, tissue = clip.depth(i), clean.masks[i]
         assert depth is not None
         known = (depth > 0) & tissue
         errors.append(np.abs(depth - truth.frame(i).depth)[known])

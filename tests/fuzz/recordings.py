@@ -139,7 +139,7 @@ def read_sequence_file(path: Path) -> object:
     from endotsr.clips.sequences.sequence_file import read_sequence_file as read
 
     found = read(path.parent)
-    return found.camera.lens(path), read_poses(found, path)
+    return found.camera.intrinsics(path), read_poses(found, path)
 
 
 def rig_seeds() -> list[bytes]:
@@ -150,9 +150,9 @@ def rig_seeds() -> list[bytes]:
 
 
 def read_rig(path: Path) -> object:
-    from endotsr.clips.sequences.calibrations import lens_or_rig
+    from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
 
-    return lens_or_rig(path, 64, 48)
+    return intrinsics_or_stereo(path, 64, 48)
 
 
 def trajectory_seeds() -> list[bytes]:

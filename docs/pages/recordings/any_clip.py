@@ -109,11 +109,11 @@ def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> d
 
     wanted    frame -> reference depth, (H, W) in mm; 0 = not compared
     """
-    recording = open_common(prepared)
+    clip = open_common(prepared)
     errors, covered = [], []
-    assert recording.depth is not None and recording.masks is not None
-    for i in range(recording.count):
-        depth, tissue, known = recording.depth(i), recording.masks(i), wanted(i)
+    assert clip.depth is not None and clip.masks is not None
+    for i in range(clip.count):
+        depth, tissue, known = clip.depth(i), clip.masks(i), wanted(i)
         assert depth is not None and tissue is not None and known is not None
         compared = tissue & (known > 0)
         errors.append(np.abs(depth - known)[compared & (depth > 0)])

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.sequences.propose_masks import propose_masks
-from endotsr.clips.sequences.recording import Picture
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.config import with_settings

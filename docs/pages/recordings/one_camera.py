@@ -108,20 +108,22 @@ def _forget_depth(clip: Path) -> None:
 
 def _interpolate(clip: Path) -> None:
     """Planes between the points, as computed by `endotsr prepare` from a reconstruction."""
+    from endotsr.clips.sequences.clip import CameraPose
     from endotsr.clips.sequences.points import depth_from_points
-    from endotsr.clips.sequences.recording import Pose
 
-    recording = open_common(clip)
-    lens = recording.lens
-    assert recording.depth is not None and lens is not None
+    opened = open_common(clip)
+    intrinsics = opened.intrinsics
+    assert opened.depth is not None and intrinsics is not None
     for i, file in enumerate(sorted((clip / "depth").iterdir())):
-        depth, stored = recording.depth(i), read_png(file)
+        depth, stored = opened.depth(i), read_png(file)
         assert depth is not None
         row, column = np.nonzero(depth)
         z = depth[row, column].astype(np.float64)
-        view = np.stack([(column + 0.5 - lens.cx) * z / lens.fx, (row + 0.5 - lens.cy) * z / lens.fy, z], 1)
+        view = np.stack(
+            [(column + 0.5 - intrinsics.cx) * z / intrinsics.fx, (row + 0.5 - intrinsics.cy) * z / intrinsics.fy, z], 1
+        )
         step = float(np.median(z / stored[row, column]))
-        planes = depth_from_points(view, Pose(np.eye(3), np.zeros(3)), lens, "interpolated")
+        planes = depth_from_points(view, CameraPose(np.eye(3), np.zeros(3)), intrinsics, "interpolated")
         write_png(file, np.rint(planes / step).astype(np.uint16))
 
 
@@ -136,16 +138,16 @@ def measured(root: Path, scene: str, way: str) -> dict[str, float]:
 
 def _depth_error(clip: Path, clean: Path) -> dict[str, float]:
     """Median relative error of the prior depth on tissue, after one scale for the clip if its unit is arbitrary."""
-    recording, truth = open_common(clip), read_truth(clean)
-    assert recording.depth is not None and recording.masks is not None
+    opened, truth = open_common(clip), read_truth(clean)
+    assert opened.depth is not None and opened.masks is not None
     ratios = []
-    for i in range(recording.count):
-        depth, tissue = recording.depth(i), recording.masks(i)
+    for i in range(opened.count):
+        depth, tissue = opened.depth(i), opened.masks(i)
         assert depth is not None and tissue is not None
         known = tissue & (depth > 0)
         ratios.append((depth / truth.frame(i).depth)[known])
     ratio = np.concatenate(ratios)
-    return {"depth": float(np.median(np.abs(ratio / (np.median(ratio) if recording.unit == "arbitrary" else 1) - 1)))}
+    return {"depth": float(np.median(np.abs(ratio / (np.median(ratio) if opened.unit == "arbitrary" else 1) - 1)))}
 
 
 def table(result: dict[str, Any]) -> str:

@@ -80,14 +80,14 @@ def recordings(clip: Path, root: Path) -> dict[str, Path]:
 def prepared(clip: Path, root: Path) -> dict[str, Path]:
     """The common format of every route."""
     camera, baseline = rectified_pair(clip)
-    lens: list[object] = [camera.fx, camera.fy, camera.cx, camera.cy]
+    intrinsics: list[object] = [camera.fx, camera.fy, camera.cx, camera.cy]
     common: list[object] = ["--scale", SCALE, "--baseline", f"{baseline:.4f}"]
     made = recordings(clip, root)
     sources: dict[str, list[object]] = {
         GIVEN: [clip],
         "png": [clip],
-        "jpg": [made["jpg"], "--camera", *lens, "--masks", clip / "masks"],
-        "mp4": [made["mp4"], "--stereo", "stacked", "--camera", *lens, "--masks", clip / "masks"],
+        "jpg": [made["jpg"], "--camera", *intrinsics, "--masks", clip / "masks"],
+        "mp4": [made["mp4"], "--stereo", "stacked", "--camera", *intrinsics, "--masks", clip / "masks"],
     }
     for way, words in sources.items():
         said("prepare", *words, "--out", root / "clips" / way, *common)

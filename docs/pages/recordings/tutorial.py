@@ -44,11 +44,11 @@ def recorded(raw: Path) -> Picture:
 
 def prepared(clip: Path) -> Picture:
     """Rows of picture, mask and depth."""
-    recording = open_common(clip)
-    assert recording.masks is not None and recording.depth is not None
+    opened = open_common(clip)
+    assert opened.masks is not None and opened.depth is not None
     rows = []
-    for i, pair in zip(SHOWN, recording.pictures(list(SHOWN))):
-        depth, tissue = recording.depth(i), recording.masks(i)
+    for i, pair in zip(SHOWN, opened.pictures(list(SHOWN))):
+        depth, tissue = opened.depth(i), opened.masks(i)
         assert depth is not None and tissue is not None
         rows.append(np.concatenate([pair.left, overlay(pair.left, ~tissue), coloured(depth, 35.0, 65.0)], axis=1))
     return np.concatenate(rows)

@@ -34,7 +34,7 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(MasksOptions, words, "masks")
     from endotsr.clips.sequences.files import shortened
-    from endotsr.clips.sequences.layouts import open_recording
+    from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.make_masks import OVERLAY, enter_masks, write_proposal
     from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.untrusted.writing import refuse_existing
@@ -43,8 +43,8 @@ def run(words: list[str]) -> int:
         proposal, place = enter_masks(options.sequence, options.replace), options.sequence
     else:
         refuse_existing(options.out)
-        recording = open_recording(options.sequence, SourceOptions(layout=options.layout))
-        proposal, place = write_proposal(recording, options.out), options.out
+        clip = describe(options.sequence, SourceOptions(layout=options.layout))
+        proposal, place = write_proposal(clip, options.out), options.out
     fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)
     write_result(
         options.json, folder=place, found=proposal.found, reason=proposal.reason, excluded_fraction=fraction,

@@ -92,7 +92,7 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(PrepareOptions, words, "prepare")
     from endotsr.clips.sequences.editing import cropped, united
-    from endotsr.clips.sequences.layouts import open_recording
+    from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.prepare import PrepareSettings, prepare
     from endotsr.clips.sequences.sequence_file import RIGHT
     from endotsr.untrusted.writing import refuse_existing
@@ -103,13 +103,13 @@ def run(words: list[str]) -> int:
     settings = PrepareSettings(
         options.frames, options.drop, options.rate, options.scale, options.gaps, options.pictures, options.points
     )
-    recording = open_recording(options.source, _stated(options))
+    clip = describe(options.source, _stated(options))
     if options.unite_masks:
-        recording = united(recording, options.unite_masks, _stated(options))
+        clip = united(clip, options.unite_masks, _stated(options))
     if options.crop:
-        recording = cropped(recording, options.crop)
-    print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
-    found, notes = prepare(recording, options.out, settings, replace=options.replace)
+        clip = cropped(clip, options.crop)
+    print(f"source: {options.source}, layout {clip.layout}, {clip.count} frames", flush=True)
+    found, notes = prepare(clip, options.out, settings, replace=options.replace)
     if options.also:
         from endotsr.clips.sequences.for_others import describe_for
 
@@ -121,7 +121,7 @@ def run(words: list[str]) -> int:
     pair = (options.out / RIGHT).is_dir()
     print(_next_step(options.out, found.depth is not None, camera.baseline > 0, pair))
     write_result(
-        options.json, source=options.source, layout=recording.layout, folder=options.out, frames=found.frames,
+        options.json, source=options.source, layout=clip.layout, folder=options.out, frames=found.frames,
         width=camera.width, height=camera.height, stereo=camera.baseline > 0, depth=found.depth is not None,
         notes=list(notes),
     )  # fmt: skip

@@ -9,7 +9,7 @@ from pages.effects.study import settings_of
 from scenes import clip
 
 from data_folder import data_folder
-from endotsr.clips.effects.clip import TILE, training_clip
+from endotsr.clips.effects.frames import TILE, reduced_frames
 from endotsr.clips.effects.motion import motion_verdict
 from endotsr.clips.effects.noise import estimate_noise
 from endotsr.clips.effects.rigid import fit_rigid, inverse_depth, predicted_flow
@@ -22,14 +22,14 @@ SWING = 3.0  # mm
 
 
 def _motion(sequence):
-    found = training_clip(sequence)
+    found = reduced_frames(sequence)
     noise = estimate_noise(sequence, found)
     return motion_verdict(sequence, found, make_tracks(found, noise), noise)[0]
 
 
 def test_inverse_depth_of_resting_points_is_found_exactly():
     """Also where frames do not see them, and for a point without an end: its inverse depth is 0."""
-    found = training_clip(clip("noise", "camera_motion", amplitude=9.0))
+    found = reduced_frames(clip("noise", "camera_motion", amplitude=9.0))
     rng = np.random.default_rng(0)
     place = rng.uniform(10, 110, (2, 40))
     inverse = np.append(1 / rng.uniform(30, 80, 39), 0.0)
@@ -41,7 +41,7 @@ def test_inverse_depth_of_resting_points_is_found_exactly():
 
 def test_predicted_flow_is_that_of_the_simulated_tissue():
     made = simulate(settings_of(("noise", "camera_motion"), 0, 9, 5.0))
-    found = training_clip(made.sequence)
+    found = reduced_frames(made.sequence)
     train = made.sequence.train_index
     middle = int(train[found.reference])
     row, column = 40, 70
@@ -84,7 +84,7 @@ def test_tiles_beside_excluded_pixels_are_left_out():
     sequence = clip("noise", "camera_motion", amplitude=SWING)
     masks = sequence.masks.copy()
     masks[:, 40:44, 72:76] = False
-    changed = training_clip(replace(sequence, masks=masks))
+    changed = reduced_frames(replace(sequence, masks=masks))
     noise = estimate_noise(sequence, changed)
     clear = fit_rigid(changed, make_tracks(changed, noise), noise).clear.reshape(128 // TILE, 160 // TILE)
     assert not clear[0].any() and not clear[:, -1].any()  # the edge of the picture
@@ -98,13 +98,13 @@ def test_flow_that_does_not_return_counts_as_noise():
     images = sequence.images.copy()
     rng = np.random.default_rng(3)
     images[:, :, 32:96, 32:128] = rng.integers(60, 200, images[:, :, 32:96, 32:128].shape, dtype=np.uint8)
-    changed = training_clip(replace(sequence, images=images))
+    changed = reduced_frames(replace(sequence, images=images))
     noise = estimate_noise(sequence, changed)
     tracks = make_tracks(changed, noise)
     inside = (slice(3, 5), slice(3, 7))
     error = fit_rigid(changed, tracks, noise).error.reshape(128 // TILE, 160 // TILE)
     assert error[inside].min() > 0.3
-    plain = training_clip(sequence)
+    plain = reduced_frames(sequence)
     error = fit_rigid(plain, make_tracks(plain, noise), noise).error.reshape(128 // TILE, 160 // TILE)
     assert error[inside].max() < 0.15
 

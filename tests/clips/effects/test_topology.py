@@ -8,7 +8,7 @@ import pytest
 from pages.effects.study import blurred, smoky
 from scenes import clip, inspected
 
-from endotsr.clips.effects.clip import training_clip, with_clear_reference
+from endotsr.clips.effects.frames import reduced_frames, with_clear_reference
 from endotsr.clips.effects.inspect import inspect_sequence
 from endotsr.clips.effects.noise import estimate_noise
 from endotsr.clips.effects.topology import local_correlation, topology_verdict
@@ -69,7 +69,7 @@ def test_a_moving_camera_leaves_a_new_region_open():
 
 def test_too_few_clear_frames_leave_it_open():
     sequence = clip("noise")
-    found = training_clip(sequence)
+    found = reduced_frames(sequence)
     noise = estimate_noise(sequence, found)
     clear = np.zeros(found.count, bool)
     clear[:5] = True
@@ -80,7 +80,7 @@ def test_too_few_clear_frames_leave_it_open():
 
 def test_correlation_is_one_with_the_frame_itself_and_nan_off_tissue():
     sequence = clip("noise", "instrument")
-    found = training_clip(sequence)
+    found = reduced_frames(sequence)
     sigma = float(estimate_noise(sequence, found).working.mean())
     score = local_correlation(found, found.luminance, 3, 3, sigma)
     assert (np.isnan(score) == ~found.masks[3]).all()
@@ -98,7 +98,7 @@ def test_spoiled_frames_in_the_middle_are_no_motion(spoil, strength):
 
 
 def test_the_reference_is_the_clear_frame_nearest_the_middle():
-    found = training_clip(clip("noise"))
+    found = reduced_frames(clip("noise"))
     clear = np.ones(found.count, bool)
     assert with_clear_reference(found, clear).reference == found.count // 2
     clear[found.count // 2 - 1 : found.count // 2 + 2] = False

@@ -7,7 +7,7 @@ import pytest
 from pages.effects.study import blurred, expectation, settings_of, smoky
 from scenes import clip, inspected
 
-from endotsr.clips.effects.clip import training_clip
+from endotsr.clips.effects.frames import reduced_frames
 from endotsr.clips.effects.inspect import EFFECTS, inspect_sequence, inspection_record
 from endotsr.clips.effects.noise import estimate_noise
 from endotsr.clips.effects.verdict import EffectVerdict
@@ -39,7 +39,7 @@ def test_noise_is_measured_and_moving_texture_adds_little_to_it(sigma, effects, 
     rng = np.random.default_rng(0)
     noisy = np.clip(sequence.images + rng.normal(0, 255 * sigma, sequence.images.shape), 0, 255)
     changed = replace(sequence, images=np.rint(noisy).astype(np.uint8))
-    assert 0.9 * sigma < estimate_noise(changed, training_clip(changed)).level < most * sigma
+    assert 0.9 * sigma < estimate_noise(changed, reduced_frames(changed)).level < most * sigma
 
 
 def test_held_out_frames_are_not_read():
@@ -84,7 +84,7 @@ def test_wider_views_determine_higher_degrees(amplitude, degree):
     sequence = clip("noise", "camera_motion")
     cameras = make_cameras(settings_of(("noise", "camera_motion"), 0, sequence.count, amplitude), sequence.times)
     moved = replace(sequence, cameras=cameras)
-    assert view_verdict(moved, training_clip(moved)).details["degree"] == degree
+    assert view_verdict(moved, reduced_frames(moved)).details["degree"] == degree
 
 
 def test_too_little_tissue_leaves_motion_open():

@@ -8,7 +8,7 @@ from public_layouts import K, stereo_yaml
 from raw_sources import ini
 
 from endotsr.clips.sequences.calibration_formats import FORMATS
-from endotsr.clips.sequences.calibrations import lens_or_rig
+from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
 from endotsr.errors import InputError
 
 SIZE = (128, 96)
@@ -38,49 +38,49 @@ def kalibr(pair=True, **changes):
     return yaml.safe_dump(chain | ({"cam1": camera | {"T_cn_cnm1": motion.tolist()}} if pair else {}))
 
 
-def check_lens(lens, distortion):
-    assert lens[:6] == (100.0, 101.0, 64.0, 48.0, *SIZE)  # half a pixel more than the file
-    np.testing.assert_allclose(lens.distortion, distortion)
+def check_intrinsics(intrinsics, distortion):
+    assert intrinsics[:6] == (100.0, 101.0, 64.0, 48.0, *SIZE)  # half a pixel more than the file
+    np.testing.assert_allclose(intrinsics.distortion, distortion)
 
 
 def test_one_camera_of_opencv(tmp_path):
     stereo_yaml(tmp_path / "a.yaml", image_width=128, image_height=96, camera_matrix=K,
                 distortion_coefficients=np.array([BENT]))  # fmt: skip
-    lens, rig = lens_or_rig(tmp_path / "a.yaml", *SIZE)
-    assert rig is None
-    check_lens(lens, BENT)
+    intrinsics, calibration = intrinsics_or_stereo(tmp_path / "a.yaml", *SIZE)
+    assert calibration is None
+    check_intrinsics(intrinsics, BENT)
 
 
 def test_pictures_of_half_the_size_scale_a_calibration_that_says_its_size(tmp_path):
     stereo_yaml(tmp_path / "a.yaml", image_width=128, image_height=96, camera_matrix=K)
-    lens = lens_or_rig(tmp_path / "a.yaml", 64, 48)[0]
-    assert lens[:4] == (50.0, 50.5, 32.0, 24.0)
+    intrinsics = intrinsics_or_stereo(tmp_path / "a.yaml", 64, 48)[0]
+    assert intrinsics[:4] == (50.0, 50.5, 32.0, 24.0)
     with pytest.raises(InputError, match="the calibration is of 128x96"):
-        lens_or_rig(tmp_path / "a.yaml", 64, 64)
+        intrinsics_or_stereo(tmp_path / "a.yaml", 64, 64)
 
 
 def test_a_pair_of_opencv(tmp_path):
     bent = np.array([BENT])
     stereo_yaml(tmp_path / "a.yaml", M1=K, D1=bent, M2=K, D2=bent, R=TURN, T=SHIFT.reshape(3, 1))
-    lens, rig = lens_or_rig(tmp_path / "a.yaml", *SIZE)
-    assert lens is None
-    check_lens(rig.left, BENT)
-    np.testing.assert_allclose(rig.rotation, TURN)
-    np.testing.assert_allclose(rig.translation, SHIFT)
+    intrinsics, calibration = intrinsics_or_stereo(tmp_path / "a.yaml", *SIZE)
+    assert intrinsics is None
+    check_intrinsics(calibration.left, BENT)
+    np.testing.assert_allclose(calibration.rotation, TURN)
+    np.testing.assert_allclose(calibration.translation, SHIFT)
 
 
 def test_one_camera_of_ros_and_of_kalibr(tmp_path):
     (tmp_path / "ros.yaml").write_text(ros(K))
     (tmp_path / "kalibr.yaml").write_text(kalibr(pair=False))
-    check_lens(lens_or_rig(tmp_path / "ros.yaml", *SIZE)[0], BENT)
-    check_lens(lens_or_rig(tmp_path / "kalibr.yaml", *SIZE)[0], BENT[:4])
+    check_intrinsics(intrinsics_or_stereo(tmp_path / "ros.yaml", *SIZE)[0], BENT)
+    check_intrinsics(intrinsics_or_stereo(tmp_path / "kalibr.yaml", *SIZE)[0], BENT[:4])
 
 
 def test_a_pair_of_kalibr_is_in_metres(tmp_path):
     (tmp_path / "a.yaml").write_text(kalibr())
-    rig = lens_or_rig(tmp_path / "a.yaml", *SIZE)[1]
-    np.testing.assert_allclose(rig.translation, SHIFT)
-    np.testing.assert_allclose(rig.rotation, TURN)
+    calibration = intrinsics_or_stereo(tmp_path / "a.yaml", *SIZE)[1]
+    np.testing.assert_allclose(calibration.translation, SHIFT)
+    np.testing.assert_allclose(calibration.rotation, TURN)
 
 
 def test_a_pair_of_ros_is_that_of_stereo_rectify(tmp_path):
@@ -91,22 +91,22 @@ def test_a_pair_of_ros_is_that_of_stereo_rectify(tmp_path):
         changes = {"rectification_matrix": {"data": turn.ravel().tolist()},
                    "projection_matrix": {"data": projection.ravel().tolist()}}  # fmt: skip
         (tmp_path / f"{name}.yaml").write_text(ros(K, none, **changes))
-    rig = lens_or_rig(tmp_path, *SIZE)[1]
-    np.testing.assert_allclose(rig.rotation, TURN, atol=1e-9)
-    np.testing.assert_allclose(rig.translation, SHIFT, atol=1e-9)
+    calibration = intrinsics_or_stereo(tmp_path, *SIZE)[1]
+    np.testing.assert_allclose(calibration.rotation, TURN, atol=1e-9)
+    np.testing.assert_allclose(calibration.translation, SHIFT, atol=1e-9)
 
 
 @pytest.mark.parametrize("text", ["100 0 63.5\n0 101 47.5\n0 0 1\n", "[[100,0,63.5],[0,101,47.5],[0,0,1]]",
                                   "100 0 63.5 0\n0 101 47.5 0\n0 0 1 0\n"])  # fmt: skip
 def test_a_matrix_as_text(text, tmp_path):
     (tmp_path / "K.txt").write_text(text)
-    check_lens(lens_or_rig(tmp_path / "K.txt", *SIZE)[0], ())
+    check_intrinsics(intrinsics_or_stereo(tmp_path / "K.txt", *SIZE)[0], ())
 
 
 def test_the_ini_of_stereomis_is_one_of_them(tmp_path):
     (tmp_path / "a.ini").write_text(ini())
-    lens, rig = lens_or_rig(tmp_path / "a.ini", 64, 48)
-    assert lens is None and rig.left.cx == 31.5 and rig.translation.tolist() == [-4.0, 0.0, 0.0]
+    intrinsics, calibration = intrinsics_or_stereo(tmp_path / "a.ini", 64, 48)
+    assert intrinsics is None and calibration.left.cx == 31.5 and calibration.translation.tolist() == [-4.0, 0.0, 0.0]
 
 
 FISH = {"distortion_model": "equidistant"}
@@ -133,7 +133,7 @@ def test_what_is_no_calibration_is_refused(said, tmp_path):
     name, text = REFUSED[said]
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=name) as caught:
-        lens_or_rig(tmp_path / name, *SIZE)
+        intrinsics_or_stereo(tmp_path / name, *SIZE)
     assert said in str(caught.value)
 
 

@@ -181,14 +181,14 @@ def test_directions_and_axes_say_the_same(tmp_path):
 
 def test_a_recording_of_the_folder_gives_the_same_frames(tmp_path):
     written(tmp_path, right=True, poses=moving())
-    sequence, recording = read_common(tmp_path, WHOLE, 0.2), open_common(tmp_path)
-    pairs = list(recording.pictures([1, 3]))
+    sequence, clip = read_common(tmp_path, WHOLE, 0.2), open_common(tmp_path)
+    pairs = list(clip.pictures([1, 3]))
     for i, pair in zip((1, 3), pairs, strict=True):
         np.testing.assert_array_equal(pair.left.transpose(2, 0, 1), sequence.images[i])
-        assert pair.right is not None and recording.masks and recording.depth
-        np.testing.assert_array_equal(recording.masks(i), sequence.masks[i])
-        np.testing.assert_array_equal(recording.depth(i), sequence.depth[i])
-    assert recording.baseline == 4.0 and recording.lens == (30.0, 33.0, 15.0, 13.0, WIDTH, HEIGHT, ())
+        assert pair.right is not None and clip.masks and clip.depth
+        np.testing.assert_array_equal(clip.masks(i), sequence.masks[i])
+        np.testing.assert_array_equal(clip.depth(i), sequence.depth[i])
+    assert clip.baseline == 4.0 and clip.intrinsics == (30.0, 33.0, 15.0, 13.0, WIDTH, HEIGHT, ())
 
 
 def text(path, old, new, count=1):

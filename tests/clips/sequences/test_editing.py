@@ -8,9 +8,9 @@ from made_videos import CAMERA, UNEVEN, picture, pictures, write
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.clip import Clip, Intrinsics, PicturePair, StereoCalibration
 from endotsr.clips.sequences.common import open_common, read_common
 from endotsr.clips.sequences.editing import chosen_frames, cropped, without
-from endotsr.clips.sequences.recording import Lens, PicturePair, Recording, Rig
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
 from endotsr.config import PAPER
 from endotsr.errors import InputError
@@ -23,9 +23,9 @@ def recording(count=20, **known):
     def pictures(wanted):
         for i in wanted:
             shown = np.stack([x, y, np.full_like(x, i)], 2).astype(np.uint8)
-            yield PicturePair(shown, shown + np.uint8(100) if known.get("rig") else None)
+            yield PicturePair(shown, shown + np.uint8(100) if known.get("calibration") else None)
 
-    return Recording("test", __file__, [str(i) for i in range(count)], pictures, **known)  # type: ignore[arg-type]
+    return Clip("test", __file__, [str(i) for i in range(count)], pictures, **known)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("text", "frames"), [
@@ -61,11 +61,12 @@ def test_frames_are_left_out():
 
 
 def test_a_crop_moves_the_principal_point_of_every_camera():
-    lens = Lens(30.0, 31.0, 16.0, 12.0, 32, 24)
-    rig = Rig(lens, lens._replace(cx=15.0), np.eye(3), np.array([-4.0, 0, 0]))
-    found = cropped(recording(lens=lens, rig=rig, depth=lambda i: np.arange(768, dtype=np.float32).reshape(24, 32),
+    intrinsics = Intrinsics(30.0, 31.0, 16.0, 12.0, 32, 24)
+    calibration = StereoCalibration(intrinsics, intrinsics._replace(cx=15.0), np.eye(3), np.array([-4.0, 0, 0]))
+    found = cropped(recording(intrinsics=intrinsics, calibration=calibration,
+                              depth=lambda i: np.arange(768, dtype=np.float32).reshape(24, 32),
                               masks=lambda i: None if i else np.ones((24, 32), bool)), (5, 3, 20, 12))  # fmt: skip
-    assert found.lens == Lens(30.0, 31.0, 11.0, 9.0, 20, 12) and found.rig.right.cx == 10.0
+    assert found.intrinsics == Intrinsics(30.0, 31.0, 11.0, 9.0, 20, 12) and found.calibration.right.cx == 10.0
     pair = next(found.pictures([7]))
     assert pair.left[0, 0].tolist() == [5, 3, 7] and pair.left[-1, -1].tolist() == [24, 14, 7]
     assert pair.right[0, 0].tolist() == [105, 103, 107]
@@ -84,7 +85,7 @@ def test_a_cropped_clip_sees_the_same_world(tmp_path):
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--crop", "4", "3", "20", "18"]
     assert main(words) == 0
     whole, part = open_common(tmp_path / "clip"), open_common(tmp_path / "o")
-    assert (part.lens.cx, part.lens.cy) == (whole.lens.cx - 4, whole.lens.cy - 3)
+    assert (part.intrinsics.cx, part.intrinsics.cy) == (whole.intrinsics.cx - 4, whole.intrinsics.cy - 3)
     np.testing.assert_allclose(part.depth(2), whole.depth(2)[3:21, 4:24], atol=0.01)
     assert (part.masks(2) == whole.masks(2)[3:21, 4:24]).all()
 

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.stereo import rectification_maps
+from endotsr.clips.sequences.clip import intrinsics_of_matrix
 from endotsr.clips.sequences.common import open_common, read_common
 from endotsr.clips.sequences.depth_files import step_of_depth
-from endotsr.clips.sequences.layouts import layout_of, open_recording, read_sequence
+from endotsr.clips.sequences.layouts import describe, layout_of, read_sequence
 from endotsr.clips.sequences.prepare import PrepareSettings, prepare
-from endotsr.clips.sequences.recording import lens_of_matrix
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.straighten import straightener
@@ -27,7 +27,7 @@ CAMERA = (60.0, 61.0, 30.0, 25.0)
 
 
 def prepared(source, out, settings=PrepareSettings(), **options):  # noqa: B008
-    found, notes = prepare(open_recording(source, SourceOptions(**options)), out, settings)
+    found, notes = prepare(describe(source, SourceOptions(**options)), out, settings)
     assert not [p for p in out.parent.iterdir() if p.name.startswith(".")]
     return found, notes
 
@@ -40,7 +40,7 @@ def test_a_folder_of_pictures_keeps_every_pixel(tmp_path):
     assert found.frames == 4 and found.depth is None and found.masks is None
     for i in range(4):  # 8, 9, 10, 11: ordered by number
         np.testing.assert_array_equal(read_png(tmp_path / f"out/images/{i:06d}.png"), scene_picture(i))
-    assert open_common(tmp_path / "out").lens == (*CAMERA, WIDTH, HEIGHT, ())
+    assert open_common(tmp_path / "out").intrinsics == (*CAMERA, WIDTH, HEIGHT, ())
 
 
 def test_a_lossless_video_gives_the_pictures_it_was_made_of(tmp_path):
@@ -75,7 +75,7 @@ def test_resizing_moves_the_camera_along(tmp_path):
     written(tmp_path / "a", right=True, poses=moving())
     prepared(tmp_path / "a", tmp_path / "b", PrepareSettings(scale=0.75))
     whole, half = (open_common(tmp_path / name) for name in "ab")
-    assert half.lens and whole.lens and half.lens[:6] == tuple(np.array(whole.lens[:6]) * 0.75)
+    assert half.intrinsics and whole.intrinsics and half.intrinsics[:6] == tuple(np.array(whole.intrinsics[:6]) * 0.75)
     assert half.baseline == whole.baseline and half.poses and whole.poses
     np.testing.assert_array_equal(half.poses[3].translation, whole.poses[3].translation)
     same = read_common(tmp_path / "a", SequenceConfig(scale=0.75), 0.2)
@@ -95,10 +95,10 @@ def test_depth_is_reduced_as_a_training_reduces_it(tmp_path, scale):
         write_png(file, plane)
     prepared(tmp_path / "a", tmp_path / "b", PrepareSettings(scale=scale))
     whole = read_common(tmp_path / "a", SequenceConfig(scale=scale), 0.2)
-    recording = open_common(tmp_path / "a")
-    straight = straightener(recording, 32, 24, scale)
+    clip = open_common(tmp_path / "a")
+    straight = straightener(clip, 32, 24, scale)
     for i in range(whole.count):
-        np.testing.assert_array_equal(straight.depth(recording.depth(i)), whole.depth[i])  # pyright: ignore
+        np.testing.assert_array_equal(straight.depth(clip.depth(i)), whole.depth[i])  # pyright: ignore
     reduced = read_common(tmp_path / "b", SequenceConfig(), 0.2)
     step = read_sequence_file(tmp_path / "b").depth.scale  # pyright: ignore[reportOptionalMemberAccess]
     np.testing.assert_allclose(reduced.depth, whole.depth, rtol=0, atol=0.51 * step)
@@ -120,12 +120,12 @@ def test_rectified_rows_correspond_and_each_camera_has_its_own_distortion():
     )
     maps = rectification_maps(matrices, (np.array(left), np.array(right)), rotation, translation, 160, 120)
     assert maps.baseline == pytest.approx(np.linalg.norm(translation), rel=1e-9)
-    lens = lens_of_matrix(maps.left.matrix, 160, 120, where="here")
+    intrinsics = intrinsics_of_matrix(maps.left.matrix, 160, 120, where="here")
     points = np.random.default_rng(4).uniform([-8, -6, 50], [8, 6, 80], (30, 3))
     turned = points @ maps.left.rotation.T
-    u = lens.fx * turned[:, 0] / turned[:, 2] + lens.cx
-    v = lens.fy * turned[:, 1] / turned[:, 2] + lens.cy
-    disparity = lens.fx * maps.baseline / turned[:, 2]
+    u = intrinsics.fx * turned[:, 0] / turned[:, 2] + intrinsics.cx
+    v = intrinsics.fy * turned[:, 1] / turned[:, 2] + intrinsics.cy
+    disparity = intrinsics.fx * maps.baseline / turned[:, 2]
     for shift, map_, matrix, coefficients, turn, move in (
         (0.0, maps.left, matrices[0], left, np.zeros(3), np.zeros(3)),
         (disparity, maps.right, matrices[1], right, Rotation.from_matrix(rotation).as_rotvec(), translation),
@@ -143,12 +143,12 @@ def test_stereomis_as_it_is_distributed(tmp_path):
     found, notes = prepared(tmp_path / "P2_8", tmp_path / "out")
     assert (found.frames, found.unit, found.frame_rate) == (6, "mm", 25.0)
     assert found.camera.baseline == pytest.approx(4.0) and any("rectified: baseline 4 mm" in note for note in notes)
-    recording = open_common(tmp_path / "out")
-    pair = next(recording.pictures([2]))
+    clip = open_common(tmp_path / "out")
+    pair = next(clip.pictures([2]))
     assert pair.right is not None and pair.right.shape == (HEIGHT, WIDTH, 3)
-    assert recording.masks is not None
-    assert 0.6 < recording.masks(0).mean() < 0.97 and not recording.masks(0)[8, 12]  # pyright: ignore[reportOptionalMemberAccess]
-    centres = [-pose.rotation.T @ pose.translation for pose in recording.poses or [] if pose]
+    assert clip.masks is not None
+    assert 0.6 < clip.masks(0).mean() < 0.97 and not clip.masks(0)[8, 12]  # pyright: ignore[reportOptionalMemberAccess]
+    centres = [-pose.rotation.T @ pose.translation for pose in clip.poses or [] if pose]
     np.testing.assert_allclose(np.diff(centres, axis=0), [[1.0, 0, 0]] * 5, atol=1e-9)  # metres became millimetres
 
 
@@ -187,15 +187,15 @@ def test_colmap(tmp_path, binary):
     points, poses = colmap(tmp_path / "model", binary)
     assert layout_of(tmp_path / "model").name == "colmap"
     found, _ = prepared(tmp_path / "model", tmp_path / "out", PrepareSettings(points="sparse"))
-    recording = open_common(tmp_path / "out")
-    assert found.unit == "arbitrary" and recording.lens == (60.0, 61.0, 30.0, 25.0, 64, 48, ())
-    assert recording.poses and recording.depth
-    for pose, (rotation, translation) in zip(recording.poses, poses):
+    clip = open_common(tmp_path / "out")
+    assert found.unit == "arbitrary" and clip.intrinsics == (60.0, 61.0, 30.0, 25.0, 64, 48, ())
+    assert clip.poses and clip.depth
+    for pose, (rotation, translation) in zip(clip.poses, poses):
         assert pose is not None
         np.testing.assert_allclose(pose.rotation, rotation, atol=1e-12)
         np.testing.assert_allclose(pose.translation, translation, atol=1e-12)
     view = points @ poses[2][0].T + poses[2][1]
-    depth = recording.depth(2)
+    depth = clip.depth(2)
     assert depth is not None and 20 < np.count_nonzero(depth) <= 40
     for x, y, z in view:
         column, row = int(60 * x / z + 30), int(61 * y / z + 25)
@@ -205,14 +205,14 @@ def test_colmap(tmp_path, binary):
 
 def test_depth_between_points_lies_on_their_planes(tmp_path):
     """The points of a slanted plane: 1 / z is linear in the picture, so the interpolation is exact."""
+    from endotsr.clips.sequences.clip import CameraPose, Intrinsics
     from endotsr.clips.sequences.points import depth_from_points
-    from endotsr.clips.sequences.recording import CameraPose, Lens
 
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-4, 4, (2, 60))
     points = np.column_stack([x, y, 10 + 0.3 * x - 0.2 * y])
-    lens = Lens(60.0, 50.0, 30.0, 26.0, 64, 48)
-    depth = depth_from_points(points, CameraPose(np.eye(3), np.zeros(3)), lens, "interpolated")
+    intrinsics = Intrinsics(60.0, 50.0, 30.0, 26.0, 64, 48)
+    depth = depth_from_points(points, CameraPose(np.eye(3), np.zeros(3)), intrinsics, "interpolated")
     row, column = np.nonzero(depth)
     assert len(row) > 1000
     a, b = (column + 0.5 - 30) / 60, (row + 0.5 - 26) / 50
@@ -345,7 +345,7 @@ def test_a_cut_off_colmap_file_is_refused(tmp_path, cut):
         if cut < len(whole):
             file.write_bytes(whole[:cut])
             with pytest.raises(InputError, match=f"{name}.bin"):
-                open_recording(tmp_path / "model", SourceOptions())
+                describe(tmp_path / "model", SourceOptions())
             file.write_bytes(whole)
 
 

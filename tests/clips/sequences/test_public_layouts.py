@@ -9,7 +9,7 @@ from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.common import open_common
 from endotsr.clips.sequences.layouts import c3vd as c3vd_layout
-from endotsr.clips.sequences.layouts import layout_of, open_recording
+from endotsr.clips.sequences.layouts import describe, layout_of
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 
@@ -34,7 +34,7 @@ def test_hamlyn(names, columns, tmp_path, capsys):
     made.hamlyn(tmp_path / "raw", names, columns)
     assert layout_of(tmp_path / "raw").name == "hamlyn"
     found = prepared(tmp_path, *(("--baseline", "5") if len(names) == 3 else ()))
-    assert found.lens[:4] == LENS and found.count == made.FRAMES and found.poses is None
+    assert found.intrinsics[:4] == LENS and found.count == made.FRAMES and found.poses is None
     assert (found.baseline == 5.0) == (len(names) == 3)
     np.testing.assert_allclose(found.depth(2), np.rint(made.depth(2)), atol=0.01)
     assert "half a pixel was added" in capsys.readouterr().out
@@ -50,7 +50,7 @@ def test_a_matrix_of_a_right_camera_is_no_camera_matrix(tmp_path, capsys):
 def test_servct(tmp_path, capsys):
     made.servct(tmp_path / "raw")
     found = prepared(tmp_path)
-    assert found.lens[:4] == LENS and found.baseline == pytest.approx(made.BASELINE)
+    assert found.intrinsics[:4] == LENS and found.baseline == pytest.approx(made.BASELINE)
     np.testing.assert_allclose(found.depth(3), made.depth(3), atol=0.01)
     assert "not for training one scene" in capsys.readouterr().out
 
@@ -68,7 +68,7 @@ def test_scared(archive, tmp_path):
     made.scared(tmp_path / "raw", archive)
     found = prepared(tmp_path)
     assert (found.baseline, found.rate) == (pytest.approx(made.BASELINE), 25.0)
-    np.testing.assert_allclose(found.lens[0], 100.5, atol=0.6)  # rectified: one focal length
+    np.testing.assert_allclose(found.intrinsics[0], 100.5, atol=0.6)  # rectified: one focal length
     same_poses(found.poses)
     pair = next(found.pictures([1]))
     assert pair.right is not None and pair.left.shape == (made.HEIGHT, made.WIDTH, 3)
@@ -85,8 +85,8 @@ def test_scared_without_kinematics_rests_and_a_broken_archive_is_refused(tmp_pat
 
 def test_c3vd(tmp_path):
     made.c3vd(tmp_path / "raw")
-    found = open_recording(tmp_path / "raw", SourceOptions())
-    assert found.layout == "c3vd" and found.lens[:2] == (769.243600037458,) * 2
+    found = describe(tmp_path / "raw", SourceOptions())
+    assert found.layout == "c3vd" and found.intrinsics[:2] == (769.243600037458,) * 2
     for pose, true in zip(found.poses, made.poses()):
         np.testing.assert_allclose(pose.rotation, true[:3, :3], atol=1e-7)
         np.testing.assert_allclose(pose.translation, true[:3, 3], atol=1e-6)
@@ -115,7 +115,7 @@ def test_the_pinhole_of_c3vd_undoes_the_published_model():
 def test_nerfstudio(tmp_path):
     made.nerfstudio(tmp_path / "raw")
     found = prepared(tmp_path)
-    assert found.lens[:4] == LENS and found.unit == "arbitrary"
+    assert found.intrinsics[:4] == LENS and found.unit == "arbitrary"
     same_poses(found.poses, 1000.0)
     np.testing.assert_allclose(found.depth(2) * 1000, np.rint(made.depth(2)), atol=0.02)
     assert found.masks(0)[:, 41:].all() and not found.masks(0)[:, :39].any()  # black is left out
@@ -154,7 +154,7 @@ def test_sides_by_the_names_of_files(names, tmp_path):
     for i in range(11):
         write_png(tmp_path / "raw" / f"{left.format(i)}.png", np.full((20, 30, 3), (i, 0, 0), np.uint8))
         write_png(tmp_path / "raw" / f"{right.format(i)}.png", np.full((20, 30, 3), (i, 200, 0), np.uint8))
-    found = open_recording(tmp_path / "raw", SourceOptions(baseline=4.0))
+    found = describe(tmp_path / "raw", SourceOptions(baseline=4.0))
     assert found.count == 11
     for i, pair in enumerate(found.pictures(list(range(11)))):
         assert pair.left[0, 0].tolist() == [i, 0, 0] and pair.right[0, 0].tolist() == [i, 200, 0]
@@ -165,7 +165,7 @@ def test_a_side_without_its_other_is_refused(tmp_path):
     for name in ("0_left", "1_left", "0_right"):
         write_png(tmp_path / "raw" / f"{name}.png", np.zeros((20, 30, 3), np.uint8))
     with pytest.raises(InputError):
-        open_recording(tmp_path / "raw", SourceOptions(baseline=4.0))
+        describe(tmp_path / "raw", SourceOptions(baseline=4.0))
 
 
 def test_the_served_matrices_are_those_that_opencv_reads(tmp_path):
@@ -181,8 +181,8 @@ def test_out_to_other_programs_and_back(tmp_path, capsys):
     assert "transforms.json: lengths in" in capsys.readouterr().out
     (tmp_path / "o/sequence.toml").unlink()
     for layout in ("nerfstudio", "colmap"):
-        back = open_recording(tmp_path / "o", SourceOptions(layout=layout))
-        np.testing.assert_allclose(back.lens[:6], found.lens[:6])
+        back = describe(tmp_path / "o", SourceOptions(layout=layout))
+        np.testing.assert_allclose(back.intrinsics[:6], found.intrinsics[:6])
         scale = found.depth(1).max() / (back.depth(1).max() if layout == "nerfstudio" else found.depth(1).max())
         for one, other in zip(back.poses, found.poses, strict=True):
             np.testing.assert_allclose(one.rotation, other.rotation, atol=1e-9)

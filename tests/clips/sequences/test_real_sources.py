@@ -18,11 +18,11 @@ def test_one_frame_of_a_phantom_with_true_depth(tmp_path):
     words += ["--depth", folder / "depth_index_u8.png", "--depth-unit", "arbitrary", "--scale", "0.5"]
     said = ["prepare", folder / "color.png", "--out", tmp_path / "clip", *words]
     assert main([str(word) for word in said]) == 0
-    recording = open_common(tmp_path / "clip")
-    assert (recording.count, recording.unit) == (1, "arbitrary") and recording.lens
-    assert recording.lens[:6] == (385.0, 385.0, 337.5, 270.0, 675, 540)
-    assert recording.depth and recording.masks
-    depth, tissue = recording.depth(0), recording.masks(0)
+    clip = open_common(tmp_path / "clip")
+    assert (clip.count, clip.unit) == (1, "arbitrary") and clip.intrinsics
+    assert clip.intrinsics[:6] == (385.0, 385.0, 337.5, 270.0, 675, 540)
+    assert clip.depth and clip.masks
+    depth, tissue = clip.depth(0), clip.masks(0)
     stored = read_png(folder / "depth_index_u8.png")[::2, ::2]
     assert depth is not None and tissue is not None and 0.3 < tissue.mean() < 1
     inside = tissue & (depth > 0)

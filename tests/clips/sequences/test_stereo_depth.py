@@ -11,15 +11,15 @@ from test_common import write_plane
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.clip import Intrinsics
 from endotsr.clips.sequences.common import read_common
 from endotsr.clips.sequences.make_depth import depth_of_values, from_files, write_depth
-from endotsr.clips.sequences.recording import Lens
 from endotsr.clips.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
 from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
-LENS = Lens(300.0, 310.0, 80.0, 60.0, 160, 120)
+LENS = Intrinsics(300.0, 310.0, 80.0, 60.0, 160, 120)
 BASELINE = 4.0
 SETTINGS = StereoSettings(nearest=25.0, farthest=120.0)
 PLANE = (22.0, -0.02, 0.03)  # disparity = a + b column + c row: a slanted plane
@@ -120,13 +120,13 @@ def test_disparity_of_another_program(tmp_path, ending):
 
 
 def test_disparity_of_another_size_and_sign():
-    lens = Lens(30.0, 33.0, 15.0, 13.0, 32, 24)
+    intrinsics = Intrinsics(30.0, 33.0, 15.0, 13.0, 32, 24)
     small = np.full((12, 16), -1.5, np.float32)  # half the size: half the disparity
-    np.testing.assert_allclose(depth_of_values(small, "disparity", 1.0, lens, 4.0, "x"), 30 * 4 / 3.0)
+    np.testing.assert_allclose(depth_of_values(small, "disparity", 1.0, intrinsics, 4.0, "x"), 30 * 4 / 3.0)
     with pytest.raises(InputError, match="16x24 pixels, the pictures have 32x24"):
-        depth_of_values(np.ones((24, 16)), "depth", 1.0, lens, 4.0, "x")
+        depth_of_values(np.ones((24, 16)), "depth", 1.0, intrinsics, 4.0, "x")
     with pytest.raises(InputError, match="baseline"):
-        depth_of_values(small, "disparity", 1.0, lens, None, "x")
+        depth_of_values(small, "disparity", 1.0, intrinsics, None, "x")
 
 
 def stereo_folder(folder: Path) -> None:
@@ -184,8 +184,8 @@ def test_a_real_pair_agrees_with_the_given_depth():
     folder = data_folder("endonerf_pulling")
     files = [sorted((folder / name).iterdir())[0] for name in ("images", "images_right", "depth", "gt_masks")]
     left, right, given, mask = (read_png(file) for file in files)
-    lens = Lens(569.468, 569.468, 320.0, 256.0, 640, 512)
-    depth = stereo_depth(left, right, lens, 4.3, StereoSettings(nearest=30.0, farthest=200.0))
+    intrinsics = Intrinsics(569.468, 569.468, 320.0, 256.0, 640, 512)
+    depth = stereo_depth(left, right, intrinsics, 4.3, StereoSettings(nearest=30.0, farthest=200.0))
     tissue = (mask if mask.ndim == 2 else mask[:, :, 0]) == 0
     both = tissue & (given > 0) & (depth > 0)
     assert both.sum() > 0.7 * (tissue & (given > 0)).sum()

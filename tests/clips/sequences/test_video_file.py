@@ -55,8 +55,8 @@ def test_uneven_times_become_the_times_of_the_sequence(name, codec, tmp_path, ca
     stated = read_sequence_file(tmp_path / "o")
     assert stated.times == pytest.approx(np.array(UNEVEN) / 1000, abs=1e-3)
     assert stated.frame_rate == pytest.approx(11 / 1.333, rel=1e-2)
-    recording = open_common(tmp_path / "o")
-    assert recording.times is not None and len(recording.times) == 12
+    clip = open_common(tmp_path / "o")
+    assert clip.times is not None and len(clip.times) == 12
 
 
 def test_a_training_has_the_times_of_the_file(tmp_path):

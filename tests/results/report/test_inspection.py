@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from endotsr.clips.effects.clip import Clip
+from endotsr.clips.effects.frames import ReducedFrames
 from endotsr.clips.effects.inspect import Inspection
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.periodic import Line
@@ -20,8 +20,8 @@ WIDTHS = """<pre id="probe"></pre><script>document.getElementById("probe").textC
 
 @pytest.fixture
 def found() -> tuple[Inspection, Plan]:
-    clip = Clip(np.full((3, 3, 16, 32), 0.5, np.float32), np.ones((3, 16, 32), bool), np.ones((3, 16, 32), np.float32),
-                np.arange(3) / 4, [], 1, 4, 1)  # fmt: skip
+    clip = ReducedFrames(np.full((3, 3, 16, 32), 0.5, np.float32), np.ones((3, 16, 32), bool),
+                np.ones((3, 16, 32), np.float32), np.arange(3) / 4, [], 1, 4, 1)  # fmt: skip
     curve = Curve("flow, px", "time", np.arange(3) / 4, {"one": np.arange(3.0), "two": np.ones(3)}, 0.5)
     values = np.full((16, 32), 2.0)
     values[:4] = np.nan

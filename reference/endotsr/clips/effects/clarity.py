@@ -8,7 +8,7 @@ Both are found only if they vary: a clip that is blurred throughout has no sharp
 
 import numpy as np
 
-from endotsr.clips.effects.clip import Clip
+from endotsr.clips.effects.frames import ReducedFrames
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.verdict import Curve, EffectVerdict
 from endotsr.clips.sequences.sequence import Sequence
@@ -21,7 +21,7 @@ SCATTER = 4.0  # a frame must also exceed this many deviations (MAD) of the fram
 NEIGHBOURS = 4  # frames on either side: slow changes, such as of the view, are not blur
 
 
-def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[EffectVerdict, EffectVerdict]:
+def clarity_verdicts(sequence: Sequence, clip: ReducedFrames, noise: Noise) -> tuple[EffectVerdict, EffectVerdict]:
     """Verdicts on smoke and on blur."""
     rows = [_measures(sequence.images[i], sequence.masks[i], noise.level) for i in sequence.train_index]
     sharpness, dark = (np.array(column) for column in zip(*rows))
@@ -38,7 +38,7 @@ def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Effe
     return smoke, blur
 
 
-def clear_frames(clip: Clip, *verdicts: EffectVerdict) -> BoolArray:
+def clear_frames(clip: ReducedFrames, *verdicts: EffectVerdict) -> BoolArray:
     """(m,) False for the training frames listed in verdicts of `clarity_verdicts`."""
     clear = np.ones(clip.count, bool)
     for verdict in verdicts:
@@ -68,7 +68,13 @@ def _local_median(course: FloatArray) -> FloatArray:
 
 
 def _verdict(
-    effect: str, score: FloatArray, threshold: float, unit: str, test: str, clip: Clip, lines: dict[str, FloatArray]
+    effect: str,
+    score: FloatArray,
+    threshold: float,
+    unit: str,
+    test: str,
+    clip: ReducedFrames,
+    lines: dict[str, FloatArray],
 ) -> EffectVerdict:
     bad = np.flatnonzero(score >= threshold)
     statistic = float(score.max()) if score.size else 0.0

@@ -7,7 +7,7 @@ of light depends on the result of the test of motion.
 from typing import Any, NamedTuple
 
 from endotsr.clips.effects.clarity import clarity_verdicts, clear_frames
-from endotsr.clips.effects.clip import Clip, training_clip, with_clear_reference
+from endotsr.clips.effects.frames import ReducedFrames, reduced_frames, with_clear_reference
 from endotsr.clips.effects.motion import motion_verdict
 from endotsr.clips.effects.noise import Noise, estimate_noise
 from endotsr.clips.effects.periodic import Line
@@ -29,7 +29,7 @@ EFFECTS = (
 class Inspection(NamedTuple):
     """All results for a clip."""
 
-    clip: Clip
+    clip: ReducedFrames
     noise: Noise
     verdicts: dict[str, EffectVerdict]  # by effect, in the order of `EFFECTS`
     lines: list[Line]  # motion rates
@@ -51,7 +51,7 @@ def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Ins
     if frame_rate is not None and not 0.0 < frame_rate < float("inf"):
         raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames per second")
     frame_rate = sequence.frame_rate if frame_rate is None else frame_rate
-    clip = training_clip(sequence)
+    clip = reduced_frames(sequence)
     noise = estimate_noise(sequence, clip)
     smoke, blur = clarity_verdicts(sequence, clip, noise)
     clear = clear_frames(clip, smoke, blur)

@@ -8,7 +8,7 @@ round-trip error of the flow counts as noise (rigid.py).
 
 import numpy as np
 
-from endotsr.clips.effects.clip import TILE, Clip, residual, slow_courses, tile_map, without_gaps
+from endotsr.clips.effects.frames import TILE, ReducedFrames, residual, slow_courses, tile_map, without_gaps
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.periodic import Line, spectral_lines
 from endotsr.clips.effects.rigid import fit_rigid
@@ -28,7 +28,7 @@ FALSE_POSITIVES = 0.01  # designed rate, for all tiles together
 
 
 def motion_verdict(
-    sequence: Sequence, clip: Clip, tracks: FlowTracks, noise: Noise
+    sequence: Sequence, clip: ReducedFrames, tracks: FlowTracks, noise: Noise
 ) -> tuple[EffectVerdict, list[Line]]:
     """The verdict on tissue motion, and the lines of its spectrum (empty without periodic motion)."""
     null, clear, camera = tracks.null, np.ones_like(tracks.usable), np.zeros_like(tracks.tiles)
@@ -71,7 +71,7 @@ def _root_mean_square(tiles: FloatArray) -> FloatArray:
     return np.sqrt(np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
 
-def _affine_fraction(filled: FloatArray, clip: Clip, tracks: FlowTracks) -> float:
+def _affine_fraction(filled: FloatArray, clip: ReducedFrames, tracks: FlowTracks) -> float:
     """Fraction of the squared flow explained by an affine map of each frame."""
     rows, columns = clip.images.shape[2] // TILE, clip.images.shape[3] // TILE
     place = np.indices((rows, columns)).reshape(2, -1)[:, tracks.usable]
@@ -80,7 +80,7 @@ def _affine_fraction(filled: FloatArray, clip: Clip, tracks: FlowTracks) -> floa
     return 1.0 - float((residual(design, flat) ** 2).sum() / max((flat**2).sum(), 1e-30))
 
 
-def _verdict(kind: str, statistic: float, clip: Clip, tracks: FlowTracks, size: FloatArray, lines: list[Line],
+def _verdict(kind: str, statistic: float, clip: ReducedFrames, tracks: FlowTracks, size: FloatArray, lines: list[Line],
              waves: int) -> EffectVerdict:  # fmt: skip
     length = np.sqrt((tracks.tiles**2).sum(axis=1))
     seen = np.isfinite(length)

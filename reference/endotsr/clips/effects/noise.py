@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.clips.effects.clip import TILE, Clip
+from endotsr.clips.effects.frames import TILE, ReducedFrames
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -33,7 +33,7 @@ class Noise(NamedTuple):
         return float(self.full.mean())
 
 
-def estimate_noise(sequence: Sequence, clip: Clip) -> Noise:
+def estimate_noise(sequence: Sequence, clip: ReducedFrames) -> Noise:
     """The noise of the training frames at full and at working size."""
     chosen = np.unique(np.linspace(0, clip.count - 1, min(MOST_FRAMES, clip.count)).round().astype(int))
     index = sequence.train_index[chosen]
@@ -54,7 +54,7 @@ def _median(rows: list[FloatArray]) -> FloatArray:
     return np.nan_to_num(found, nan=QUANTISATION)
 
 
-def temporal_noise(clip: Clip) -> FloatArray:
+def temporal_noise(clip: ReducedFrames) -> FloatArray:
     """MAD(x[t-1] - 2 x[t] + x[t+1]) / (0.6745 sqrt 6) over tissue, per channel (3,); inf without equal time steps."""
     steps = np.diff(clip.times)
     found = []

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from endotsr.clips.effects.clip import residual, slow_courses
+from endotsr.clips.effects.frames import residual, slow_courses
 from endotsr.method.kernels.arrays import FloatArray
 
 LEAST_CYCLES = 3.0

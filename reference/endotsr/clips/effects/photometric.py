@@ -11,7 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from endotsr.clips.effects.clip import LUMINANCE, TILE, Clip, residual, slow_courses, tile_map, tile_means, without_gaps
+from endotsr.clips.effects.frames import (
+    LUMINANCE,
+    TILE,
+    ReducedFrames,
+    residual,
+    slow_courses,
+    tile_map,
+    tile_means,
+    without_gaps,
+)
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.tracks import FlowTracks
 from endotsr.clips.effects.verdict import Curve, EffectVerdict, Map, sentence
@@ -36,7 +45,7 @@ class Ratios(NamedTuple):
     tiles: IndexArray  # (U,) number of each tile in the grid
 
 
-def photometric_verdict(clip: Clip, tracks: FlowTracks, noise: Noise, moving: bool) -> EffectVerdict:
+def photometric_verdict(clip: ReducedFrames, tracks: FlowTracks, noise: Noise, moving: bool) -> EffectVerdict:
     """The verdict on changes of light."""
     ratios = colour_ratios(clip, tracks, noise)
     if ratios.values.shape[2] < LEAST_TILES:
@@ -62,7 +71,7 @@ def photometric_verdict(clip: Clip, tracks: FlowTracks, noise: Noise, moving: bo
     return _verdict(clip, found, statistic, ranges, fraction, common, balance, ratios, sizes)
 
 
-def colour_ratios(clip: Clip, tracks: FlowTracks, noise: Noise) -> Ratios:
+def colour_ratios(clip: ReducedFrames, tracks: FlowTracks, noise: Noise) -> Ratios:
     """Log ratios of the mean colours of the tiles that every frame sees."""
     reference = clip.reference
     start = clip.images[reference]
@@ -88,7 +97,7 @@ def colour_ratios(clip: Clip, tracks: FlowTracks, noise: Noise) -> Ratios:
     return Ratios(centred, deviation, LUMINANCE @ level, np.flatnonzero(usable))
 
 
-def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> tuple[BoolArray, FloatArray]:
+def local_change(clip: ReducedFrames, ratios: Ratios, gain: FloatArray, moving: bool) -> tuple[BoolArray, FloatArray]:
     """(U,) tiles whose light changes smoothly beyond the gain of the frame, and the RMS of the change, display units.
 
     With motion, the threshold allows for an alignment error of a quarter pixel at the gradients of the tile.
@@ -110,7 +119,7 @@ def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> 
     return (ratio > critical) & (size > needed), size
 
 
-def _tile_gradient(clip: Clip) -> FloatArray:
+def _tile_gradient(clip: ReducedFrames) -> FloatArray:
     """Mean absolute gradient of each tile over the square root of its rows: the effect of a common shift."""
     grey = clip.luminance[clip.reference]
     down, across = np.gradient(grey)
@@ -138,8 +147,8 @@ def _nothing(reason: str) -> EffectVerdict:
 
 
 def _verdict(
-    clip: Clip, found: list[str], statistic: float, ranges: dict[str, float], fraction: float, common: FloatArray,
-    balance: FloatArray, ratios: Ratios, sizes: FloatArray,
+    clip: ReducedFrames, found: list[str], statistic: float, ranges: dict[str, float], fraction: float,
+    common: FloatArray, balance: FloatArray, ratios: Ratios, sizes: FloatArray,
 ) -> EffectVerdict:  # fmt: skip
     words = {
         "gain": f"the gain of the frames ranges over {255 * ranges['gain']:.1f} grey levels",

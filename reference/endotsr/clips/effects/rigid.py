@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.clips.effects.clip import TILE, Clip, tile_means
+from endotsr.clips.effects.frames import TILE, ReducedFrames, tile_means
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.tracks import FlowTracks, normalised
 from endotsr.clips.opencv import dense_flow, warp_bilinear
@@ -31,7 +31,7 @@ class Rigid(NamedTuple):
     clear: BoolArray  # (T,) tiles at least `MARGIN` from excluded pixels and from the edge of the picture
 
 
-def fit_rigid(clip: Clip, tracks: FlowTracks, noise: Noise) -> Rigid:
+def fit_rigid(clip: ReducedFrames, tracks: FlowTracks, noise: Noise) -> Rigid:
     """Fit an inverse depth to every tile, with the poses held fixed and without the prior depth."""
     height, width = clip.images.shape[2:]
     row, column = np.indices((height // TILE, width // TILE)).reshape(2, -1)
@@ -40,7 +40,7 @@ def fit_rigid(clip: Clip, tracks: FlowTracks, noise: Noise) -> Rigid:
     return Rigid(flow, return_error(clip, tracks, noise), _clear_tiles(clip.masks[clip.reference]))
 
 
-def predicted_flow(clip: Clip, place: FloatArray, inverse: FloatArray) -> FloatArray:
+def predicted_flow(clip: ReducedFrames, place: FloatArray, inverse: FloatArray) -> FloatArray:
     """Flow (m, 2, T) of static points at image positions `place` (2, T) of the reference with inverse depth (T,)."""
     found = []
     for camera, (far, near) in zip(clip.cameras, _rays(clip, place)):
@@ -49,7 +49,7 @@ def predicted_flow(clip: Clip, place: FloatArray, inverse: FloatArray) -> FloatA
     return np.array(found)
 
 
-def inverse_depth(clip: Clip, place: FloatArray, tiles: FloatArray) -> FloatArray:
+def inverse_depth(clip: ReducedFrames, place: FloatArray, tiles: FloatArray) -> FloatArray:
     """Inverse depth (T,) in the reference, 1 / scene units, that fits the flow of the tiles (m, 2, T) best.
 
     Least squares in pixels: f x - (u - c) z = 0 is linear in the inverse depth and is divided by z of the previous
@@ -75,7 +75,7 @@ def inverse_depth(clip: Clip, place: FloatArray, tiles: FloatArray) -> FloatArra
     return inverse
 
 
-def return_error(clip: Clip, tracks: FlowTracks, noise: Noise) -> FloatArray:
+def return_error(clip: ReducedFrames, tracks: FlowTracks, noise: Noise) -> FloatArray:
     """|f(x) + b(x + f(x))| with the flow b back to the reference: mean over a tile, RMS over frames; (T,), pixels."""
     grey, mask, sigma = clip.luminance, clip.masks[clip.reference], float(noise.working.mean())
     squares = []
@@ -91,7 +91,7 @@ def return_error(clip: Clip, tracks: FlowTracks, noise: Noise) -> FloatArray:
     return clip.shrink * np.sqrt(total / np.maximum(known.sum(axis=0), 1))
 
 
-def _rays(clip: Clip, place: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+def _rays(clip: ReducedFrames, place: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
     """R_k x and t_k of every frame, (3, T) and (3, 1): a point of inverse depth rho lies along R_k x + rho t_k."""
     start = clip.cameras[clip.reference]
     x = np.stack([(place[0] - start.cx) / start.fx, (place[1] - start.cy) / start.fy, np.ones(place.shape[1])])

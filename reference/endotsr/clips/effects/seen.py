@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.effects.clip import Clip
+from endotsr.clips.effects.frames import ReducedFrames
 from endotsr.clips.effects.noise import NORMAL_MAD
 from endotsr.clips.effects.verdict import Curve, EffectVerdict, Map, sentence
 from endotsr.clips.sequences.sequence import Sequence
@@ -19,7 +19,7 @@ RELATIVE = 1e-3  # of the median depth: threshold for steps and flicker
 MOST_LEVELS = 4096  # a frame with more distinct values is not quantised
 
 
-def occluder_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
+def occluder_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     """Whether the masks exclude any pixel of a training frame; a fact, not an estimate."""
     masks = sequence.masks[sequence.train_index]
     by_frame = 1.0 - masks.mean(axis=(1, 2))
@@ -39,7 +39,7 @@ def occluder_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
                          "excluded pixels", 0.0, reason, details, curve, picture)  # fmt: skip
 
 
-def camera_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
+def camera_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     """Whether the poses of the training frames differ; a fact, not an estimate."""
     centres = np.array([camera_centre(camera) for camera in clip.cameras])
     turns = np.array([camera.rotation for camera in clip.cameras])
@@ -57,7 +57,7 @@ def camera_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
                          curve if moves else None)  # fmt: skip
 
 
-def highlight_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
+def highlight_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     """The verdict on saturated, colourless tissue pixels at full size."""
     fractions, sums = [], np.zeros((sequence.height, sequence.width))
     for i in sequence.train_index:
@@ -86,7 +86,7 @@ def highlights(image: NDArray[np.uint8]) -> BoolArray:
     return (largest > SATURATED * 255) & (largest - smallest < COLOURLESS * largest)
 
 
-def depth_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
+def depth_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     """The verdict on faults of the prior depth. `details["usable"]`: whether any frame has enough depth."""
     depth, known = clip.depth, (clip.depth > 0) & clip.masks
     by_frame = 1.0 - known.sum(axis=(1, 2)) / np.maximum(clip.masks.sum(axis=(1, 2)), 1)
@@ -123,7 +123,7 @@ def quantisation(depth: np.ndarray, known: np.ndarray) -> float:
     return float(np.median(steps)) if steps else 0.0
 
 
-def temporal_flicker(clip: Clip) -> float:
+def temporal_flicker(clip: ReducedFrames) -> float:
     """The smaller of the MADs of the second differences over time and over the picture, scene units."""
     found = []
     for k in range(1, clip.count - 1):

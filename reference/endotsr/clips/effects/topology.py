@@ -14,7 +14,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from endotsr.clips.effects.clip import Clip
+from endotsr.clips.effects.frames import ReducedFrames
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.tracks import matched
 from endotsr.clips.effects.verdict import UNKNOWN, EffectVerdict, Map
@@ -45,7 +45,7 @@ class End(NamedTuple):
         return 1.0 - int(self.lost.sum()) / candidates if candidates else 0.0
 
 
-def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> EffectVerdict:
+def topology_verdict(clip: ReducedFrames, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> EffectVerdict:
     """The verdict on tissue that appears or disappears permanently.
 
     clear    (m,) False for training frames with blur or smoke, which are not compared
@@ -67,7 +67,7 @@ def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: b
     return _verdict("suspected" if statistic >= 1.0 else "none", statistic, clip, end)
 
 
-def _end(clip: Clip, grey: FloatArray, near: np.ndarray, far: np.ndarray, sigma: float) -> End:
+def _end(clip: ReducedFrames, grey: FloatArray, near: np.ndarray, far: np.ndarray, sigma: float) -> End:
     """Compare the frames of both ends with the outermost frame of the near one."""
 
     def with_reference(frames: np.ndarray) -> list[FloatArray]:
@@ -89,7 +89,7 @@ def _median(rows: list[FloatArray]) -> FloatArray:
         return np.nanmedian(np.array(rows), axis=0)
 
 
-def local_correlation(clip: Clip, grey: FloatArray, reference: int, other: int, sigma: float) -> FloatArray:
+def local_correlation(clip: ReducedFrames, grey: FloatArray, reference: int, other: int, sigma: float) -> FloatArray:
     """Correlation (h, w) of the local structure of a frame with another frame that is warped onto it.
 
     grey     (m, h, w) luminance of the clip
@@ -130,7 +130,7 @@ def _largest_region(lost: BoolArray) -> int:
     return int(np.bincount(numbers.ravel())[1:].max(initial=0))
 
 
-def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str = "") -> EffectVerdict:
+def _verdict(kind: str, statistic: float, clip: ReducedFrames, end: End | None, why: str = "") -> EffectVerdict:
     """The verdict; `why` is the reason for an unknown one."""
     pixels = 0 if end is None else end.region * clip.shrink**2
     reason = {

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.effects.clip import Clip, tile_means
+from endotsr.clips.effects.frames import ReducedFrames, tile_means
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.opencv import dense_flow, warp_bilinear
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
@@ -43,7 +43,7 @@ class Match(NamedTuple):
     seen: BoolArray  # (h, w) tissue in the first and, at the end of the flow, in the second
 
 
-def matched(clip: Clip, grey: FloatArray, start: int, end: int, sigma: float) -> Match:
+def matched(clip: ReducedFrames, grey: FloatArray, start: int, end: int, sigma: float) -> Match:
     """The flow between training frames number `start` and `end`. grey: luminance of the clip (m, h, w)."""
     common = clip.masks[start] & clip.masks[end]
     before, after = (normalised(grey[k], common, sigma) for k in (start, end))
@@ -52,7 +52,7 @@ def matched(clip: Clip, grey: FloatArray, start: int, end: int, sigma: float) ->
     return Match(before, after, flow, seen)
 
 
-def make_tracks(clip: Clip, noise: Noise) -> FlowTracks:
+def make_tracks(clip: ReducedFrames, noise: Noise) -> FlowTracks:
     """Flow, its mean in tiles, its null, and the aligned frames."""
     sigma, grey = float(noise.working.mean()), clip.luminance
     flow, valid, tiles, aligned = [], [], [], []

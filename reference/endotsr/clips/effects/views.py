@@ -8,7 +8,7 @@ a grey level. A fixed camera sees every static point along one direction and det
 
 import numpy as np
 
-from endotsr.clips.effects.clip import Clip
+from endotsr.clips.effects.frames import ReducedFrames
 from endotsr.clips.effects.verdict import UNKNOWN, EffectVerdict
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
@@ -23,7 +23,7 @@ SEED = 21
 HIGHEST = 3
 
 
-def view_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
+def view_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     """The verdict on the highest degree that the views determine; `kind` is "degree D"."""
     test = "change of colour by a typical coefficient of degree 1 between frames"
     if sequence.static_camera:
@@ -44,7 +44,7 @@ def view_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
                          0.01, reason, {"degree": degree, "changes": changes, "angle_degrees": angle})  # fmt: skip
 
 
-def view_directions(clip: Clip) -> FloatArray:
+def view_directions(clip: ReducedFrames) -> FloatArray:
     """Unit vectors (P, m, 3) from the cameras to points of the reference depth; P = 0 without depth."""
     depth = clip.depth[clip.reference]
     known = np.flatnonzero((depth > 0) & clip.masks[clip.reference])
@@ -75,7 +75,7 @@ def harmonic_design(directions: FloatArray, degree: int) -> FloatArray:
     return np.array(rows)[:, : (degree + 1) ** 2]
 
 
-def harmonic_sizes(clip: Clip) -> FloatArray:
+def harmonic_sizes(clip: ReducedFrames) -> FloatArray:
     """Mean |Y_k| over the pixel directions of the reference camera in world axes, (16,)."""
     camera = clip.cameras[clip.reference]
     u, v = (np.linspace(0, side - 1, 9).ravel() for side in (camera.width, camera.height))

@@ -31,7 +31,7 @@ PAIRS = (("M1", "D1", "M2", "D2"), ("K1", "D1", "K2", "D2"), ("cameraMatrix1", "
 SIZES = (("image_width", "image_height"), ("image_Width", "image_Height"), ("width", "height"))
 
 
-class Intrinsics(NamedTuple):
+class StoredIntrinsics(NamedTuple):
     """One camera, as stored."""
 
     matrix: FloatArray  # (3, 3) in OpenCV's convention
@@ -42,8 +42,8 @@ class Intrinsics(NamedTuple):
 class StoredCalibration(NamedTuple):
     """The contents of a calibration file."""
 
-    left: Intrinsics
-    right: Intrinsics | None = None
+    left: StoredIntrinsics
+    right: StoredIntrinsics | None = None
     rotation: FloatArray = np.eye(3)
     translation: FloatArray = np.zeros(3)  # millimetres
 
@@ -90,7 +90,7 @@ def read_stereo_ini(path: Path, keys: Keys) -> StoredCalibration | None:
     return StoredCalibration(left, right, np.array(rotation).reshape(3, 3), np.array(translation))
 
 
-def _ini_camera(parser: configparser.ConfigParser, section: str, path: Path) -> Intrinsics:
+def _ini_camera(parser: configparser.ConfigParser, section: str, path: Path) -> StoredIntrinsics:
     fx, fy, cx, cy = (_ini_number(parser, section, key, path) for key in ("fc_x", "fc_y", "cc_x", "cc_y"))
     width, height = (_ini_number(parser, section, key, path) for key in ("res_x", "res_y"))
     if width < 1 or height < 1 or width % 1 or height % 1:
@@ -98,7 +98,7 @@ def _ini_camera(parser: configparser.ConfigParser, section: str, path: Path) -> 
     given = sum(f"kc_{k}" in parser[section] for k in range(COEFFICIENTS))
     count = next((number for number in FEWEST if given >= number), 0)
     distortion = tuple(_ini_number(parser, section, f"kc_{k}", path) for k in range(count))
-    return Intrinsics(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]), distortion, (int(width), int(height)))
+    return StoredIntrinsics(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]), distortion, (int(width), int(height)))
 
 
 def _ini_number(parser: configparser.ConfigParser, section: str, key: str, path: Path) -> float:
@@ -115,7 +115,7 @@ def _ini_number(parser: configparser.ConfigParser, section: str, key: str, path:
 
 def read_matrix_text(path: Path, keys: Keys) -> StoredCalibration | None:
     """One camera without distortion, from a text file. Raises InputError as `read_matrix`."""
-    return StoredCalibration(Intrinsics(read_matrix(path))) if path.suffix.lower() == ".txt" else None
+    return StoredCalibration(StoredIntrinsics(read_matrix(path))) if path.suffix.lower() == ".txt" else None
 
 
 def read_matrix(path: Path) -> FloatArray:
@@ -149,7 +149,7 @@ def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
     return StoredCalibration(left, _kalibr_camera(path, keys["cam1"], "cam1"), motion[:3, :3], 1000.0 * motion[:3, 3])
 
 
-def _kalibr_camera(path: Path, keys: Keys, name: str) -> Intrinsics:
+def _kalibr_camera(path: Path, keys: Keys, name: str) -> StoredIntrinsics:
     where = f"{path}: {name}"
     for key, allowed in KALIBR_MODELS.items():
         if keys.get(key, allowed[0]) not in allowed:
@@ -160,7 +160,7 @@ def _kalibr_camera(path: Path, keys: Keys, name: str) -> Intrinsics:
     if min(width, height) < 1 or width % 1 or height % 1:
         raise InputError(f"{where}: resolution: allowed: two whole numbers > 0")
     found = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-    return Intrinsics(found, distortion_of(given, where), (int(width), int(height)))
+    return StoredIntrinsics(found, distortion_of(given, where), (int(width), int(height)))
 
 
 def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
@@ -187,7 +187,7 @@ def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
     return StoredCalibration(*cameras, turns[1].T @ turns[0], turns[1].T @ across)
 
 
-def _ros_camera(path: Path, keys: Keys) -> Intrinsics:
+def _ros_camera(path: Path, keys: Keys) -> StoredIntrinsics:
     model = keys.get("distortion_model", ROS_MODELS[0])
     if model not in ROS_MODELS:
         raise InputError(f"{path}: distortion_model {model!r} is not allowed; allowed: {', '.join(ROS_MODELS)}")
@@ -196,7 +196,7 @@ def _ros_camera(path: Path, keys: Keys) -> Intrinsics:
         raise InputError(f"{path}: image_width and image_height: allowed: whole numbers > 0")
     found = matrix(keys.get("camera_matrix"), f"{path}: camera_matrix", (3, 3))
     given = matrix(keys.get("distortion_coefficients"), f"{path}: distortion_coefficients", (-1,))
-    return Intrinsics(found, distortion_of(given, f"{path}: distortion_coefficients"), (size[0], size[1]))  # type: ignore[arg-type]
+    return StoredIntrinsics(found, distortion_of(given, f"{path}: distortion_coefficients"), (size[0], size[1]))  # type: ignore[arg-type]
 
 
 def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
@@ -220,10 +220,12 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
     return StoredCalibration(_opencv_camera(path, keys, *one, size)) if one else None
 
 
-def _opencv_camera(path: Path, keys: Keys, name: str, distortion: str, size: tuple[int, int] | None) -> Intrinsics:
+def _opencv_camera(
+    path: Path, keys: Keys, name: str, distortion: str, size: tuple[int, int] | None
+) -> StoredIntrinsics:
     found = matrix(keys[name], f"{path}: {name}", (3, 3))
     given = matrix(keys[distortion], f"{path}: {distortion}", (-1,)) if distortion in keys else None
-    return Intrinsics(found, () if given is None else distortion_of(given, f"{path}: {distortion}"), size)
+    return StoredIntrinsics(found, () if given is None else distortion_of(given, f"{path}: {distortion}"), size)
 
 
 def _opencv_size(keys: Keys) -> tuple[int, int] | None:

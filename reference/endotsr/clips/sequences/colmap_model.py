@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.recording import CameraPose, Lens, checked_lens
+from endotsr.clips.sequences.clip import CameraPose, Intrinsics, checked_intrinsics
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_bytes, read_text
@@ -43,7 +43,7 @@ class ModelImage(NamedTuple):
 class ColmapModel(NamedTuple):
     """A whole model."""
 
-    cameras: dict[int, Lens]
+    cameras: dict[int, Intrinsics]
     images: list[ModelImage]  # by name
     points: dict[int, FloatArray]  # id -> (3,)
 
@@ -78,15 +78,17 @@ def read_model(folder: Path) -> ColmapModel:
     return ColmapModel(cameras, sorted(images, key=lambda image: image.name), points)
 
 
-def _lens(name: str, width: int, height: int, values: list[float], where: str) -> Lens:
+def _intrinsics(name: str, width: int, height: int, values: list[float], where: str) -> Intrinsics:
     if name not in MODELS:
         raise InputError(f"{where}: camera model {name}: allowed: {', '.join(MODELS)}")
     if len(values) != PARAMETERS[name]:
         raise InputError(f"{where}: {len(values)} parameters; {name} has {PARAMETERS[name]}")
     _, (fx, fy, cx, cy), places = MODELS[name]
     distortion = tuple(0.0 if place is None else values[place] for place in places)
-    lens = Lens(values[fx], values[fy], values[cx], values[cy], width, height, distortion if any(distortion) else ())
-    return checked_lens(lens, where)
+    intrinsics = Intrinsics(
+        values[fx], values[fy], values[cx], values[cy], width, height, distortion if any(distortion) else ()
+    )
+    return checked_intrinsics(intrinsics, where)
 
 
 def _pose(values: list[float] | FloatArray, where: str) -> CameraPose:
@@ -103,7 +105,7 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     return [(number, line) for number, line in enumerate(lines, 1) if not line.startswith("#")]
 
 
-def _cameras_text(path: Path) -> dict[int, Lens]:
+def _cameras_text(path: Path) -> dict[int, Intrinsics]:
     found = {}
     for number, line in _lines(path):
         if line.strip():
@@ -113,7 +115,7 @@ def _cameras_text(path: Path) -> dict[int, Lens]:
                 values = [float(word) for word in words[4:]]
             except (ValueError, IndexError):
                 raise InputError(f"{where}: allowed: CAMERA_ID MODEL WIDTH HEIGHT PARAMETERS") from None
-            found[key] = _lens(words[1], width, height, values, where)
+            found[key] = _intrinsics(words[1], width, height, values, where)
     return found
 
 
@@ -176,7 +178,7 @@ class _Bytes:
         return text
 
 
-def _cameras_binary(path: Path) -> dict[int, Lens]:
+def _cameras_binary(path: Path) -> dict[int, Intrinsics]:
     stream, found = _Bytes(path), {}
     for _ in range(stream.count(24)):
         key, model, width, height = stream.take("iiQQ")
@@ -184,7 +186,7 @@ def _cameras_binary(path: Path) -> dict[int, Lens]:
         if model not in NUMBERS:
             raise InputError(f"{where}: camera model number {model}: allowed: {', '.join(MODELS)}")
         values = list(stream.take(f"{PARAMETERS[NUMBERS[model]]}d"))
-        found[key] = _lens(NUMBERS[model], width, height, values, where)
+        found[key] = _intrinsics(NUMBERS[model], width, height, values, where)
     return found
 
 

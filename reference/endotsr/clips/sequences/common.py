@@ -1,6 +1,6 @@
 """Reading the common format: `sequence.toml` with `images/`, `masks/`, `depth/` and `images_right/`.
 
-In: a folder and the `SequenceConfig`. Out: a `Sequence`, or a `Recording` for `prepare` and `depth`. `sequence_file`
+In: a folder and the `SequenceConfig`. Out: a `Sequence`, or a `Clip` for `prepare` and `depth`. `sequence_file`
 describes the fields of `sequence.toml`. The file states the units and the polarity of the masks; the setting
 `sequence.excluded_value = "black"` overrides the polarity.
 """
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.assemble import assemble, check_percentiles
 from endotsr.clips.sequences.checks.kinds import KINDS, ONE_CAMERA
+from endotsr.clips.sequences.clip import CameraPose, Clip, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.clips.sequences.masks import tissue_masks
 from endotsr.clips.sequences.read_frames import FrameFiles, of_size
-from endotsr.clips.sequences.recording import CameraPose, PicturePair, Recording, colour_picture, grey_plane
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.sequence_file import (
     FILE_NAME,
@@ -175,9 +175,9 @@ def common_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
 def cameras_of(contents: Contents) -> list[Camera]:
     """One camera per frame; the same object for all frames of a static camera."""
     entry, count = contents.file.camera, len(contents.images)
-    lens = (entry.fx, entry.fy, entry.cx, entry.cy, entry.width, entry.height)
+    intrinsics = (entry.fx, entry.fy, entry.cx, entry.cy, entry.width, entry.height)
     poses = contents.poses or [CameraPose(np.eye(3), np.zeros(3))]
-    cameras = [Camera(*pose, *lens) for pose in poses]
+    cameras = [Camera(*pose, *intrinsics) for pose in poses]
     static = all((pose.rotation == poses[0].rotation).all() for pose in poses)
     static &= all((pose.translation == poses[0].translation).all() for pose in poses)
     return cameras[:1] * count if static else cameras
@@ -191,8 +191,8 @@ def _colour(contents: Contents, path: Path) -> NDArray[np.uint8]:
     return colour_picture(_sized(contents, read_picture(path), path), path)
 
 
-def open_common(folder: Path) -> Recording:
-    """The whole folder as a recording, decoded on demand. An invalid pose becomes a gap. Raises InputError."""
+def open_common(folder: Path) -> Clip:
+    """The whole folder as a clip, decoded on demand. An invalid pose becomes a gap. Raises InputError."""
     contents = list_contents(folder, poses=False)
     found = contents.file
     poses, faults = read_poses_with_gaps(found, folder / FILE_NAME)
@@ -212,7 +212,7 @@ def open_common(folder: Path) -> Recording:
         path = contents.depth[i]
         return depth_plane(_sized(contents, read_plane(path), path), found.depth_scale, path)
 
-    return Recording(
+    return Clip(
         layout="common",
         where=Path(folder),
         names=[file.stem for file in contents.images],
@@ -224,7 +224,7 @@ def open_common(folder: Path) -> Recording:
         depth_method=found.depth.method if found.depth else "given",
         depth_assumed=found.depth.assumed if found.depth else "",
         unit="arbitrary" if found.arbitrary else "mm",
-        lens=found.camera.lens(folder),
+        intrinsics=found.camera.intrinsics(folder),
         baseline=found.baseline or None,
         poses=poses,
         rate=found.frame_rate or None,

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, write_png
 from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
+from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.masks import sparse_step
-from endotsr.clips.sequences.recording import grey_plane
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.untrusted import arrays as untrusted

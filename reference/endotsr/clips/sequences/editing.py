@@ -1,6 +1,6 @@
-"""Editing a recording before it is written: frame selection by number or time, cropping, and union of masks.
+"""Editing a clip before it is written: frame selection by number or time, cropping, and union of masks.
 
-In: a `Recording` and option values. Out: frame numbers, or an edited `Recording`.
+In: a `Clip` and option values. Out: frame numbers, or an edited `Clip`.
 """
 
 from dataclasses import replace
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.recording import Lens, Picture, PicturePair, Recording
+from endotsr.clips.sequences.clip import Clip, Intrinsics, Picture, PicturePair
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import masks_are_proposed, stated_masks
 from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
@@ -19,28 +19,28 @@ from endotsr.method.kernels.arrays import FloatArray
 ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
 
-def chosen_frames(text: str, recording: Recording) -> list[int]:
+def chosen_frames(text: str, clip: Clip) -> list[int]:
     """The frames of a list such as `0:10,12,2.5s:8s`, ascending and unique; "" selects all.
 
     Numbers follow Python's slices; negative ones count from the end. Seconds count from the first frame. The end is
     exclusive.
 
-    Raises:  InputError for a part that is invalid, selects nothing, or is outside the recording.
+    Raises:  InputError for a part that is invalid, selects nothing, or is outside the clip.
     """
     if not text.strip():
-        return list(range(recording.count))
+        return list(range(clip.count))
     found: set[int] = set()
     for part in text.split(","):
-        frames = _seconds(part.strip(), recording) if "s" in part else _numbers(part.strip(), recording.count)
+        frames = _seconds(part.strip(), clip) if "s" in part else _numbers(part.strip(), clip.count)
         if not frames:
-            raise InputError(f"--frames {part.strip()!r}: selects nothing of {recording.count} frames; {ALLOWED}")
+            raise InputError(f"--frames {part.strip()!r}: selects nothing of {clip.count} frames; {ALLOWED}")
         found.update(frames)
     return sorted(found)
 
 
-def without(frames: list[int], text: str, recording: Recording) -> list[int]:
+def without(frames: list[int], text: str, clip: Clip) -> list[int]:
     """The frames that are not in a list as in `chosen_frames`. Raises InputError."""
-    dropped = set(chosen_frames(text, recording)) if text.strip() else set()
+    dropped = set(chosen_frames(text, clip)) if text.strip() else set()
     return [i for i in frames if i not in dropped]
 
 
@@ -58,9 +58,9 @@ def _numbers(part: str, count: int) -> list[int]:
     return [number % count]
 
 
-def _seconds(part: str, recording: Recording) -> list[int]:
+def _seconds(part: str, clip: Clip) -> list[int]:
     """The frames of a time span such as `2.5s:8s`."""
-    if recording.times is None and not recording.rate:
+    if clip.times is None and not clip.rate:
         raise InputError(f"--frames {part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
     words = part.split(":")
     try:
@@ -70,24 +70,24 @@ def _seconds(part: str, recording: Recording) -> list[int]:
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
         raise InputError(f"--frames {part!r}: no span of seconds; {ALLOWED}")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
-    times = recording.seconds(list(range(recording.count)))
+    times = clip.seconds(list(range(clip.count)))
     elapsed: FloatArray = times - times[0]
-    if np.isfinite(last) and last > elapsed[-1] + 1.5 / (recording.rate or 1.0):
+    if np.isfinite(last) and last > elapsed[-1] + 1.5 / (clip.rate or 1.0):
         raise InputError(f"--frames {part!r}: the source ends after {elapsed[-1]:.3f} seconds")
     return np.flatnonzero((elapsed >= first - 1e-9) & (elapsed < last - 1e-9)).tolist()
 
 
-def thinned(recording: Recording, frames: list[int], rate: float | None, notes: list[str]) -> list[int]:
+def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str]) -> list[int]:
     """The frames nearest to the times of a lower frame rate; all frames without a rate. Raises InputError."""
     if not frames:
-        raise InputError(f"{recording.where}: no frame is left")
+        raise InputError(f"{clip.where}: no frame is left")
     if rate is None:
         return frames
-    if recording.rate is None:
-        raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
-    if rate > recording.rate:
-        raise InputError(f"rate {rate:g}: the source has {recording.rate:g} frames per second; allowed: no more")
-    seconds = recording.seconds(frames)
+    if clip.rate is None:
+        raise InputError(f"{clip.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
+    if rate > clip.rate:
+        raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; allowed: no more")
+    seconds = clip.seconds(frames)
     wanted = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * rate + 1e-6) + 1) / rate
     kept = np.unique(np.abs(seconds[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
     notes.append(f"{len(kept)} of {len(frames)} frames kept for {rate:g} a second, by their times")
@@ -95,20 +95,20 @@ def thinned(recording: Recording, frames: list[int], rate: float | None, notes: 
 
 
 def written_times(
-    recording: Recording, frames: list[int], rate: float | None, notes: list[str]
+    clip: Clip, frames: list[int], rate: float | None, notes: list[str]
 ) -> tuple[list[float] | None, float]:
     """The times for `sequence.toml`, None for evenly spaced frames, and the mean frame rate.
 
     rate     the requested frame rate, or None
     """
-    seconds = recording.seconds(frames)
+    seconds = clip.seconds(frames)
     if len(frames) < 2:
-        return None, float(recording.rate or 0.0)
+        return None, float(clip.rate or 0.0)
     mean = (len(frames) - 1) / float(seconds[-1] - seconds[0])
-    whole = recording.rate and frames == list(range(frames[0], frames[-1] + 1))
-    known = recording.rate or recording.times is not None
+    whole = clip.rate and frames == list(range(frames[0], frames[-1] + 1))
+    known = clip.rate or clip.times is not None
     even = evenly_spaced(seconds)
-    stated = float(rate if rate and even else recording.rate if whole and even and recording.rate else mean)
+    stated = float(rate if rate and even else clip.rate if whole and even and clip.rate else mean)
     if even:
         return None, stated if known else 0.0
     steps, unit = np.diff(seconds), "s" if known else "frames"
@@ -119,8 +119,8 @@ def written_times(
     return [round(float(s), 6) for s in seconds - seconds[0]], stated if known else 0.0
 
 
-def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:
-    """The recording cropped to a window x, y, width, height of its pictures, with the principal point shifted.
+def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
+    """The clip cropped to a window x, y, width, height of its pictures, with the principal point shifted.
 
     Raises:  InputError for an empty window. A window beyond the pictures is refused when a picture is read.
     """
@@ -131,7 +131,7 @@ def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:
     def cut(plane: NDArray, what: str) -> NDArray:
         if x + width > plane.shape[1] or y + height > plane.shape[0]:
             raise InputError(
-                f"{recording.where}: --crop {x} {y} {width} {height} leaves the {what} of"
+                f"{clip.where}: --crop {x} {y} {width} {height} leaves the {what} of"
                 f" {plane.shape[1]}x{plane.shape[0]} pixels"
             )
         return np.ascontiguousarray(plane[y : y + height, x : x + width])
@@ -139,35 +139,39 @@ def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:
     def picture(found: Picture) -> Picture:
         return cut(found, "pictures")
 
-    def lens(old: Lens) -> Lens:
+    def intrinsics(old: Intrinsics) -> Intrinsics:
         return old._replace(cx=old.cx - x, cy=old.cy - y, width=width, height=height)
 
-    masks, depth, rig = recording.masks, recording.depth, recording.rig
+    masks, depth, calibration = clip.masks, clip.depth, clip.calibration
     return replace(
-        recording,
+        clip,
         pictures=lambda wanted: (
             PicturePair(picture(pair.left), None if pair.right is None else picture(pair.right))
-            for pair in recording.pictures(wanted)
+            for pair in clip.pictures(wanted)
         ),
         masks=None if masks is None else lambda i: None if (plane := masks(i)) is None else cut(plane, "masks"),
         depth=None if depth is None else lambda i: None if (plane := depth(i)) is None else cut(plane, "depth"),
-        lens=None if recording.lens is None else lens(recording.lens),
-        rig=None if rig is None else rig._replace(left=lens(rig.left), right=lens(rig.right)),
-        notes=[*recording.notes, f"cropped to {width}x{height} pixels from ({x}, {y}); the intrinsics follow"],
+        intrinsics=None if clip.intrinsics is None else intrinsics(clip.intrinsics),
+        calibration=None
+        if calibration is None
+        else calibration._replace(left=intrinsics(calibration.left), right=intrinsics(calibration.right)),
+        notes=[*clip.notes, f"cropped to {width}x{height} pixels from ({x}, {y}); the intrinsics follow"],
     )
 
 
-def united(recording: Recording, folders: tuple[Path, ...], options: SourceOptions) -> Recording:
-    """The recording with a union of masks: a pixel that its own or any folder's mask excludes is excluded.
+def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Clip:
+    """The clip with a union of masks: a pixel that its own or any folder's mask excludes is excluded.
 
     Raises:  InputError as `stated_masks`, or for unknown intrinsics.
     """
-    lens = recording.lens or (recording.rig.left if recording.rig else None)
-    if lens is None:
-        raise InputError(f"{recording.where}: the intrinsics are unknown; allowed: --camera or --calibration")
-    frames = [recording.where / f"{name}.png" for name in recording.names]
-    more = [stated_masks(replace(options, masks=folder), frames, lens.width, lens.height) for folder in folders]
-    every = [mask for mask in (recording.masks, *more) if mask is not None]
+    intrinsics = clip.intrinsics or (clip.calibration.left if clip.calibration else None)
+    if intrinsics is None:
+        raise InputError(f"{clip.where}: the intrinsics are unknown; allowed: --camera or --calibration")
+    frames = [clip.where / f"{name}.png" for name in clip.names]
+    more = [
+        stated_masks(replace(options, masks=folder), frames, intrinsics.width, intrinsics.height) for folder in folders
+    ]
+    every = [mask for mask in (clip.masks, *more) if mask is not None]
 
     def mask(i: int) -> NDArray[np.bool_] | None:
         planes = [plane for plane in (one(i) for one in every) if plane is not None]
@@ -176,8 +180,8 @@ def united(recording: Recording, folders: tuple[Path, ...], options: SourceOptio
     names = ", ".join(folder.name for folder in folders)
     proposed = any(masks_are_proposed(replace(options, masks=folder)) for folder in folders)
     return replace(
-        recording,
+        clip,
         masks=mask,
-        proposed=recording.proposed or proposed,
-        notes=[*recording.notes, f"masks: united with {names}"],
+        proposed=clip.proposed or proposed,
+        notes=[*clip.notes, f"masks: united with {names}"],
     )

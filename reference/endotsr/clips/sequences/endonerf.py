@@ -5,7 +5,7 @@
     masks/*.png      or gt_masks/*.png (or as above), white = excluded unless the configuration says otherwise
 
 File names are free, with one pattern per folder. The number in the name orders and pairs the frames. In: a folder, and
-the `SequenceConfig` or the statements of a user. Out: a `Sequence` in memory or a `Recording`; notes state every
+the `SequenceConfig` or the statements of a user. Out: a `Sequence` in memory or a `Clip`; notes state every
 assumption. Unusable input raises an `InputError` of one line that names file, frame and reason. This module does not
 depend on models or training.
 """
@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.assemble import assemble, check_percentiles
+from endotsr.clips.sequences.clip import CameraPose, Clip, Intrinsics, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.clips.sequences.masks import tissue_masks
 from endotsr.clips.sequences.poses import POSE_FILES, cameras_from_rows, find_pose_file, read_pose_rows
 from endotsr.clips.sequences.read_frames import FrameFiles
-from endotsr.clips.sequences.recording import CameraPose, Lens, Recording, grey_plane
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, MASKS, RIGHT
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -127,8 +127,8 @@ def input_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
     return hash_files(Path(folder), [*files.images, *files.masks, *files.depth, files.poses])
 
 
-def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording. Raises InputError."""
+def open_endonerf(folder: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip. Raises InputError."""
     files = select_files(folder, SequenceConfig(masks=MASKS if (folder / MASKS).is_dir() else NO_MASKS))
     width, height = size_of(files.images)
     cameras = _read_cameras(files, width, height)
@@ -141,7 +141,7 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
         return tissue_masks([plane], [str(files.masks[i])], options.excluded_value)[0]
 
     first, moves = cameras[0], cameras[0] is not cameras[-1]
-    return Recording(
+    return Clip(
         layout="endonerf",
         where=folder,
         names=[file.stem for file in files.images],
@@ -149,7 +149,7 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
         masks=stated_masks(options, files.images, width, height) or (mask if files.masks else None),
         depth=stated_depth(options, files.images) or depth_reader([*files.depth], 1.0),
         unit=UNIT,
-        lens=Lens(first.fx, first.fy, first.cx, first.cy, width, height),
+        intrinsics=Intrinsics(first.fx, first.fy, first.cx, first.cy, width, height),
         baseline=options.baseline,
         poses=[CameraPose(camera.rotation, camera.translation) for camera in cameras] if moves else None,
         rate=options.rate,

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
+from endotsr.clips.sequences.clip import CameraPose, Clip, Intrinsics
 from endotsr.clips.sequences.common import open_common
-from endotsr.clips.sequences.recording import CameraPose, Lens, Recording
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, OPENGL, inverse_pose, read_sequence_file
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.writing import replace_text
@@ -36,41 +36,41 @@ class SeenPoint(NamedTuple):
 
 def describe_for(folder: Path, others: tuple[Other, ...]) -> list[str]:
     """Write the descriptions. Returns a note on each. Raises InputError."""
-    recording, notes = open_common(folder), []
+    clip, notes = open_common(folder), []
     for name in others:
-        notes.append(_nerfstudio(folder, recording) if name == "nerfstudio" else _colmap(folder, recording))
+        notes.append(_nerfstudio(folder, clip) if name == "nerfstudio" else _colmap(folder, clip))
     return notes
 
 
-def _lens_and_poses(recording: Recording) -> tuple[Lens, list[CameraPose]]:
-    assert recording.lens is not None
+def _intrinsics_and_poses(clip: Clip) -> tuple[Intrinsics, list[CameraPose]]:
+    assert clip.intrinsics is not None
     rest = CameraPose(np.eye(3), np.zeros(3))
-    return recording.lens, [pose or rest for pose in recording.poses or [rest] * recording.count]
+    return clip.intrinsics, [pose or rest for pose in clip.poses or [rest] * clip.count]
 
 
-def _nerfstudio(folder: Path, recording: Recording) -> str:
-    lens, poses = _lens_and_poses(recording)
+def _nerfstudio(folder: Path, clip: Clip) -> str:
+    intrinsics, poses = _intrinsics_and_poses(clip)
     file = read_sequence_file(folder)
     step = THOUSANDTHS * file.depth_scale if file.depth else 1.0
-    if recording.masks is not None:
+    if clip.masks is not None:
         (folder / KEPT).mkdir()
     frames = []
     for i, pose in enumerate(poses):
-        name = recording.names[i]
+        name = clip.names[i]
         rotation, centre = inverse_pose(*pose)
         entry = {"file_path": f"{IMAGES}/{_file(folder, IMAGES, name)}"}
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = rotation @ OPENGL, centre / step
-        if recording.masks is not None:
-            tissue = recording.masks(i)
+        if clip.masks is not None:
+            tissue = clip.masks(i)
             assert tissue is not None
             write_png(folder / KEPT / f"{name}.png", tissue * np.uint8(255))
             entry["mask_path"] = f"{KEPT}/{name}.png"
         if file.depth:
             entry["depth_file_path"] = f"{DEPTH}/{_file(folder, DEPTH, name)}"
         frames.append(entry | {"transform_matrix": matrix.tolist()})
-    about = {"camera_model": "OPENCV", "fl_x": lens.fx, "fl_y": lens.fy, "cx": lens.cx, "cy": lens.cy, "w": lens.width,
-             "h": lens.height, "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0}  # fmt: skip
+    about = {"camera_model": "OPENCV"} | dict(zip(("fl_x", "fl_y", "cx", "cy", "w", "h"), intrinsics))
+    about |= dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
     replace_text(folder / "transforms.json", json.dumps(about | {"frames": frames}, indent=1) + "\n")
     unit = "of the unknown unit" if file.arbitrary else "mm"
     return f"transforms.json: lengths in {step:g} {unit}; a step of the depth files is a thousandth of this"
@@ -81,17 +81,17 @@ def _file(folder: Path, part: str, stem: str) -> str:
     return next(file.name for file in (folder / part).iterdir() if file.stem == stem)
 
 
-def _colmap(folder: Path, recording: Recording) -> str:
+def _colmap(folder: Path, clip: Clip) -> str:
     from scipy.spatial.transform import Rotation
 
-    lens, poses = _lens_and_poses(recording)
-    points = _points(recording, lens, poses)
+    intrinsics, poses = _intrinsics_and_poses(clip)
+    points = _points(clip, intrinsics, poses)
     place = folder / MODEL
     place.mkdir(parents=True)
-    numbers = " ".join(repr(float(value)) for value in lens[:4])
-    replace_text(place / "cameras.txt", f"1 PINHOLE {lens.width} {lens.height} {numbers}\n")
+    numbers = " ".join(repr(float(value)) for value in intrinsics[:4])
+    replace_text(place / "cameras.txt", f"1 PINHOLE {intrinsics.width} {intrinsics.height} {numbers}\n")
     lines, seen = [], {i: [(k, p) for k, p in enumerate(points, 1) if p.frame == i] for i in range(len(poses))}
-    for i, (pose, name) in enumerate(zip(poses, recording.names)):
+    for i, (pose, name) in enumerate(zip(poses, clip.names)):
         x, y, z, w = Rotation.from_matrix(pose.rotation).as_quat()
         values = " ".join(repr(float(value)) for value in (w, x, y, z, *pose.translation))
         lines.append(f"{i + 1} {values} 1 {_file(folder, IMAGES, name)}")
@@ -107,20 +107,20 @@ def _colmap(folder: Path, recording: Recording) -> str:
     return f"{MODEL}: {len(poses)} images, {len(points)} points of the prior depth, in the unit of sequence.toml"
 
 
-def _points(recording: Recording, lens: Lens, poses: list[CameraPose]) -> list[SeenPoint]:
+def _points(clip: Clip, intrinsics: Intrinsics, poses: list[CameraPose]) -> list[SeenPoint]:
     """Some tissue pixels with depth of some frames."""
-    if recording.depth is None:
+    if clip.depth is None:
         return []
-    chosen = np.unique(np.linspace(0, recording.count - 1, FRAMES_OF_POINTS).astype(int)).tolist()
+    chosen = np.unique(np.linspace(0, clip.count - 1, FRAMES_OF_POINTS).astype(int)).tolist()
     found: list[SeenPoint] = []
-    for i, pair in zip(chosen, recording.pictures(chosen)):
-        depth, tissue = recording.depth(i), recording.masks(i) if recording.masks else None
+    for i, pair in zip(chosen, clip.pictures(chosen)):
+        depth, tissue = clip.depth(i), clip.masks(i) if clip.masks else None
         assert depth is not None
         places = np.flatnonzero((depth > 0) & (True if tissue is None else tissue))
         rows, columns = np.unravel_index(places[:: max(1, len(places) // POINTS)], depth.shape)
         rotation, centre = inverse_pose(*poses[i])
         for row, column in zip(rows.tolist(), columns.tolist()):
             z, u, v = float(depth[row, column]), column + 0.5, row + 0.5
-            view = np.array([(u - lens.cx) * z / lens.fx, (v - lens.cy) * z / lens.fy, z])
+            view = np.array([(u - intrinsics.cx) * z / intrinsics.fx, (v - intrinsics.cy) * z / intrinsics.fy, z])
             found.append(SeenPoint(rotation @ view + centre, pair.left[row, column], i, np.array([u, v])))
     return found

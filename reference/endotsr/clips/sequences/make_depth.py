@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
+from endotsr.clips.sequences.clip import ARBITRARY, Clip, Intrinsics, PicturePair
 from endotsr.clips.sequences.common import list_contents, open_common
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.clips.sequences.files import check_pairing, list_pictures
-from endotsr.clips.sequences.recording import ARBITRARY, Lens, PicturePair, Recording
 from endotsr.clips.sequences.relative_depth import Align, MadeDepth, relative_depth
 from endotsr.clips.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
 from endotsr.clips.sequences.smaller import nearest_pixels
@@ -37,24 +37,24 @@ class DepthReport(NamedTuple):
     median: float  # of the frame medians
 
 
-def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
+def stereo_frames(clip: Clip, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
     """Depth of every frame from its stereo pair. Raises InputError without right pictures or baseline."""
-    if recording.lens is None or not recording.baseline:
+    if clip.intrinsics is None or not clip.baseline:
         raise InputError(
-            f"{recording.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME};"
+            f"{clip.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME};"
             " allowed: the distance between the two cameras in the unit of the file"
         )
-    lens, baseline = recording.lens, recording.baseline
-    disparity_range(settings, lens, baseline)
+    intrinsics, baseline = clip.intrinsics, clip.baseline
+    disparity_range(settings, intrinsics, baseline)
     pairs: list[PicturePair] = []
     depths: list[NDArray[np.float32]] = []
-    for i, pair in enumerate(recording.pictures(list(range(recording.count)))):
+    for i, pair in enumerate(clip.pictures(list(range(clip.count)))):
         if pair.right is None:
-            raise InputError(f"{recording.where}: no right pictures (images_right/); allowed: a stereo sequence")
-        found = stereo_depth(pair.left, pair.right, lens, baseline, settings)
+            raise InputError(f"{clip.where}: no right pictures (images_right/); allowed: a stereo sequence")
+        found = stereo_depth(pair.left, pair.right, intrinsics, baseline, settings)
         if i == 0 and (found > 0).mean() < LITTLE:
-            exchanged = stereo_depth(pair.right, pair.left, lens, baseline, settings)
-            _refuse_exchanged(float((found > 0).mean()), float((exchanged > 0).mean()), recording.where)
+            exchanged = stereo_depth(pair.right, pair.left, intrinsics, baseline, settings)
+            _refuse_exchanged(float((found > 0).mean()), float((exchanged > 0).mean()), clip.where)
         if not settings.temporal:
             yield found
             continue
@@ -90,16 +90,16 @@ def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDept
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
     contents, files = list_contents(folder), list_pictures(source, DEPTH_ENDINGS)
     check_pairing(contents.images, files)
-    lens, baseline = contents.file.camera.lens(folder), contents.file.baseline
+    intrinsics, baseline = contents.file.camera.intrinsics(folder), contents.file.baseline
     frames = (
-        _without_mark(depth_of_values(read_plane(file), kind, scale, lens, baseline, file), kind, file)
+        _without_mark(depth_of_values(read_plane(file), kind, scale, intrinsics, baseline, file), kind, file)
         for file in files
     )
     return MadeDepth(frames, f"{kind} from {source.name}", "")
 
 
 def depth_of_values(
-    values: NDArray, kind: Kind, scale: float, lens: Lens, baseline: float | None, where: object
+    values: NDArray, kind: Kind, scale: float, intrinsics: Intrinsics, baseline: float | None, where: object
 ) -> NDArray[np.float32]:
     """Depth (H, W) in the unit of the sequence and at its size, 0 = none, from the values of another program.
 
@@ -117,9 +117,9 @@ def depth_of_values(
             raise InputError(f"{where}: disparity needs the baseline: [camera] baseline is 0 in sequence.toml")
         if (numbers <= 0).all():
             numbers = -numbers
-        focal = lens.fx * values.shape[1] / lens.width
+        focal = intrinsics.fx * values.shape[1] / intrinsics.width
         numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
-    depth = nearest_pixels(np.maximum(numbers, 0.0), lens.width, lens.height, where).astype(np.float32)
+    depth = nearest_pixels(np.maximum(numbers, 0.0), intrinsics.width, intrinsics.height, where).astype(np.float32)
     depth[~np.isfinite(depth)] = 0.0
     return depth
 

@@ -1,6 +1,6 @@
 """`endotsr masks`: proposed masks of a clip, recorded in a sequence or written to a separate folder.
 
-In: a recording. Out: mask pictures (white = excluded), an overlay for inspection, and a mark of the proposal: `proposed
+In: a clip. Out: mask pictures (white = excluded), an overlay for inspection, and a mark of the proposal: `proposed
 = true` in `sequence.toml`, or the file `proposal.json` next to the masks.
 """
 
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, write_png
+from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.common import Contents, list_contents, open_common
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.propose_masks import Proposal, overlay, propose_masks
-from endotsr.clips.sequences.recording import Picture, Recording
 from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, sequence_text
 from endotsr.clips.sequences.sources import PROPOSAL
 from endotsr.errors import InputError
@@ -27,38 +27,38 @@ MOST_WITHOUT = 0.5  # of the frames; a proposal that leaves more frames without 
 SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, per row, and their largest width
 
 
-def left_pictures(recording: Recording) -> Iterator[Picture]:
+def left_pictures(clip: Clip) -> Iterator[Picture]:
     """The left pictures of all frames, decoded one at a time."""
-    return (pair.left for pair in recording.pictures(list(range(recording.count))))
+    return (pair.left for pair in clip.pictures(list(range(clip.count))))
 
 
-def _proposed(recording: Recording) -> Proposal:
-    """The proposal for a recording. Raises InputError if it leaves most frames without tissue."""
-    proposal = propose_masks(left_pictures(recording))
-    empty = without_tissue(recording, proposal)
-    if len(empty) > MOST_WITHOUT * recording.count:
+def _proposed(clip: Clip) -> Proposal:
+    """The proposal for a clip. Raises InputError if it leaves most frames without tissue."""
+    proposal = propose_masks(left_pictures(clip))
+    empty = without_tissue(clip, proposal)
+    if len(empty) > MOST_WITHOUT * clip.count:
         raise InputError(
-            f"{recording.where}: the proposed masks leave hardly any tissue in {len(empty)} of {recording.count}"
+            f"{clip.where}: the proposed masks leave hardly any tissue in {len(empty)} of {clip.count}"
             f" frames: {shortened(empty)}; allowed: masks of another program (prepare --masks)"
         )
     return proposal
 
 
-def _static_mask(contents: Contents, recording: Recording) -> NDArray[np.bool_] | None:
+def _static_mask(contents: Contents, clip: Clip) -> NDArray[np.bool_] | None:
     """The excluded pixels (H, W) if the masks are not a proposal and are equal in all frames; else None."""
-    if recording.masks is None or recording.proposed:
+    if clip.masks is None or clip.proposed:
         return None
-    first = recording.masks(0)
+    first = clip.masks(0)
     assert first is not None
     for i in range(1, len(contents.masks)):
-        if not np.array_equal(recording.masks(i), first):  # pyright: ignore[reportArgumentType]
+        if not np.array_equal(clip.masks(i), first):  # pyright: ignore[reportArgumentType]
             return None
     return ~first
 
 
-def without_tissue(recording: Recording, proposal: Proposal) -> list[str]:
+def without_tissue(clip: Clip, proposal: Proposal) -> list[str]:
     """Names of the frames in which a proposal leaves almost no tissue."""
-    return [recording.names[i] for i in proposal.without_tissue]
+    return [clip.names[i] for i in proposal.without_tissue]
 
 
 def enter_masks(folder: Path, replace: bool = False) -> Proposal:
@@ -71,11 +71,11 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
     Raises:  InputError, leaving the folder unchanged.
     """
     contents = list_contents(folder)
-    recording = open_common(folder)
-    static = None if replace else _static_mask(contents, recording)
+    clip = open_common(folder)
+    static = None if replace else _static_mask(contents, clip)
     if (contents.file.masks or (folder / MASKS).exists()) and not replace and static is None:
         raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
-    proposal = _proposed(recording)
+    proposal = _proposed(clip)
     if proposal.found and static is not None:
         united = [plane | static for plane in proposal.excluded]
         proposal = proposal._replace(excluded=united, reason=f"{proposal.reason}; united with the mask of all frames")
@@ -85,23 +85,23 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
         _write_masks(place, [file.stem for file in contents.images], proposal)
     found = msgspec.structs.replace(contents.file, masks=MaskEntry(proposed=True))
     replace_text(folder / FILE_NAME, sequence_text(found))
-    write_png(folder / OVERLAY, overlays(recording, proposal))
+    write_png(folder / OVERLAY, overlays(clip, proposal))
     return proposal
 
 
-def write_proposal(recording: Recording, out: Path) -> Proposal:
+def write_proposal(clip: Clip, out: Path) -> Proposal:
     """Write masks, overlay and mark into the new folder `out`. Without a proposal nothing is written.
 
     Raises:  InputError, leaving nothing behind.
     """
-    proposal = _proposed(recording)
+    proposal = _proposed(clip)
     if not proposal.found:
         return proposal
     with new_folder(out) as place:
         (place / MASKS).mkdir()
-        _write_masks(place / MASKS, recording.names, proposal)
-        write_png(place / OVERLAY, overlays(recording, proposal))
-        about = {"source": recording.where.name, "proposed": True, "excluded_value": "white", "found": proposal.reason}
+        _write_masks(place / MASKS, clip.names, proposal)
+        write_png(place / OVERLAY, overlays(clip, proposal))
+        about = {"source": clip.where.name, "proposed": True, "excluded_value": "white", "found": proposal.reason}
         (place / PROPOSAL).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8", newline="\n")
     return proposal
 
@@ -111,11 +111,11 @@ def _write_masks(folder: Path, names: list[str], proposal: Proposal) -> None:
         write_png(folder / f"{name}.png", np.where(plane, 255, 0).astype(np.uint8))
 
 
-def overlays(recording: Recording, proposal: Proposal) -> Picture:
+def overlays(clip: Clip, proposal: Proposal) -> Picture:
     """Up to twelve frames of the clip in rows, with proposed pixels in green, (H, W, 3) uint8."""
-    chosen = np.unique(np.linspace(0, recording.count - 1, min(SHOWN, recording.count)).astype(int)).tolist()
+    chosen = np.unique(np.linspace(0, clip.count - 1, min(SHOWN, clip.count)).astype(int)).tolist()
     shown = []
-    for i, pair in zip(chosen, recording.pictures(chosen)):
+    for i, pair in zip(chosen, clip.pictures(chosen)):
         picture = overlay(pair.left, proposal.excluded[i])
         factor = min(1.0, SHOWN_WIDTH / picture.shape[1])
         shown.append(area_resize(picture, round(picture.shape[1] * factor), round(picture.shape[0] * factor)))

@@ -1,6 +1,6 @@
-"""Conversion of a recording into a folder in the common format.
+"""Conversion of a clip into a folder in the common format.
 
-In: a `Recording` and `PrepareSettings`. Out: a new folder with pictures, masks, depth and `sequence.toml`, and notes on
+In: a `Clip` and `PrepareSettings`. Out: a new folder with pictures, masks, depth and `sequence.toml`, and notes on
 every assumption. Frames are read, undistorted, resized and written one at a time. The folder appears when it is
 complete.
 """
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
-from endotsr.clips.sequences.checks.cameras import lens_findings
+from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
+from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip, Intrinsics, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.points import depth_from_points
-from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Lens, PicturePair, Recording
 from endotsr.clips.sequences.sequence_file import (
     DEPTH,
     FILE_NAME,
@@ -61,7 +61,7 @@ class PrepareSettings:
 
 
 def prepare(
-    recording: Recording,
+    clip: Clip,
     out: Path,
     settings: PrepareSettings,
     on_frame: OnFrame = lambda i, n: None,
@@ -74,45 +74,45 @@ def prepare(
 
     Raises:  InputError, leaving nothing behind.
     """
-    notes = list(recording.notes)
-    frames = without(chosen_frames(settings.frames, recording), settings.drop, recording)
-    chosen = thinned(recording, frames, settings.rate, notes)
-    chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
-    refuse_no_lengths(recording, chosen)
+    notes = list(clip.notes)
+    frames = without(chosen_frames(settings.frames, clip), settings.drop, clip)
+    chosen = thinned(clip, frames, settings.rate, notes)
+    chosen, poses = _poses_and_masks(clip, chosen, settings.gaps, notes)
+    refuse_no_lengths(clip, chosen)
     with new_folder(Path(out), FILE_NAME if replace else "") as folder:
-        found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
+        found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
     return found, notes
 
 
 def _poses_and_masks(
-    recording: Recording, chosen: list[int], gaps: str, notes: list[str]
+    clip: Clip, chosen: list[int], gaps: str, notes: list[str]
 ) -> tuple[list[int], list[CameraPose] | None]:
     """The frames to write and their poses. Gaps are refused, dropped or filled, and noted."""
     lacking: dict[str, list[int]] = {}
-    if recording.poses is not None:
-        lacking["pose"] = [i for i in chosen if recording.poses[i] is None]
-    if recording.masks is not None:
-        lacking["mask"] = [i for i in chosen if recording.masks(i) is None]
+    if clip.poses is not None:
+        lacking["pose"] = [i for i in chosen if clip.poses[i] is None]
+    if clip.masks is not None:
+        lacking["mask"] = [i for i in chosen if clip.masks(i) is None]
     for what, frames in lacking.items():
         if not frames:
             continue
         named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
         if gaps == "refuse" or len(frames) == len(chosen):
-            raise InputError(f"{recording.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
+            raise InputError(f"{clip.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
         filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
     if gaps == "drop":
         without = set().union(*lacking.values())
         chosen = [i for i in chosen if i not in without]
-    if recording.poses is None:
+    if clip.poses is None:
         return chosen, None
-    every = filled(recording.poses) if lacking["pose"] and gaps == "fill" else recording.poses
+    every = filled(clip.poses) if lacking["pose"] and gaps == "fill" else clip.poses
     return chosen, [pose for pose in (every[i] for i in chosen) if pose is not None]
 
 
 def _write_frames(
-    recording: Recording,
+    clip: Clip,
     folder: Path,
     chosen: list[int],
     poses: list[CameraPose] | None,
@@ -121,80 +121,85 @@ def _write_frames(
     on_frame: OnFrame,
 ) -> SequenceFile:
     if not chosen:
-        raise InputError(f"{recording.where}: no frame is left")
+        raise InputError(f"{clip.where}: no frame is left")
     straight: Straightener | None = None
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
     facts: list[FrameFacts] = []
     (folder / IMAGES).mkdir()
-    for k, (i, pair) in enumerate(zip(chosen, recording.pictures(chosen))):
+    for k, (i, pair) in enumerate(zip(chosen, clip.pictures(chosen))):
         if straight is None:
             height, width = pair.left.shape[:2]
-            straight = straightener(recording, width, height, settings.scale)
+            straight = straightener(clip, width, height, settings.scale)
             notes += straight.notes
-        new = _checked(recording, i, pair, straight)
-        facts.append(frame_facts(recording.names[i], new.left))
+        new = _checked(clip, i, pair, straight)
+        facts.append(frame_facts(clip.names[i], new.left))
         _write_pictures(folder, k, new, settings.pictures)
-        if recording.masks is not None:
-            _write_mask(folder, k, straight.mask(_mask_or_nearest(recording, i, chosen)))
-        depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
+        if clip.masks is not None:
+            _write_mask(folder, k, straight.mask(_mask_or_nearest(clip, i, chosen)))
+        depth = _depth(clip, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
         if depth is not None and depth.any():
             depth_scale = depth_scale or step_of_depth(float(np.percentile(depth[depth > 0], LARGEST)))
             saturated += write_levels(_depth_file(folder, k), depth, depth_scale)
-        elif recording.depth is not None or (recording.points is not None and settings.points != "none"):
+        elif clip.depth is not None or (clip.points is not None and settings.points != "none"):
             without_depth.append(i)
-            write_levels(_depth_file(folder, k), np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
+            write_levels(
+                _depth_file(folder, k),
+                np.zeros((straight.intrinsics.height, straight.intrinsics.width), np.float32),
+                1.0,
+            )
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    notes += notes_of(frame_findings(facts, str(recording.where)) + lens_findings(straight.lens, str(recording.where)))
+    notes += notes_of(
+        frame_findings(facts, str(clip.where)) + intrinsics_findings(straight.intrinsics, str(clip.where))
+    )
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
         notes.append(f"{saturated} pixels are clipped at {65535 * depth_scale:g}, eight times the usual depth")
     turned = [straight.pose(pose) for pose in poses] if poses else None
-    return _file_of(recording, straight, turned, chosen, depth_scale, settings, notes)
+    return _file_of(clip, straight, turned, chosen, depth_scale, settings, notes)
 
 
-def _checked(recording: Recording, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
+def _checked(clip: Clip, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
     """The pictures in the new camera. Raises InputError for a frame with another size than the first."""
     size = pair.left.shape[:2]
     expected = straight.left.x.shape if straight.left else None
-    source = recording.rig.left if recording.rig else recording.lens
+    source = clip.calibration.left if clip.calibration else clip.intrinsics
     expected = expected or (source and (source.height, source.width))
     if expected and size != tuple(expected):
         raise InputError(
-            f"{recording.where}: frame {recording.names[i]}: {size[1]}x{size[0]} pixels, others"
-            f" {expected[1]}x{expected[0]}"
+            f"{clip.where}: frame {clip.names[i]}: {size[1]}x{size[0]} pixels, others {expected[1]}x{expected[0]}"
         )
     if pair.right is not None and pair.right.shape != pair.left.shape:
-        raise InputError(f"{recording.where}: frame {recording.names[i]}: left and right differ in size")
+        raise InputError(f"{clip.where}: frame {clip.names[i]}: left and right differ in size")
     return straight.pictures(pair)
 
 
-def _mask_or_nearest(recording: Recording, i: int, chosen: list[int]) -> NDArray[np.bool_]:
+def _mask_or_nearest(clip: Clip, i: int, chosen: list[int]) -> NDArray[np.bool_]:
     """The mask of a frame, or of the nearest frame with a mask."""
-    assert recording.masks is not None
+    assert clip.masks is not None
     for other in sorted(chosen, key=lambda k: (abs(k - i), k)):
-        found = recording.masks(other)
+        found = clip.masks(other)
         if found is not None:
             return found
-    raise InputError(f"{recording.where}: no frame has a mask")
+    raise InputError(f"{clip.where}: no frame has a mask")
 
 
 def _depth(
-    recording: Recording, i: int, straight: Straightener, pose: CameraPose | None, points: str, size: tuple[int, ...]
+    clip: Clip, i: int, straight: Straightener, pose: CameraPose | None, points: str, size: tuple[int, ...]
 ) -> NDArray[np.float32] | None:
-    if recording.depth is not None:
-        found = recording.depth(i)
+    if clip.depth is not None:
+        found = clip.depth(i)
         if found is not None and found.shape != size:
             raise InputError(
-                f"{recording.where}: frame {recording.names[i]}: depth of {found.shape[1]}x{found.shape[0]} pixels, the"
+                f"{clip.where}: frame {clip.names[i]}: depth of {found.shape[1]}x{found.shape[0]} pixels, the"
                 f" picture has {size[1]}x{size[0]}; allowed: one size (`endotsr depth --given` takes proportional ones)"
             )
         return None if found is None else straight.depth(found)
-    if recording.points is None or pose is None or points == "none":
+    if clip.points is None or pose is None or points == "none":
         return None
-    return depth_from_points(recording.points(i), straight.pose(pose), straight.lens, points)
+    return depth_from_points(clip.points(i), straight.pose(pose), straight.intrinsics, points)
 
 
 def _write_pictures(folder: Path, k: int, pair: PicturePair, ending: str) -> None:
@@ -216,7 +221,7 @@ def _depth_file(folder: Path, k: int) -> Path:
 
 
 def _file_of(
-    recording: Recording,
+    clip: Clip,
     straight: Straightener,
     poses: list[CameraPose] | None,
     chosen: list[int],
@@ -224,33 +229,33 @@ def _file_of(
     settings: PrepareSettings,
     notes: list[str],
 ) -> SequenceFile:
-    unit = "arbitrary" if recording.unit == ARBITRARY else "mm"
-    if (recording.depth or recording.points) and not depth_scale:
+    unit = "arbitrary" if clip.unit == ARBITRARY else "mm"
+    if (clip.depth or clip.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
-    method = recording.depth_method if recording.depth else f"points, {settings.points}"
-    clipped = list(CLIPPED) if recording.depth and (settings.scale < 1 or recording.depth_clipped) else []
-    times, rate = written_times(recording, chosen, settings.rate, notes)
+    method = clip.depth_method if clip.depth else f"points, {settings.points}"
+    clipped = list(CLIPPED) if clip.depth and (settings.scale < 1 or clip.depth_clipped) else []
+    times, rate = written_times(clip, chosen, settings.rate, notes)
     return SequenceFile(
         format=FORMAT,
         frames=len(chosen),
-        camera=camera_entry(straight.lens, straight.baseline),
-        source=f"{recording.where.name} ({recording.layout})",
+        camera=camera_entry(straight.intrinsics, straight.baseline),
+        source=f"{clip.where.name} ({clip.layout})",
         unit=unit,
         frame_rate=rate,
         times=times,
-        masks=MaskEntry(proposed=recording.proposed) if recording.masks is not None else None,
-        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method, assumed=recording.depth_assumed)
+        masks=MaskEntry(proposed=clip.proposed) if clip.masks is not None else None,
+        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method, assumed=clip.depth_assumed)
         if depth_scale
         else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )
 
 
-def camera_entry(lens: Lens, baseline: float | None) -> CameraEntry:
-    """The section [camera] of a lens without distortion."""
-    fx, fy, cx, cy = (float(value) for value in (lens.fx, lens.fy, lens.cx, lens.cy))
+def camera_entry(intrinsics: Intrinsics, baseline: float | None) -> CameraEntry:
+    """The section [camera] of intrinsics without distortion."""
+    fx, fy, cx, cy = (float(value) for value in (intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy))
     return CameraEntry(
-        width=lens.width, height=lens.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
+        width=intrinsics.width, height=intrinsics.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
     )
 
 

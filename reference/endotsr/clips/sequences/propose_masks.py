@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, dense_flow
-from endotsr.clips.sequences.recording import Picture
+from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts
+from endotsr.clips.sequences.clip import colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import check_depth_scale, clip_depth, depth_plane, read_plane
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.masks import tissue_masks
-from endotsr.clips.sequences.recording import colour_picture, grey_plane
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.untrusted.files import in_threads

@@ -98,10 +98,10 @@ def relative_depth(contents: Contents, source: Path, align: Align, farthest: flo
     """
     files = list_pictures(source, DEPTH_ENDINGS)
     check_pairing(contents.images, files)
-    lens = contents.file.camera.lens(contents.folder)
+    intrinsics = contents.file.camera.intrinsics(contents.folder)
 
     def relative(i: int) -> FloatArray:
-        return nearest_pixels(read_plane(files[i]).astype(np.float64), lens.width, lens.height, files[i])
+        return nearest_pixels(read_plane(files[i]).astype(np.float64), intrinsics.width, intrinsics.height, files[i])
 
     if contents.depth and contents.file.depth and not contents.file.depth.assumed:
         return _aligned(contents, relative, source, align)
@@ -196,10 +196,10 @@ def _assumed_line(
 def _refuse_against_light(
     contents: Contents, relative: Callable[[int], FloatArray], lines: list[StraightLine], source: Path
 ) -> None:
-    recording, light = open_common(contents.folder), []
-    looked = list(range(min(LOOKED_AT, recording.count)))
-    for i, pair in zip(looked, recording.pictures(looked)):
-        tissue = recording.masks(i) if recording.masks else None
+    clip, light = open_common(contents.folder), []
+    looked = list(range(min(LOOKED_AT, clip.count)))
+    for i, pair in zip(looked, clip.pictures(looked)):
+        tissue = clip.masks(i) if clip.masks else None
         light.append(light_correlation(pair.left, lines[i].depth(relative(i)), tissue))
     if light_finding(light, str(source)):
         raise InputError(

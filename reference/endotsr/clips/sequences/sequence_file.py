@@ -40,7 +40,7 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Lens, checked_lens, scene_factor
+from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Intrinsics, checked_intrinsics, scene_factor
 from endotsr.config import Section, checked, refuse_unknown_keys
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -70,10 +70,10 @@ class CameraEntry(Section, frozen=True, kw_only=True):
     distortion: list[float] = msgspec.field(default_factory=list)
     baseline: NonNegative = 0.0
 
-    def lens(self, where: object) -> Lens:
-        """The lens, checked. Raises InputError."""
-        lens = Lens(self.fx, self.fy, self.cx, self.cy, self.width, self.height, tuple(self.distortion))
-        return checked_lens(lens, where)
+    def intrinsics(self, where: object) -> Intrinsics:
+        """The intrinsics, checked. Raises InputError."""
+        intrinsics = Intrinsics(self.fx, self.fy, self.cx, self.cy, self.width, self.height, tuple(self.distortion))
+        return checked_intrinsics(intrinsics, where)
 
 
 class MaskEntry(Section, frozen=True, kw_only=True):
@@ -168,7 +168,7 @@ def read_sequence_file(folder: Path) -> SequenceFile:
             raise InputError(
                 f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder next to the file"
             )
-    found.camera.lens(path)
+    found.camera.intrinsics(path)
     _check_times(found, path)
     return found
 

@@ -1,6 +1,6 @@
 """Parts shared by several layouts: picture files as frames, masks and depth, stated cameras.
 
-In: paths and the statements of `SourceOptions`. Out: the fields of a `Recording`.
+In: paths and the statements of `SourceOptions`. Out: the fields of a `Clip`.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,23 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.clips.sequences.calibrations import lens_or_rig
-from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
-from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
-from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
-from endotsr.clips.sequences.recording import (
+from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
+from endotsr.clips.sequences.clip import (
     ARBITRARY,
     CameraPose,
-    Lens,
+    Clip,
+    Intrinsics,
     Picture,
     PicturePair,
-    Recording,
-    Rig,
-    checked_lens,
+    StereoCalibration,
+    checked_intrinsics,
     colour_picture,
     grey_plane,
     scene_factor,
 )
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
+from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.trajectory import poses_of_frames, read_trajectory
@@ -185,39 +185,41 @@ def depth_step(options: SourceOptions) -> float:
     return options.depth_scale * scene_factor(options.depth_unit)
 
 
-def with_stated(recording: Recording, options: SourceOptions) -> Recording:
-    """The recording with its masks and depth replaced by those of `--masks` and `--depth`, if stated.
+def with_stated(clip: Clip, options: SourceOptions) -> Clip:
+    """The clip with its masks and depth replaced by those of `--masks` and `--depth`, if stated.
 
-    Raises:  InputError for files that do not match its frames, or if only one of depth and recording is in millimetres.
+    Raises:  InputError for files that do not match its frames, or if only one of depth and clip is in millimetres.
     """
-    lens = recording.lens
-    assert lens is not None
-    frames = [recording.where / f"{name}.png" for name in recording.names]
-    masks, depth = stated_masks(options, frames, lens.width, lens.height), stated_depth(options, frames)
-    if depth is not None and (options.depth_unit == ARBITRARY) != (recording.unit == ARBITRARY):
-        raise InputError(f"{recording.where}: --depth-unit {options.depth_unit} with the unit {recording.unit}")
+    intrinsics = clip.intrinsics
+    assert intrinsics is not None
+    frames = [clip.where / f"{name}.png" for name in clip.names]
+    masks, depth = stated_masks(options, frames, intrinsics.width, intrinsics.height), stated_depth(options, frames)
+    if depth is not None and (options.depth_unit == ARBITRARY) != (clip.unit == ARBITRARY):
+        raise InputError(f"{clip.where}: --depth-unit {options.depth_unit} with the unit {clip.unit}")
     return replace(
-        recording,
-        masks=masks or recording.masks,
-        depth=depth or recording.depth,
-        depth_clipped=recording.depth_clipped and depth is None,
-        depth_method="given" if depth else recording.depth_method,
-        depth_assumed="" if depth else recording.depth_assumed,
-        proposed=recording.proposed and masks is None,
+        clip,
+        masks=masks or clip.masks,
+        depth=depth or clip.depth,
+        depth_clipped=clip.depth_clipped and depth is None,
+        depth_method="given" if depth else clip.depth_method,
+        depth_assumed="" if depth else clip.depth_assumed,
+        proposed=clip.proposed and masks is None,
     )
 
 
-def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> tuple[Lens | None, Rig | None]:
-    """The lens of `--camera` or the lens or rig of `--calibration`, for pictures of this size; both None if not stated.
+def stated_camera(
+    options: SourceOptions, width: int, height: int, where: object
+) -> tuple[Intrinsics | None, StereoCalibration | None]:
+    """What `--camera` or `--calibration` states for pictures of this size; (None, None) without either.
 
     Raises:  InputError for a calibration of another aspect ratio; proportional sizes are scaled.
     """
     if options.calibration is not None:
-        return lens_or_rig(options.calibration, width, height)
+        return intrinsics_or_stereo(options.calibration, width, height)
     if options.camera is None:
         return None, None
     fx, fy, cx, cy = options.camera
-    return checked_lens(Lens(fx, fy, cx, cy, width, height, options.distortion), where), None
+    return checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, options.distortion), where), None
 
 
 def stated_poses(

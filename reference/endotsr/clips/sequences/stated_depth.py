@@ -6,7 +6,7 @@ endoscope, the parallax of a stereo pair, and the light. Light comes from the sc
 in measured clips the rank correlation of brightness with depth is -0.55 to -0.84, and +0.55 to +0.84 with inverse
 depth. Simulated scenes with even light give -0.3 to 0.2.
 
-In: a recording with stated depth. Out: nothing, or an `InputError` with the evidence and the remedy.
+In: a clip with stated depth. Out: nothing, or an `InputError` with the evidence and the remedy.
 """
 
 import re
@@ -26,7 +26,7 @@ from endotsr.clips.sequences.checks.depth import (
 )
 from endotsr.clips.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
 from endotsr.clips.sequences.checks.kinds import Finding
-from endotsr.clips.sequences.recording import ARBITRARY, Recording
+from endotsr.clips.sequences.clip import ARBITRARY, Clip
 from endotsr.errors import InputError
 
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
@@ -37,15 +37,15 @@ REMEDY = (
 )
 
 
-def refuse_no_lengths(recording: Recording, chosen: list[int]) -> None:
-    """Raises InputError if the stated depth of a recording most likely contains no lengths.
+def refuse_no_lengths(clip: Clip, chosen: list[int]) -> None:
+    """Raises InputError if the stated depth of a clip most likely contains no lengths.
 
     chosen   the frames to read; the first `LOOKED_AT` are checked
     """
-    stated = recording.stated_depth
-    if stated is None or stated.trusted or recording.depth is None:
+    stated = clip.stated_depth
+    if stated is None or stated.trusted or clip.depth is None:
         return
-    found = _of_names(stated.path) or _of_values(recording, chosen[:LOOKED_AT])
+    found = _of_names(stated.path) or _of_values(clip, chosen[:LOOKED_AT])
     if found:
         raise InputError(f"{stated.path}: {found}; {REMEDY}")
 
@@ -56,18 +56,18 @@ def _of_names(path: Path) -> str:
     return f"the name {named} indicates a disparity or a relative depth" if named else ""
 
 
-def _of_values(recording: Recording, frames: list[int]) -> str:
+def _of_values(clip: Clip, frames: list[int]) -> str:
     """Evidence against lengths in the values and in comparison with the pictures; "" without any.
 
     Raises:  InputError for depth that is upside down or mirrored, or whose largest value marks missing depth.
     """
-    stated, where = recording.stated_depth, str(recording.where)
-    read, masks = recording.depth, recording.masks
+    stated, where = clip.stated_depth, str(clip.where)
+    read, masks = clip.depth, clip.masks
     assert read is not None and stated is not None
     planes: list[NDArray[np.float32]] = []
     light: list[float] = []
     shading: list[Fit] = []
-    for i, pair in zip(frames, recording.pictures(frames)):
+    for i, pair in zip(frames, clip.pictures(frames)):
         plane = read(i)
         if plane is None or not plane.any():
             continue
@@ -76,7 +76,7 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
             tissue = masks(i) if masks else None
             light.append(light_correlation(pair.left, plane, tissue))
             shading += filter(None, [shading_fit(pair.left, plane, tissue)])
-            right = pair.right if recording.rig is None and len(planes) == 1 else None
+            right = pair.right if clip.calibration is None and len(planes) == 1 else None
             disparity = None if right is None else agreed_disparity(pair.left, right)
             if disparity is not None:
                 found = stereo_finding(plane, disparity, where, i)
@@ -91,7 +91,7 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
         raise InputError(f"{stated.path}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}, or --trust-depth")
     if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
         return full
-    unit = [] if recording.unit == ARBITRARY else unit_finding(usual_depth(facts), where)
+    unit = [] if clip.unit == ARBITRARY else unit_finding(usual_depth(facts), where)
     if unit:
         return f"{unit[0].what}; state another unit with --depth-unit and --depth-scale"
     found = light_finding(light, where)

@@ -2,8 +2,8 @@
 
     z = f B / d          f, B: focal length (px) and baseline; d: disparity (px)
 
-In: left and right pictures, the lens and the baseline. Out: depth (H, W) with unfilled holes (0), and a confidence. A
-pixel has depth if left and right agree, the match is confident and the depth is within range.
+In: left and right pictures, the intrinsics and the baseline. Out: depth (H, W) with unfilled holes (0), and a
+confidence. A pixel has depth if left and right agree, the match is confident and the depth is within range.
 """
 
 from typing import Literal
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.stereo import match_pair
-from endotsr.clips.sequences.recording import Lens, Picture
+from endotsr.clips.sequences.clip import Intrinsics, Picture
 from endotsr.config import Fraction, Positive, Section
 from endotsr.errors import InputError
 
@@ -39,7 +39,7 @@ class StereoSettings(Section, frozen=True, kw_only=True):
     """median over three frames along the optical flow"""
 
 
-def disparity_range(settings: StereoSettings, lens: Lens, baseline: float) -> tuple[int, int]:
+def disparity_range(settings: StereoSettings, intrinsics: Intrinsics, baseline: float) -> tuple[int, int]:
     """Lowest disparity and number of disparities, a multiple of 16, for the searched depths.
 
     Raises:  InputError for depths that are not ascending, or a range beyond the width of the pictures.
@@ -48,29 +48,29 @@ def disparity_range(settings: StereoSettings, lens: Lens, baseline: float) -> tu
         raise InputError(
             f"nearest {settings.nearest:g}, farthest {settings.farthest:g}: allowed: two ascending numbers > 0"
         )
-    lowest = int(np.floor(lens.fx * baseline / settings.farthest))
-    highest = int(np.ceil(lens.fx * baseline / settings.nearest))
+    lowest = int(np.floor(intrinsics.fx * baseline / settings.farthest))
+    highest = int(np.ceil(intrinsics.fx * baseline / settings.nearest))
     count = -(-(highest - lowest + 1) // MULTIPLE) * MULTIPLE
-    if count > min(MOST, lens.width):
+    if count > min(MOST, intrinsics.width):
         raise InputError(
             f"depths from {settings.nearest:g} to {settings.farthest:g} at baseline {baseline:g} are disparities from"
-            f" {lowest} to {highest} px in pictures {lens.width} px wide; allowed: a larger --nearest, or the right"
-            " baseline and unit"
+            f" {lowest} to {highest} px in pictures {intrinsics.width} px wide; allowed: a larger --nearest, or the"
+            " right baseline and unit"
         )
     return lowest, count
 
 
 def stereo_depth(
-    left: Picture, right: Picture, lens: Lens, baseline: float, settings: StereoSettings
+    left: Picture, right: Picture, intrinsics: Intrinsics, baseline: float, settings: StereoSettings
 ) -> NDArray[np.float32]:
     """Depth (H, W) of the left picture, 0 = none.
 
-    lens       of both rectified pictures
+    intrinsics       of both rectified pictures
     baseline   in the unit of the resulting depth
 
     Edges:   pixels whose match is outside the right picture have no depth.
     """
-    lowest, count = disparity_range(settings, lens, baseline)
+    lowest, count = disparity_range(settings, intrinsics, baseline)
     # OpenCV does not match a strip as wide as the search, at the left of the left and the right of the right picture.
     padding = lowest + count
     pad = ((0, 0), (padding, padding), (0, 0))
@@ -80,9 +80,9 @@ def stereo_depth(
     disparity, confidence, apart = (
         plane[:, padding:-padding] for plane in (match.disparity, match.confidence, match.disagreement)
     )
-    column = np.arange(lens.width)[None, :]
+    column = np.arange(intrinsics.width)[None, :]
     with np.errstate(invalid="ignore", divide="ignore"):
-        depth = lens.fx * baseline / disparity
+        depth = intrinsics.fx * baseline / disparity
         good = (apart <= settings.agreement) & (confidence >= settings.confidence) & (disparity > 0)
         good &= (depth >= settings.nearest) & (depth <= settings.farthest) & (column - disparity >= 0)
     return np.where(good, depth, 0).astype(np.float32)

@@ -1,6 +1,6 @@
-"""Undistortion, rectification and resizing of a recording to the pictures of one pinhole camera.
+"""Undistortion, rectification and resizing of a clip to the pictures of one pinhole camera.
 
-In: a `Recording` and a scale. Out: a `Straightener`, which maps pictures, masks, depth and poses, and the lens of the
+In: a `Clip` and a scale. Out: a `Straightener`, which maps pictures, masks, depth and poses, and the intrinsics of the
 new pictures. Left and right each have their own distortion.
 """
 
@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
-from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
-from endotsr.clips.sequences.recording import (
+from endotsr.clips.sequences.clip import (
     CameraPose,
-    Lens,
+    Clip,
+    Intrinsics,
     Picture,
     PicturePair,
-    Recording,
-    lens_of_matrix,
+    intrinsics_of_matrix,
     opencv_matrix,
 )
+from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import degrees_between
@@ -30,15 +30,15 @@ SKEWED = 0.5  # largest vertical over horizontal offset of two cameras that coun
 
 @dataclass(frozen=True)
 class Straightener:
-    """The maps of a recording, and the size of the new pictures."""
+    """The maps of a clip, and the size of the new pictures."""
 
-    lens: Lens  # of the new pictures, without distortion
+    intrinsics: Intrinsics  # of the new pictures, without distortion
     left: Maps | None  # None: as stored
     right: Maps | None
     turn: FloatArray  # (3, 3) x_new = turn @ x_old, camera axes of the left picture
     baseline: float | None
     notes: list[str]
-    clipped: bool = False  # the depth of the recording is already clipped
+    clipped: bool = False  # the depth of the clip is already clipped
 
     def pictures(self, pair: PicturePair) -> PicturePair:
         """Both pictures in the new camera."""
@@ -46,13 +46,13 @@ class Straightener:
         return PicturePair(left, None if pair.right is None else self._picture(pair.right, self.right))
 
     def _picture(self, picture: Picture, maps: Maps | None) -> Picture:
-        return area_resize(remapped(picture, maps) if maps else picture, self.lens.width, self.lens.height)
+        return area_resize(remapped(picture, maps) if maps else picture, self.intrinsics.width, self.intrinsics.height)
 
     def mask(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Tissue where all covered pixels of the old mask are tissue."""
         if self.left:
             mask = remapped(mask.astype(np.uint8), self.left, nearest=True) > 0
-        return area_resize((~mask).astype(np.float32), self.lens.width, self.lens.height) == 0
+        return area_resize((~mask).astype(np.float32), self.intrinsics.width, self.intrinsics.height) == 0
 
     def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
         """Mean of the depths that a new pixel covers, or 0 if it covers none.
@@ -62,10 +62,10 @@ class Straightener:
         """
         if self.left:
             depth = remapped(depth, self.left, nearest=True)
-        if depth.shape == (self.lens.height, self.lens.width):
+        if depth.shape == (self.intrinsics.height, self.intrinsics.width):
             return depth
         plane = depth if self.clipped else clip_depth(depth, CLIPPED)
-        return reduced_depth(plane, self.lens.width, self.lens.height)
+        return reduced_depth(plane, self.intrinsics.width, self.intrinsics.height)
 
     def pose(self, pose: CameraPose) -> CameraPose:
         """World-to-camera of the new left camera."""
@@ -74,8 +74,8 @@ class Straightener:
         return CameraPose(self.turn @ pose.rotation, self.turn @ pose.translation)
 
 
-def straightener(recording: Recording, width: int, height: int, scale: float) -> Straightener:
-    """The maps of a recording with pictures of this size.
+def straightener(clip: Clip, width: int, height: int, scale: float) -> Straightener:
+    """The maps of a clip with pictures of this size.
 
     Raises:  InputError without intrinsics, for a scale outside (0, 1], and for cameras that are not side by side.
     """
@@ -84,53 +84,51 @@ def straightener(recording: Recording, width: int, height: int, scale: float) ->
     new_size = round(width * scale), round(height * scale)
     if min(new_size) < 1:
         raise InputError(f"scale {scale:g} makes {new_size[0]}x{new_size[1]} pixels of {width}x{height}")
-    if recording.rig is not None:
-        return _rectified(recording, new_size)
-    lens = recording.lens
-    if lens is None:
+    if clip.calibration is not None:
+        return _rectified(clip, new_size)
+    intrinsics = clip.intrinsics
+    if intrinsics is None:
         raise InputError(
-            f"{recording.where}: the intrinsics are unknown; allowed: --camera FX FY CX CY in pixels, or"
-            " --calibration FILE"
+            f"{clip.where}: the intrinsics are unknown; allowed: --camera FX FY CX CY in pixels, or --calibration FILE"
         )
-    if (lens.width, lens.height) != (width, height):
+    if (intrinsics.width, intrinsics.height) != (width, height):
         raise InputError(
-            f"{recording.where}: the intrinsics are of {lens.width}x{lens.height} pixels, the pictures have"
+            f"{clip.where}: the intrinsics are of {intrinsics.width}x{intrinsics.height} pixels, the pictures have"
             f" {width}x{height}"
         )
-    if not any(lens.distortion):
-        plain = lens._replace(distortion=())
-        return Straightener(
-            plain.scaled(*new_size), None, None, np.eye(3), recording.baseline, [], recording.depth_clipped
-        )
-    maps = undistortion_maps(opencv_matrix(lens), np.array(lens.distortion), width, height)
-    new = lens_of_matrix(maps.matrix, width, height, where=recording.where)
-    note = f"undistorted: distortion {', '.join(f'{k:g}' for k in lens.distortion)}"
-    return Straightener(
-        new.scaled(*new_size), maps, maps, np.eye(3), recording.baseline, [note], recording.depth_clipped
-    )
+    if not any(intrinsics.distortion):
+        plain = intrinsics._replace(distortion=())
+        return Straightener(plain.scaled(*new_size), None, None, np.eye(3), clip.baseline, [], clip.depth_clipped)
+    maps = undistortion_maps(opencv_matrix(intrinsics), np.array(intrinsics.distortion), width, height)
+    new = intrinsics_of_matrix(maps.matrix, width, height, where=clip.where)
+    note = f"undistorted: distortion {', '.join(f'{k:g}' for k in intrinsics.distortion)}"
+    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, [note], clip.depth_clipped)
 
 
-def _rectified(recording: Recording, new_size: tuple[int, int]) -> Straightener:
-    rig = recording.rig
-    assert rig is not None
-    across, down = abs(rig.translation[0]), abs(rig.translation[1])
+def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:
+    calibration = clip.calibration
+    assert calibration is not None
+    across, down = abs(calibration.translation[0]), abs(calibration.translation[1])
     if down > SKEWED * across:
         raise InputError(
-            f"{recording.where}: the cameras are {across:g} apart horizontally and {down:g} vertically;"
+            f"{clip.where}: the cameras are {across:g} apart horizontally and {down:g} vertically;"
             " allowed: side by side"
         )
-    if recording.depth is not None:
-        raise InputError(f"{recording.where}: depth of pictures that are not rectified; allowed: without --depth")
-    distortions = np.array(rig.left.distortion or (0.0,) * 4), np.array(rig.right.distortion or (0.0,) * 4)
-    matrices = opencv_matrix(rig.left), opencv_matrix(rig.right)
-    width, height = rig.left.width, rig.left.height
-    maps = rectification_maps(matrices, distortions, rig.rotation, rig.translation, width, height)
+    if clip.depth is not None:
+        raise InputError(f"{clip.where}: depth of pictures that are not rectified; allowed: without --depth")
+    distortions = (
+        np.array(calibration.left.distortion or (0.0,) * 4),
+        np.array(calibration.right.distortion or (0.0,) * 4),
+    )
+    matrices = opencv_matrix(calibration.left), opencv_matrix(calibration.right)
+    width, height = calibration.left.width, calibration.left.height
+    maps = rectification_maps(matrices, distortions, calibration.rotation, calibration.translation, width, height)
     if maps.baseline <= 0:
         raise InputError(
-            f"{recording.where}: the calibration states that the right camera is on the left; are the pictures, or the"
+            f"{clip.where}: the calibration states that the right camera is on the left; are the pictures, or the"
             " sections of the calibration, swapped?"
         )
-    lens = lens_of_matrix(maps.left.matrix, width, height, where=recording.where).scaled(*new_size)
+    intrinsics = intrinsics_of_matrix(maps.left.matrix, width, height, where=clip.where).scaled(*new_size)
     angle = degrees_between(maps.left.rotation, np.eye(3))
     note = f"rectified: baseline {maps.baseline:.6g} mm, left camera turned by {angle:.3g} degrees"
-    return Straightener(lens, maps.left, maps.right, maps.left.rotation, maps.baseline, [note])
+    return Straightener(intrinsics, maps.left, maps.right, maps.left.rotation, maps.baseline, [note])

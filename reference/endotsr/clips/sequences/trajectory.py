@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.recording import CameraPose, scene_factor
+from endotsr.clips.sequences.clip import CameraPose, scene_factor
 from endotsr.clips.sequences.sequence_file import OPENGL, inverse_pose
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray

@@ -166,13 +166,13 @@ def no_larger(config: Config, gaussians: int | None) -> Config:
 
 def size_of(job: Job) -> Size:
     """The size of a window; reads the first picture of the folder."""
-    from endotsr.clips.sequences.layouts import open_recording
+    from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.source_options import SourceOptions
 
     first, end, step = (int(word) for word in job.config.sequence.frames.split(":"))
-    lens, scale = open_recording(Path(job.source), SourceOptions()).lens, job.config.sequence.scale
-    assert lens is not None
-    return Size(len(range(first, end, step)), round(lens.width * scale), round(lens.height * scale))
+    intrinsics, scale = describe(Path(job.source), SourceOptions()).intrinsics, job.config.sequence.scale
+    assert intrinsics is not None
+    return Size(len(range(first, end, step)), round(intrinsics.width * scale), round(intrinsics.height * scale))
 
 
 def frame_range(selected: str, window: Window) -> str:

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.effects.clip import WIDEST
+from endotsr.clips.effects.frames import WIDEST
+from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip
 from endotsr.clips.sequences.endonerf import NO_MASKS
-from endotsr.clips.sequences.layouts import open_recording, readable_layout
-from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Recording
+from endotsr.clips.sequences.layouts import describe, readable_layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.splits import parse_frame_range
 from endotsr.config import SequenceConfig
@@ -58,22 +58,22 @@ def survey(source: Path, config: SequenceConfig) -> list[SurveyedFrame]:
             window would have its own scale. An unreadable frame raises nothing; `fault` gives the reason.
     """
     readable_layout(source)
-    recording = open_recording(source, SourceOptions(excluded_value=config.excluded_value))
-    if recording.unit == ARBITRARY:
+    clip = describe(source, SourceOptions(excluded_value=config.excluded_value))
+    if clip.unit == ARBITRARY:
         raise InputError(f"{source}: its unit is arbitrary, so each window would have its own scale; allowed: mm")
     try:
-        frames = parse_frame_range(config.frames, recording.count)
+        frames = parse_frame_range(config.frames, clip.count)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
-    return list(_surveyed(recording, frames, config.masks != NO_MASKS))
+    return list(_surveyed(clip, frames, config.masks != NO_MASKS))
 
 
-def _surveyed(recording: Recording, frames: range, masked: bool) -> Iterator[SurveyedFrame]:
+def _surveyed(clip: Clip, frames: range, masked: bool) -> Iterator[SurveyedFrame]:
     before: _Shown | None = None
     for i in frames:
-        found, shown = SurveyedFrame(recording.names[i]), None
+        found, shown = SurveyedFrame(clip.names[i]), None
         try:
-            shown = _shown(recording, i, masked)
+            shown = _shown(clip, i, masked)
         except InputError as error:
             found = found._replace(fault=str(error))
         if shown is not None:
@@ -84,19 +84,19 @@ def _surveyed(recording: Recording, frames: range, masked: bool) -> Iterator[Sur
         yield found
 
 
-def _shown(recording: Recording, i: int, masked: bool) -> _Shown:
+def _shown(clip: Clip, i: int, masked: bool) -> _Shown:
     """Frame i. Raises InputError if one of its files cannot be read."""
-    picture = next(iter(recording.pictures([i]))).left
-    lens = recording.lens
-    if lens is not None and picture.shape[:2] != (lens.height, lens.width):
+    picture = next(iter(clip.pictures([i]))).left
+    intrinsics = clip.intrinsics
+    if intrinsics is not None and picture.shape[:2] != (intrinsics.height, intrinsics.width):
         size = f"{picture.shape[1]}x{picture.shape[0]}"
-        raise InputError(f"{recording.names[i]}: {size} pixels, the recording has {lens.width}x{lens.height}")
-    mask = recording.masks(i) if masked and recording.masks is not None else None
+        raise InputError(f"{clip.names[i]}: {size} pixels, the recording has {intrinsics.width}x{intrinsics.height}")
+    mask = clip.masks(i) if masked and clip.masks is not None else None
     tissue = np.ones(picture.shape[:2], bool) if mask is None else mask
-    depth = None if recording.depth is None else recording.depth(i)
+    depth = None if clip.depth is None else clip.depth(i)
     known = np.empty(0) if depth is None else depth[tissue & (depth > 0)]
     grey, small = _reduced(picture.mean(axis=2).round().astype(np.uint8), tissue)
-    pose = None if recording.poses is None else recording.poses[i]
+    pose = None if clip.poses is None else clip.poses[i]
     return _Shown(grey, small, pose, float(np.median(known)) if known.size else None)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from endotsr.clips.sequences.checks.kinds import Finding, finding
-from endotsr.clips.sequences.recording import Lens
+from endotsr.clips.sequences.clip import Intrinsics
 from endotsr.clips.sequences.world import FAR_FROM_ORIGIN
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
@@ -19,7 +19,7 @@ OFF_CENTRE = 0.25  # of the picture
 def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Finding]:
     """Findings on the cameras of a sequence; `depth` is its median depth, 0 if unknown."""
     centres = np.array([camera_centre(camera) for camera in cameras])
-    found = lens_findings(cameras[0], where) + _step_findings(cameras, centres, where)
+    found = intrinsics_findings(cameras[0], where) + _step_findings(cameras, centres, where)
     way, distance = float(np.ptp(centres, axis=0).max()), float(np.abs(centres).max())
     if depth and 0 < way < STILL * depth:
         found.append(finding("pose-unit", where, f"the camera moves {way:.3g} in all, the depth is {depth:.4g}"))
@@ -46,7 +46,7 @@ def _step_findings(cameras: list[Camera], centres: FloatArray, where: str) -> li
     return found
 
 
-def lens_findings(camera: Camera | Lens, where: str) -> list[Finding]:
+def intrinsics_findings(camera: Camera | Intrinsics, where: str) -> list[Finding]:
     """Field of view, principal point, shape of the pixels."""
     found = []
     angle = float(np.degrees(2 * np.arctan(camera.width / (2 * camera.fx))))

@@ -33,11 +33,11 @@ from endotsr.clips.sequences.checks.frames import (
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.parts import Parts, parts_of
+from endotsr.clips.sequences.clip import colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
-from endotsr.clips.sequences.recording import colour_picture, grey_plane
 from endotsr.clips.sequences.sources import matching_files
 from endotsr.clips.sequences.splits import parse_frame_range, split_frames
 from endotsr.config import Config, lengthened

@@ -13,7 +13,7 @@ from pkgutil import iter_modules
 from typing import NamedTuple
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.recording import Recording, StatedDepth
+from endotsr.clips.sequences.clip import Clip, StatedDepth
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_step, masks_are_proposed
@@ -33,7 +33,7 @@ class Layout(NamedTuple):
     about: str  # contents of a path in this layout, for messages
     rank: int  # layouts are tried in ascending order
     recognises: Callable[[Path], bool]
-    open: Callable[[Path, SourceOptions], Recording]
+    open: Callable[[Path, SourceOptions], Clip]
     takes: tuple[str, ...] = ()  # the STATEMENTS that it reads; the others are refused
     read: Callable[[Path, SequenceConfig, float], Sequence] | None = None  # None: needs `endotsr prepare`
     hashes: Callable[[Path, SequenceConfig], dict[str, str]] | None = None  # SHA-256 of the files that `read` reads
@@ -66,20 +66,20 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
     raise InputError(f"{path}: no known layout; allowed: {known}")
 
 
-def open_recording(path: Path, options: SourceOptions) -> Recording:
-    """The recording at a path. Raises InputError."""
+def describe(path: Path, options: SourceOptions) -> Clip:
+    """The clip at a path. Raises InputError."""
     layout = layout_of(path, options.layout)
     if options.layout != "auto" and not Path(path).exists():
         raise InputError(f"{path}: not found")
     refuse_unused(layout, Path(path), options)
-    recording = layout.open(Path(path), options)
+    clip = layout.open(Path(path), options)
     if options.calibration is not None:
         said = f"{options.calibration.name}: {HALF_A_PIXEL}"
-        recording = replace(recording, notes=[*recording.notes, said])
+        clip = replace(clip, notes=[*clip.notes, said])
     if options.depth is not None:
         stated = StatedDepth(options.depth, depth_step(options), options.trust_depth)
-        recording = replace(recording, stated_depth=stated)
-    return replace(recording, proposed=True) if masks_are_proposed(options) else recording
+        clip = replace(clip, stated_depth=stated)
+    return replace(clip, proposed=True) if masks_are_proposed(options) else clip
 
 
 def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.opencv.stereo import Maps, remapped
+from endotsr.clips.sequences.clip import CameraPose, Clip, PicturePair, colour_picture, intrinsics_of_matrix
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import CameraPose, PicturePair, Recording, colour_picture, lens_of_matrix
 from endotsr.clips.sequences.sequence_file import checked_rotation, inverse_pose
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import matching_files
@@ -76,8 +76,8 @@ def read_poses(path: Path) -> list[CameraPose | None]:
     return found
 
 
-def open_c3vd(path: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording of a pinhole camera. Raises InputError for another size."""
+def open_c3vd(path: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip of a pinhole camera. Raises InputError for another size."""
     number = lambda file: int(digits) if (digits := file.name.split("_")[0]).isdecimal() else -1
     files, planes = (sorted(path.glob(f"*{end}"), key=number) for end in (COLOUR, DEPTH))
     poses, maps = read_poses(path / POSES), pinhole_maps()
@@ -100,13 +100,13 @@ def open_c3vd(path: Path, options: SourceOptions) -> Recording:
         plane = np.where(stored < NO_DEPTH, stored * np.float32(STEP), 0).astype(np.float32)
         return remapped(plane, maps, nearest=True)
 
-    return Recording(
+    return Clip(
         layout="c3vd",
         where=path,
         names=[file.stem for file in files],
         pictures=pictures,
         depth=depth if planes else None,
-        lens=lens_of_matrix(maps.matrix, WIDTH, HEIGHT, where=path),
+        intrinsics=intrinsics_of_matrix(maps.matrix, WIDTH, HEIGHT, where=path),
         poses=poses,
         rate=options.rate,
         notes=[

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.sequences.checks.frames import gap_findings
+from endotsr.clips.sequences.clip import ARBITRARY, Clip
 from endotsr.clips.sequences.colmap_model import find_model, read_model
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import ARBITRARY, Recording
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import pictures_from_files, stated_masks
 from endotsr.errors import InputError
@@ -24,8 +24,8 @@ def recognises(path: Path) -> bool:
     return path.is_dir() and find_model(path) is not None
 
 
-def open_colmap(path: Path, options: SourceOptions) -> Recording:
-    """The model as a recording. Raises InputError for a missing picture, or for several cameras."""
+def open_colmap(path: Path, options: SourceOptions) -> Clip:
+    """The model as a clip. Raises InputError for a missing picture, or for several cameras."""
     folder = find_model(path)
     if folder is None:
         raise InputError(f"{path}: holds no COLMAP model (cameras.txt or cameras.bin, also in sparse/0)")
@@ -38,22 +38,22 @@ def open_colmap(path: Path, options: SourceOptions) -> Recording:
     files = [_file(path, image.name) for image in model.images]
     order = time_order(files)
     files, images = [files[i] for i in order], [model.images[i] for i in order]
-    lens = model.cameras[images[0].camera]
+    intrinsics = model.cameras[images[0].camera]
     empty = np.zeros((0, 3))
 
     def points(i: int) -> np.ndarray:
         seen = [model.points[key] for key in images[i].points.tolist() if key in model.points]
         return np.array(seen) if seen else empty
 
-    return Recording(
+    return Clip(
         layout="colmap",
         where=path,
         names=[file.stem for file in files],
         pictures=pictures_from_files(files, []),
-        masks=stated_masks(options, files, lens.width, lens.height),
+        masks=stated_masks(options, files, intrinsics.width, intrinsics.height),
         points=points,
         unit=ARBITRARY,
-        lens=lens,
+        intrinsics=intrinsics,
         poses=[image.pose for image in images],
         rate=options.rate,
         notes=[f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points"]

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL, read_matrix
+from endotsr.clips.sequences.clip import Clip, intrinsics_of_matrix
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import Recording, lens_of_matrix
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
 from endotsr.errors import InputError
@@ -31,8 +31,8 @@ def _first(path: Path, names: tuple[str, ...]) -> Path | None:
     return next((path / name for name in names if (path / name).is_dir()), None)
 
 
-def open_hamlyn(path: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording. Raises InputError."""
+def open_hamlyn(path: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip. Raises InputError."""
     left_folder, right_folder, depth_folder = (_first(path, names) for names in (LEFT, RIGHT, DEPTH))
     if left_folder is None or not (path / CAMERA).is_file():
         raise InputError(f"{path}: allowed: a folder with {CAMERA} and {' or '.join(LEFT)}")
@@ -42,18 +42,18 @@ def open_hamlyn(path: Path, options: SourceOptions) -> Recording:
         check_pairing(left, right)
     width, height = size_of(left)
     depth = list_pictures(depth_folder, DEPTH_ENDINGS) if depth_folder else []
-    recording = Recording(
+    clip = Clip(
         layout="hamlyn",
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
         depth=depth_reader(matching_files(left, depth), 1.0) if depth else None,
-        lens=lens_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
+        intrinsics=intrinsics_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
         baseline=options.baseline,
         rate=options.rate,
         notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout has no poses: the camera counts as static"],
     )
-    return with_stated(recording, options)
+    return with_stated(clip, options)
 
 
 LAYOUT = Layout(

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.sequences.checks.frames import gap_findings
+from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip, Intrinsics, checked_intrinsics
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Lens, Recording, checked_lens
 from endotsr.clips.sequences.sequence_file import OPENGL, checked_rotation, inverse_pose
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_reader, mask_reader, pictures_from_files, size_of, stated_masks
@@ -35,7 +35,7 @@ def recognises(path: Path) -> bool:
     return path.name == FILE or (path / FILE).is_file()
 
 
-def read_lens(data: dict[str, Any], frame: dict[str, Any], size: tuple[int, int], where: str) -> Lens:
+def read_intrinsics(data: dict[str, Any], frame: dict[str, Any], size: tuple[int, int], where: str) -> Intrinsics:
     """The intrinsics of a frame, by default those of the file. Raises InputError."""
     found = data | frame
     if found.get("camera_model", MODELS[0]) not in MODELS or found.get("k4"):
@@ -51,7 +51,7 @@ def read_lens(data: dict[str, Any], frame: dict[str, Any], size: tuple[int, int]
         number(found.get(key, found.get("fl_x") if key == "fl_y" else None), f"{where}: {key}") for key in INTRINSICS
     )
     bent = tuple(number(found.get(key, 0.0), f"{where}: {key}") for key in ("k1", "k2", "p1", "p2", "k3"))
-    return checked_lens(Lens(fx, fy, cx, cy, width, height, bent if any(bent) else ()), where)
+    return checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, bent if any(bent) else ()), where)
 
 
 def read_points(path: Path) -> FloatArray:
@@ -68,8 +68,8 @@ def read_points(path: Path) -> FloatArray:
     return rows
 
 
-def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
-    """The file as a recording. Raises InputError naming the frame and the key."""
+def open_nerfstudio(path: Path, options: SourceOptions) -> Clip:
+    """The file as a clip. Raises InputError naming the frame and the key."""
     file = path if path.is_file() else path / FILE
     data, folder = read_json(file, LARGEST_FILE), file.parent
     entries = listed(data.get("frames"), f"{file}: frames")
@@ -84,7 +84,7 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
     masked, planes = ([_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
     width, height = size_of(files)
-    lenses = {read_lens(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)}
+    lenses = {read_intrinsics(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)}
     if len(lenses) > 1:
         raise InputError(f"{file}: {len(lenses)} different cameras; allowed: one for all frames")
     masks = stated_masks(options, files, width, height)
@@ -93,7 +93,7 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
     points = _named(folder, data.get("ply_file_path"), f"{file}: ply_file_path")
     cloud = read_points(points) if points is not None and points.is_file() else None
     depth = depth_reader(planes, DEPTH_STEP) if any(planes) else None
-    return Recording(
+    return Clip(
         layout="nerfstudio",
         where=path,
         names=[name.stem for name in files],
@@ -102,7 +102,7 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
         depth=depth,
         points=None if cloud is None or depth is not None else lambda i: cloud,
         unit=ARBITRARY,
-        lens=lenses.pop(),
+        intrinsics=lenses.pop(),
         poses=[_pose(entry, f"{file}: frame {i}: transform_matrix") for i, entry in enumerate(entries)],
         rate=options.rate,
         notes=[f"{FILE}: {len(files)} frames, unit of lengths unknown"]

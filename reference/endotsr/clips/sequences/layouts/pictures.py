@@ -1,7 +1,7 @@
 """A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one per frame, alone or as stereo pairs.
 
 A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
-or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording. All other properties
+or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo clip. All other properties
 are stated on the command line.
 """
 
@@ -10,9 +10,9 @@ from pathlib import Path
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings, profile_findings
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import check_pairing, frame_numbers
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
-from endotsr.clips.sequences.recording import Recording
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     files_of,
@@ -75,16 +75,16 @@ def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
     return found["l"], found["r"]
 
 
-def open_pictures(path: Path, options: SourceOptions) -> Recording:
-    """The pictures as a recording. Raises InputError."""
+def open_pictures(path: Path, options: SourceOptions) -> Clip:
+    """The pictures as a clip. Raises InputError."""
     left, right = find_pictures(path)
     stereo = "none" if options.stereo == "auto" else options.stereo
     if right and stereo != "none":
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
     width, height = halves(*size_of(left), stereo)
-    lens, rig = stated_camera(options, width, height, path)
+    intrinsics, calibration = stated_camera(options, width, height, path)
     poses, notes = stated_poses(options, len(left), options.rate)
-    return Recording(
+    return Clip(
         layout="pictures",
         where=path,
         names=[file.stem for file in left],
@@ -92,8 +92,8 @@ def open_pictures(path: Path, options: SourceOptions) -> Recording:
         masks=stated_masks(options, left, width, height),
         depth=stated_depth(options, left),
         unit=unit_of(options, "m"),
-        lens=lens,
-        rig=rig,
+        intrinsics=intrinsics,
+        calibration=calibration,
         baseline=options.baseline,
         poses=poses,
         rate=options.rate,

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
+from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip, intrinsics_of_matrix
 from endotsr.clips.sequences.files import frame_numbers, list_pictures
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import ARBITRARY, CameraPose, Recording, lens_of_matrix
 from endotsr.clips.sequences.sequence_file import checked_rotation
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import mask_reader, pictures_from_files, size_of
@@ -48,8 +48,8 @@ def read_cameras(path: Path, frames: list[Path]) -> dict[str, np.ndarray]:
     return found
 
 
-def open_points(path: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording. Raises InputError."""
+def open_points(path: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip. Raises InputError."""
     frames = list_pictures(path / "images", PICTURE_ENDINGS)
     found = read_cameras(path / CAMERAS, frames)
     width, height = size_of(frames)
@@ -62,7 +62,7 @@ def open_points(path: Path, options: SourceOptions) -> Recording:
     if options.masks is not None and not mask.is_file():
         raise InputError(f"{mask}: no file; allowed: one mask for all frames, white inside the field of view")
     visible, points = found["visible"].astype(bool), found["points"].astype(np.float64)
-    return Recording(
+    return Clip(
         layout="points",
         where=path,
         names=[file.stem for file in frames],
@@ -70,7 +70,7 @@ def open_points(path: Path, options: SourceOptions) -> Recording:
         masks=mask_reader([mask] * len(frames), "black", width, height) if mask.is_file() else None,
         points=lambda i: points[visible[:, i]],
         unit=ARBITRARY,
-        lens=lens_of_matrix(found["K"], width, height, where=where),
+        intrinsics=intrinsics_of_matrix(found["K"], width, height, where=where),
         poses=poses,
         rate=options.rate,
         notes=[f"{CAMERAS}: {len(points)} points, on average {visible.sum(axis=0).mean():.0f} in a frame"],

@@ -12,9 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.sequences.clip import CameraPose, Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import open_video
-from endotsr.clips.sequences.recording import CameraPose, Recording
 from endotsr.clips.sequences.sequence_file import checked_rotation
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
@@ -36,23 +36,23 @@ def recognises(path: Path) -> bool:
     return (path / VIDEO).is_file() and _calibration(path) is not None
 
 
-def open_scared(path: Path, options: SourceOptions) -> Recording:
-    """The keyframe as a recording. Raises InputError."""
+def open_scared(path: Path, options: SourceOptions) -> Clip:
+    """The keyframe as a clip. Raises InputError."""
     calibration = options.calibration or _calibration(path)
     if calibration is None or not (path / VIDEO).is_file():
         raise InputError(f"{path}: allowed: a folder with {VIDEO} and {CALIBRATIONS[0]}")
     stated = replace(options, stereo="stacked", calibration=calibration)
-    recording = open_video(path / VIDEO, stated)
-    notes, poses = [*recording.notes], recording.poses
+    clip = open_video(path / VIDEO, stated)
+    notes, poses = [*clip.notes], clip.poses
     if options.calibration is None:
         notes.append(f"{calibration.name}: {HALF_A_PIXEL}; T in millimetres")
     if poses is None:
-        poses = _poses(path, recording.count)
+        poses = _poses(path, clip.count)
         kinematics = (
             "camera-pose of the kinematics: read as world-to-camera, millimetres; its authors report errors in it"
         )
         notes.append(kinematics if poses else f"{FOLDER} is missing: the camera counts as static")
-    return replace(recording, layout="scared", where=path, poses=poses, unit="mm", notes=notes)
+    return replace(clip, layout="scared", where=path, poses=poses, unit="mm", notes=notes)
 
 
 def _poses(path: Path, count: int) -> list[CameraPose | None] | None:

@@ -11,10 +11,10 @@ import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.sequences.clip import Clip, Intrinsics, intrinsics_of_matrix
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import Lens, Recording, lens_of_matrix
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
 from endotsr.errors import InputError
@@ -30,34 +30,34 @@ def recognises(path: Path) -> bool:
     return (path / LEFT).is_dir() and (path / CAMERAS).is_dir()
 
 
-def read_camera(path: Path, width: int, height: int) -> tuple[Lens, float]:
-    """Lens and baseline in millimetres of a pair. Raises InputError."""
+def read_camera(path: Path, width: int, height: int) -> tuple[Intrinsics, float]:
+    """Intrinsics and baseline in millimetres of a pair. Raises InputError."""
     found = read_json(path)
     left, right = (matrix(found.get(name), f"{path}: {name}", (3, 4)) for name in ("P1", "P2"))
     if right[0, 3] >= 0:
         raise InputError(f"{path}: P2: the fourth number is {right[0, 3]:g}; allowed: below 0, -f times the baseline")
-    return lens_of_matrix(left[:, :3], width, height, where=path), float(-right[0, 3] / right[0, 0])
+    return intrinsics_of_matrix(left[:, :3], width, height, where=path), float(-right[0, 3] / right[0, 0])
 
 
-def open_servct(path: Path, options: SourceOptions) -> Recording:
-    """The experiment as a recording. Raises InputError for pairs whose cameras differ."""
+def open_servct(path: Path, options: SourceOptions) -> Clip:
+    """The experiment as a clip. Raises InputError for pairs whose cameras differ."""
     left, right = (list_pictures(path / name, PICTURE_ENDINGS) for name in (LEFT, RIGHT))
     check_pairing(left, right)
     width, height = size_of(left)
     files = list_pictures(path / CAMERAS, (".json",))
     cameras = [read_camera(file, width, height) for file in files]
-    numbers = np.array([[*lens[:4], baseline] for lens, baseline in cameras])
+    numbers = np.array([[*intrinsics[:4], baseline] for intrinsics, baseline in cameras])
     apart = np.flatnonzero(np.abs(numbers - numbers[0]).max(axis=1) > 1e-3)
     if apart.size:
         raise InputError(f"{files[apart[0]]}: another camera than {files[0].name}; allowed: one for all frames")
     depth = list_pictures(path / DEPTH, DEPTH_ENDINGS) if (path / DEPTH).is_dir() else []
-    recording = Recording(
+    clip = Clip(
         layout="servct",
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
         depth=depth_reader(matching_files(left, depth), STEP) if depth else None,
-        lens=cameras[0][0],
+        intrinsics=cameras[0][0],
         baseline=cameras[0][1],
         notes=[
             f"{CAMERAS}: {HALF_A_PIXEL}",
@@ -65,7 +65,7 @@ def open_servct(path: Path, options: SourceOptions) -> Recording:
             " with the reference, not for training one scene",
         ],
     )
-    return with_stated(recording, options)
+    return with_stated(clip, options)
 
 
 LAYOUT = Layout(

@@ -10,10 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import open_video
-from endotsr.clips.sequences.recording import Recording
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import mask_reader, matching_files
 from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
@@ -33,8 +33,8 @@ def _videos(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
 
 
-def open_stereomis(path: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording. Raises InputError for more than one video, and for invalid files."""
+def open_stereomis(path: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip. Raises InputError for more than one video, and for invalid files."""
     videos = _videos(path)
     if len(videos) != 1:
         raise InputError(f"{path}: {len(videos)} videos ({', '.join(v.name for v in videos)}); allowed: one")
@@ -46,18 +46,18 @@ def open_stereomis(path: Path, options: SourceOptions) -> Recording:
         trajectory=options.trajectory or (trajectory if trajectory.is_file() else None),
         trajectory_unit=options.trajectory_unit or "m",
     )
-    recording = open_video(videos[0], stated)
-    notes = list(recording.notes)
+    clip = open_video(videos[0], stated)
+    notes = list(clip.notes)
     if stated.trajectory is None:
         notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
-    masks = recording.masks
+    masks = clip.masks
     if options.masks is None and (path / MASKS).is_dir():
-        assert recording.rig is not None
-        files = matching_files(recording.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
-        masks = mask_reader(files, "black", recording.rig.left.width, recording.rig.left.height)
+        assert clip.calibration is not None
+        files = matching_files(clip.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
+        masks = mask_reader(files, "black", clip.calibration.left.width, clip.calibration.left.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
-    return replace(recording, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes)
+    return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes)
 
 
 LAYOUT = Layout(

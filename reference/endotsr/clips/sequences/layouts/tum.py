@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.sequences.clip import CameraPose, Clip, Intrinsics
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.recording import CameraPose, Lens, Recording
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     depth_reader,
@@ -56,14 +56,14 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
     return np.array(times)[order], [files[i] for i in order]
 
 
-def open_tum(path: Path, options: SourceOptions) -> Recording:
-    """The folder as a recording. Raises InputError."""
+def open_tum(path: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
     width, height = size_of(files)
-    lens, _ = stated_camera(options, width, height, path)
+    intrinsics, _ = stated_camera(options, width, height, path)
     notes = []
-    if lens is None and (width, height) == (640, 480):
-        lens = Lens(*DEFAULT, width, height)
+    if intrinsics is None and (width, height) == (640, 480):
+        intrinsics = Intrinsics(*DEFAULT, width, height)
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")
     depth = None
     if (path / DEPTH_LIST).is_file():
@@ -76,7 +76,7 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
     if where.is_file():
         poses = poses_at(read_trajectory(where, options.trajectory_unit or "m", options.direction), times, LONGEST)
     steps = np.diff(times)
-    return Recording(
+    return Clip(
         layout="tum",
         where=path,
         names=[file.stem for file in files],
@@ -84,7 +84,7 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
         masks=stated_masks(options, files, width, height),
         depth=stated_depth(options, files) or depth,
         unit="mm",
-        lens=lens,
+        intrinsics=intrinsics,
         poses=poses,
         rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
         times=times if steps.size and (steps > 0).all() else None,

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
-from endotsr.clips.sequences.recording import Picture, PicturePair, Recording
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     halves,
@@ -26,8 +26,8 @@ def recognises(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
 
 
-def open_video(path: Path, options: SourceOptions) -> Recording:
-    """The video as a recording. Raises InputError."""
+def open_video(path: Path, options: SourceOptions) -> Clip:
+    """The video as a clip. Raises InputError."""
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
@@ -35,7 +35,7 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
     width, height = halves(across, down, stereo)
     rate = options.rate or facts.rate
     times = None if options.rate else facts.times
-    lens, rig = stated_camera(options, width, height, path)
+    intrinsics, calibration = stated_camera(options, width, height, path)
     notes = _notes(facts, rate, path)
     if facts.turn:
         done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
@@ -47,7 +47,7 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
             turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
             yield split_pair(turned, stereo, f"{path}: picture {i}")
 
-    return Recording(
+    return Clip(
         layout="video",
         where=path,
         names=[f"{i:06d}" for i in range(facts.count)],
@@ -55,8 +55,8 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
         masks=stated_masks(options, facts.count, width, height),
         depth=stated_depth(options, facts.count),
         unit=unit_of(options, "m"),
-        lens=lens,
-        rig=rig,
+        intrinsics=intrinsics,
+        calibration=calibration,
         baseline=options.baseline,
         poses=poses,
         rate=rate,

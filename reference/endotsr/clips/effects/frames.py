@@ -19,7 +19,7 @@ TILE_TISSUE = 0.5  # minimum fraction of tissue pixels in a tile that counts
 LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)
 
 
-class Clip(NamedTuple):
+class ReducedFrames(NamedTuple):
     """m training frames at the working size h x w."""
 
     images: NDArray[np.float32]  # (m, 3, h, w) display units
@@ -42,7 +42,7 @@ class Clip(NamedTuple):
         return np.einsum("c,mchw->mhw", LUMINANCE, self.images, optimize=True)
 
 
-def training_clip(sequence: Sequence) -> Clip:
+def reduced_frames(sequence: Sequence) -> ReducedFrames:
     """The training frames of a sequence, averaged to at most `WIDEST` columns. The middle one is the reference."""
     index, side = sequence.train_index, -(-sequence.width // WIDEST)
     height, width = sequence.height // side, sequence.width // side
@@ -55,10 +55,10 @@ def training_clip(sequence: Sequence) -> Clip:
     masks = np.logical_and.reduce(whole, axis=(2, 4))
     depth = sequence.depth[index][:, side // 2 : rows : side, side // 2 : columns : side]
     cameras = [sequence.cameras[i] for i in index]
-    return Clip(images, masks, depth, sequence.times[index], cameras, side, sequence.count, len(index) // 2)
+    return ReducedFrames(images, masks, depth, sequence.times[index], cameras, side, sequence.count, len(index) // 2)
 
 
-def with_clear_reference(clip: Clip, clear: BoolArray) -> Clip:
+def with_clear_reference(clip: ReducedFrames, clear: BoolArray) -> ReducedFrames:
     """The clip with the clear frame nearest the middle as its reference; unchanged if no frame is clear.
 
     clear   (m,) False for training frames with blur or smoke

@@ -1,6 +1,6 @@
-"""A recording: the contents of a path in some layout, decoded on demand.
+"""A clip: the contents of a path in some layout, decoded on demand.
 
-Every layout returns a `Recording`: frames that are decoded on demand, with masks, depth, calibration and poses if they
+Every layout returns a `Clip`: frames that are decoded on demand, with masks, depth, calibration and poses if they
 exist. `prepare` converts it into the common format. Conventions: pixel edges are at integers (the first pixel centre is
 at 0.5), poses are world-to-camera in OpenCV axes, masks are True on tissue, and a depth of 0 means no depth.
 """
@@ -26,7 +26,7 @@ def scene_factor(unit: str) -> float:
     return 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
 
 
-class Lens(NamedTuple):
+class Intrinsics(NamedTuple):
     """Intrinsics of one camera, pixels; pixel edges at integers."""
 
     fx: float
@@ -37,17 +37,17 @@ class Lens(NamedTuple):
     height: int
     distortion: tuple[float, ...] = ()  # OpenCV's order k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
 
-    def scaled(self, width: int, height: int) -> "Lens":
-        """The lens of the picture resized to width x height, with aligned picture edges."""
+    def scaled(self, width: int, height: int) -> "Intrinsics":
+        """The intrinsics of the picture resized to width x height, with aligned picture edges."""
         x, y = width / self.width, height / self.height
         return self._replace(fx=self.fx * x, cx=self.cx * x, fy=self.fy * y, cy=self.cy * y, width=width, height=height)
 
 
-class Rig(NamedTuple):
+class StereoCalibration(NamedTuple):
     """Two cameras before rectification: x_right = rotation @ x_left + translation."""
 
-    left: Lens
-    right: Lens
+    left: Intrinsics
+    right: Intrinsics
     rotation: FloatArray  # (3, 3)
     translation: FloatArray  # (3,) millimetres
 
@@ -56,7 +56,7 @@ class CameraPose(NamedTuple):
     """World-to-camera, OpenCV axes: x_camera = rotation @ x_world + translation."""
 
     rotation: FloatArray  # (3, 3)
-    translation: FloatArray  # (3,) in the unit of the recording
+    translation: FloatArray  # (3,) in the unit of the clip
 
 
 class PicturePair(NamedTuple):
@@ -70,12 +70,12 @@ class StatedDepth(NamedTuple):
     """Depth files stated by a user."""
 
     path: Path
-    step: float  # length per stored unit, in the unit of the recording
+    step: float  # length per stored unit, in the unit of the clip
     trusted: bool  # the user confirms that they contain lengths
 
 
 @dataclass(frozen=True)
-class Recording:
+class Clip:
     """Frames of a source and everything known about them. None for anything that the source lacks."""
 
     layout: str
@@ -91,8 +91,8 @@ class Recording:
     depth_assumed: Literal["", "scale and shift", "shape"] = ""  # properties of the depth that are not measured
     points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions visible in a frame, in `unit`
     unit: str = "mm"
-    lens: Lens | None = None
-    rig: Rig | None = None
+    intrinsics: Intrinsics | None = None
+    calibration: StereoCalibration | None = None
     baseline: float | None = None  # of a rectified pair, in `unit`
     poses: list[CameraPose | None] | None = None
     rate: float | None = None  # frames per second
@@ -109,12 +109,12 @@ class Recording:
         return np.array(frames) / (self.rate or 1.0) if self.times is None else self.times[frames]
 
 
-def lens_of_matrix(
+def intrinsics_of_matrix(
     matrix: FloatArray, width: int, height: int, distortion: tuple[float, ...] = (), *, where: object
-) -> Lens:
-    """A lens from a 3x3 matrix in OpenCV's convention, with pixel centres at integers: half a pixel is added.
+) -> Intrinsics:
+    """The intrinsics of a 3x3 matrix in OpenCV's convention, with pixel centres at integers: half a pixel is added.
 
-    Raises:  InputError for a matrix that is not finite or has skew, and as `checked_lens`.
+    Raises:  InputError for a matrix that is not finite or has skew, and as `checked_intrinsics`.
     """
     numbers = np.asarray(matrix, np.float64)
     if numbers.shape != (3, 3) or not np.isfinite(numbers).all():
@@ -124,32 +124,34 @@ def lens_of_matrix(
     fx, fy, cx, cy = (
         float(value) for value in (numbers[0, 0], numbers[1, 1], numbers[0, 2] + 0.5, numbers[1, 2] + 0.5)
     )
-    return checked_lens(Lens(fx, fy, cx, cy, width, height, distortion), where)
+    return checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, distortion), where)
 
 
-def checked_lens(lens: Lens, where: object) -> Lens:
-    """The lens, checked.
+def checked_intrinsics(found: Intrinsics, where: object) -> Intrinsics:
+    """The intrinsics, checked.
 
     Raises:  InputError for values that are not finite, a focal length that is not positive, a principal point far
              outside the picture, or another number of distortion coefficients than 0, 4, 5 or 8.
     """
-    if not np.isfinite([*lens[:4], *lens.distortion]).all():
-        raise InputError(f"{where}: camera: allowed: finite numbers, got {lens[:4]} and distortion {lens.distortion}")
-    if lens.fx <= 0 or lens.fy <= 0:
-        raise InputError(f"{where}: focal length {min(lens.fx, lens.fy):g}: allowed: numbers > 0")
-    if not -lens.width <= lens.cx <= 2 * lens.width or not -lens.height <= lens.cy <= 2 * lens.height:
+    fx, fy, cx, cy, width, height, distortion = found
+    if not np.isfinite([fx, fy, cx, cy, *distortion]).all():
+        raise InputError(f"{where}: camera: allowed: finite numbers, got {found[:4]} and distortion {distortion}")
+    if fx <= 0 or fy <= 0:
+        raise InputError(f"{where}: focal length {min(fx, fy):g}: allowed: numbers > 0")
+    if not -width <= cx <= 2 * width or not -height <= cy <= 2 * height:
         raise InputError(
-            f"{where}: principal point ({lens.cx:g}, {lens.cy:g}) is far outside the {lens.width}x{lens.height}"
-            " pixels; is the calibration of another picture size?"
+            f"{where}: principal point ({cx:g}, {cy:g}) is far outside the {width}x{height} pixels; is the calibration"
+            " of another picture size?"
         )
-    if len(lens.distortion) not in (0, 4, 5, 8):
-        raise InputError(f"{where}: {len(lens.distortion)} distortion coefficients; allowed: none, 4, 5 or 8")
-    return lens
+    if len(distortion) not in (0, 4, 5, 8):
+        raise InputError(f"{where}: {len(distortion)} distortion coefficients; allowed: none, 4, 5 or 8")
+    return found
 
 
-def opencv_matrix(lens: Lens) -> FloatArray:
+def opencv_matrix(intrinsics: Intrinsics) -> FloatArray:
     """The 3x3 matrix in OpenCV's convention (pixel centres at integers)."""
-    return np.array([[lens.fx, 0.0, lens.cx - 0.5], [0.0, lens.fy, lens.cy - 0.5], [0.0, 0.0, 1.0]])
+    fx, fy, cx, cy, *_ = intrinsics
+    return np.array([[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]])
 
 
 def grey_plane(pixels: NDArray[Any], where: object) -> NDArray[Any]:
