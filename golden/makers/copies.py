@@ -71,7 +71,7 @@ def changed_copy(edits: Sequence[Edit]) -> Iterator[Callable[[str], Stage]]:
     texts = {name: changed_text(module, [e for e in edits if e.module == module]) for module, name in names.items()}
     interpreted = without_compiler(edits)
     again = (set(_files()) if interpreted else _importers(frozenset(texts)) | {REGISTRY}) - SHARED
-    again |= {name.rpartition(".")[0] for name in again} - SHARED - {""}  # packages refer to their modules by name
+    again |= {above for name in again for above in _packages_above(name)} - SHARED  # they refer to modules by name
     before = {name: module for name, module in sys.modules.items() if name in again}
     finder, off = _Finder(again, texts), numba.config.DISABLE_JIT  # type: ignore[attr-defined]
     _exchange(again, {})
@@ -83,6 +83,12 @@ def changed_copy(edits: Sequence[Edit]) -> Iterator[Callable[[str], Stage]]:
         numba.config.DISABLE_JIT = off  # type: ignore[attr-defined]
         sys.meta_path.remove(finder)
         _exchange(again, before)
+
+
+def _packages_above(name: str) -> list[str]:
+    """`a`, `a.b` of `a.b.c`."""
+    parts = name.split(".")
+    return [".".join(parts[:k]) for k in range(1, len(parts))]
 
 
 def _operation(name: str) -> Stage:

@@ -7,7 +7,7 @@ import pytest
 from tiny import log_without_seconds, run_line, train_words
 
 from endotsr.cli.main import main
-from endotsr.training.fitting import trainer
+from endotsr.training.fitting import view
 from endotsr.training.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.training.runs.diverged import repeat_iteration
 from endotsr.training.scene.gaussians import Gaussians
@@ -17,7 +17,7 @@ SLOW = pytest.mark.faults  # not by default
 
 def spoiled(monkeypatch, at, name, value=math.nan):
     """The gradient or the loss term `name` gets a value at iteration `at`."""
-    reverse, image_loss = trainer.render_reverse, trainer.image_loss
+    reverse, image_loss = view.render_reverse, view.image_loss
     calls = {"reverse": 0, "loss": 0}
 
     def spoil_gradient(*words, **more):
@@ -33,9 +33,9 @@ def spoiled(monkeypatch, at, name, value=math.nan):
         return found._replace(terms=found.terms | {name: value}) if calls["loss"] == at else found
 
     if name.startswith("d_"):
-        monkeypatch.setattr(trainer, "render_reverse", spoil_gradient)
+        monkeypatch.setattr(view, "render_reverse", spoil_gradient)
     else:
-        monkeypatch.setattr(trainer, "image_loss", spoil_loss)
+        monkeypatch.setattr(view, "image_loss", spoil_loss)
 
 
 @pytest.mark.parametrize("value", [math.nan, pytest.param(math.inf, marks=SLOW)])

@@ -3,10 +3,10 @@
 Needs torch (the CPU build is enough) and gsplat, `pip install '.[peers]'`; skipped without.
 """
 
-import bench_gsplat as peer_gsplat
 import numpy as np
 import pytest
 from made_up_scenes import random_scene, turned_camera
+from pages.bench import gsplat as peer_gsplat
 
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import render_forward, render_reverse

@@ -14,7 +14,7 @@ from endotsr.method.equations.deformation import CHANNELS, deformation_forward, 
 from endotsr.port.gradcheck import one_thread
 from endotsr.training.fitting.adam import adam_state, adam_update
 from endotsr.training.fitting.fused.coefficients import coefficients_adam_step
-from endotsr.training.fitting.fused.deformation import NAMES, deformation_adam_step
+from endotsr.training.fitting.fused.deformation import NAMES, FdmArrays, deformation_adam_step
 
 NAMES_OF_LENGTHS = (
     "GAUSSIANS_PER_TASK",
@@ -77,7 +77,8 @@ def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
         for t in (0.2, 0.6):
             _, saved = deformation_forward(*parameters.values(), t=t)
             if fused:
-                ahead = deformation_adam_step(d_offsets, saved, state, rates, 0.9, 0.999, 1e-15, 0.4)
+                fdm = FdmArrays(*parameters.values())
+                ahead = deformation_adam_step(d_offsets, fdm, saved, state, rates, 0.9, 0.999, 1e-15, 0.4)
                 np.testing.assert_array_equal(ahead, deformation_forward(*parameters.values(), t=0.4)[0])
             else:
                 grads = dict(zip(NAMES, deformation_reverse(d_offsets, saved)[:3], strict=True))

@@ -61,6 +61,9 @@ def test_a_copy_leaves_the_reference_as_it_is(golden):
     made = answers(WRONG_PORTS["l1_over_all_pixels"], [Question(question.name, question.operation,
                    golden.inputs(question), question.settings, question.flags)])  # fmt: skip
     assert {name: module for name, module in sys.modules.items() if name in before} == before
+    for name, module in before.items():
+        above, _, own = name.rpartition(".")
+        assert not above or getattr(sys.modules[above], own, module) is module, f"{above}.{own} is still the copy's"
     right = all_operations()["masked_l1"].compute(golden.inputs(question), question.settings)
     assert right["loss"] == golden.array(question, "expected/loss.npy") != made[question.name].double["loss"]
 

@@ -5,10 +5,10 @@ import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, replace
 
-import bench_scaling as scaling
 import numba
 import numpy as np
 import pytest
+from pages.bench import scaling
 
 from endotsr.config import PAPER
 from endotsr.method.kernels.timer import NO_TIMER, timed

@@ -5,7 +5,7 @@ import json
 import msgspec
 import numpy as np
 import pytest
-import tradeoff_training as training
+from pages.tradeoff import training
 from pages.tradeoff.text import summary, training_lines, training_rows
 from pages.tradeoff.training import changed, configurations, measured, run_training_study
 

@@ -8,7 +8,7 @@ import pytest
 from endotsr.method.equations.deformation import BASES, deformation_forward, deformation_reverse
 from endotsr.method.equations.deformation import GAUSSIANS_PER_PIECE as PIECE
 from endotsr.training.fitting.adam import AdamState, adam_state, adam_step, adam_update, add_array
-from endotsr.training.fitting.fused.deformation import NAMES, deformation_adam_step
+from endotsr.training.fitting.fused.deformation import NAMES, FdmArrays, deformation_adam_step
 from oracle.adam import adam_scalar
 
 BETAS = (0.9, 0.999, 1e-15)
@@ -185,7 +185,7 @@ def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dty
         adam_update(states[0], separate, dict(zip(NAMES, grads[:3], strict=True)), rates, *BETAS)
         _, saved = deformation_forward(*fused.values(), t=0.3 * k, basis=basis)
         ahead = (0.0, None, 0.81)[k]
-        offsets = deformation_adam_step(d_offsets, saved, states[1], rates, *BETAS, ahead)
+        offsets = deformation_adam_step(d_offsets, FdmArrays(*fused.values()), saved, states[1], rates, *BETAS, ahead)
         if ahead is None:
             assert offsets is None
         else:
@@ -211,7 +211,7 @@ def test_fused_step_with_rates_and_counters_of_their_own(rng):
     grads = deformation_reverse(d_offsets, saved)
     adam_update(states[0], separate, dict(zip(NAMES, grads[:3], strict=True)), rates, *BETAS)
     _, saved = deformation_forward(*fused.values(), t=0.4)
-    deformation_adam_step(d_offsets, saved, states[1], rates, *BETAS)
+    deformation_adam_step(d_offsets, FdmArrays(*fused.values()), saved, states[1], rates, *BETAS)
     assert states[0].step == states[1].step == dict(zip(NAMES, (1, 5, 12), strict=True))
     for name in NAMES:
         np.testing.assert_array_equal(separate[name], fused[name])
@@ -223,12 +223,13 @@ def test_fused_step_refuses_arrays_that_disagree(rng):
     state = adam_state(parameters)
     rates = dict.fromkeys(NAMES, 1e-3)
     with pytest.raises(ValueError, match="d_offsets"):
-        deformation_adam_step(out[:, :3].copy(), saved, state, rates, *BETAS)
+        deformation_adam_step(out[:, :3].copy(), FdmArrays(*parameters.values()), saved, state, rates, *BETAS)
     short = np.zeros((10, 2, 4))
+    fdm = FdmArrays(*parameters.values())
     for kind, curves, broken in (
-        ("", saved._replace(width=short), state),
-        ("first ", saved, AdamState({**state.first, "fdm_width": short}, state.second, state.step)),
-        ("second ", saved, AdamState(state.first, {**state.second, "fdm_width": short}, state.step)),
+        ("", fdm._replace(width=short), state),
+        ("first ", fdm, AdamState({**state.first, "fdm_width": short}, state.second, state.step)),
+        ("second ", fdm, AdamState(state.first, {**state.second, "fdm_width": short}, state.step)),
     ):
         with pytest.raises(ValueError, match=f"^{kind}fdm_width: expected C-contiguous"):
-            deformation_adam_step(out, curves, broken, rates, *BETAS)
+            deformation_adam_step(out, curves, saved, broken, rates, *BETAS)

@@ -99,20 +99,18 @@ def test_a_component_without_arrays_adds_nothing_and_gets_no_gradient(gaussians,
     assert (back.d_offsets is not None) == deformation
 
 
-def test_offsets_taken_ahead_serve_their_own_gaussians_and_time_alone(gaussians):
-    scene, saved = scene_at(gaussians, SPECTRAL, MODEL, T)
-    ahead = OffsetsAhead(gaussians.fdm_weight, T, np.full((10, N), 5.0))
+def test_offsets_taken_ahead_serve_their_own_time_alone(gaussians):
+    _, saved = scene_at(gaussians, SPECTRAL, MODEL, T)
+    ahead = OffsetsAhead(T, np.full((10, N), 5.0))
     used, used_saved = scene_at(gaussians, SPECTRAL, MODEL, T, ahead)
     np.testing.assert_array_equal(used.log_scale, gaussians.log_scale + 5)
     np.testing.assert_array_equal(used.quaternion, gaussians.quaternion + 5)
     assert used_saved.deformation == saved.deformation  # the same arrays, time and basis
-    other = gaussians._replace(fdm_weight=gaussians.fdm_weight.copy())
-    for found, wanted in (
-        (scene_at(other, SPECTRAL, MODEL, T, ahead), scene),
-        (scene_at(gaussians, SPECTRAL, MODEL, T + 1e-3, ahead), scene_at(gaussians, SPECTRAL, MODEL, T + 1e-3)[0]),
-    ):
-        for one, two in zip(found[0], wanted, strict=True):
-            np.testing.assert_array_equal(one, two)
+    later = scene_at(gaussians, SPECTRAL, MODEL, T + 1e-3)[0]
+    for one, two in zip(scene_at(gaussians, SPECTRAL, MODEL, T + 1e-3, ahead)[0], later, strict=True):
+        np.testing.assert_array_equal(one, two)
+    with pytest.raises(ValueError, match=f"offsets of 3 Gaussians, the scene has {N}"):
+        scene_at(gaussians, SPECTRAL, MODEL, T, OffsetsAhead(T, np.zeros((10, 3))))
 
 
 def gradients(appearance=True):

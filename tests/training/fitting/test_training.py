@@ -23,7 +23,7 @@ from endotsr.config import (
 )
 from endotsr.method.equations.deformation import deformation_forward
 from endotsr.training.fitting import model as model_module
-from endotsr.training.fitting import objective, packed, trainer
+from endotsr.training.fitting import objective, packed, trainer, view
 from endotsr.training.fitting.checkpoint import load_checkpoint
 from endotsr.training.fitting.checkpoint_values import check_lengths
 from endotsr.training.fitting.divergence import Diverged
@@ -171,10 +171,10 @@ def test_hard_G5_checkpoint_and_continue_equals_uninterrupted(stop, finished, se
 def stepped(state, sequence, config, monkeypatch):
     """One iteration on a copy of the state: the state after it, its log entry and the image it rendered."""
     seen = []
-    real = trainer.image_loss
+    real = view.image_loss
     with monkeypatch.context() as patch:
         watched = lambda rendered, *rest, **named: seen.append(rendered) or real(rendered, *rest, **named)
-        patch.setattr(trainer, "image_loss", watched)
+        patch.setattr(view, "image_loss", watched)
         state = copy.deepcopy(state)
         entry = training_step(state, training_constants(sequence, config))
     return state, entry, seen[0]

@@ -134,19 +134,19 @@ def rehearse_optimiser(constants: Any, state: Any) -> None:
 
     from endotsr.method.equations.deformation import CHANNELS, DeformationSaved
     from endotsr.training.fitting.adam import adam_update
-    from endotsr.training.fitting.fused.deformation import NAMES, deformation_adam_step
+    from endotsr.training.fitting.fused.deformation import NAMES, FdmArrays, deformation_adam_step
     from endotsr.training.fitting.schedules import learning_rates
     from endotsr.training.scene.gaussians import arrays
 
     config, rates, o = constants.config, learning_rates(1, constants.config), constants.config.optimiser
     given = {name: array for name, array in arrays(state.gaussians).items() if name in rates and name not in NAMES}
     adam_update(state.adam, given, given, rates, o.beta1, o.beta2, o.epsilon)
-    weight, centre, width = (getattr(state.gaussians, name) for name in NAMES)
-    if weight is not None:
-        saved = DeformationSaved(weight, centre, width, 0.5, config.model.basis)
-        d_offsets = np.zeros((CHANNELS, weight.shape[2]), weight.dtype)
+    fdm = FdmArrays(*(getattr(state.gaussians, name) for name in NAMES))
+    if fdm.weight is not None:
+        saved = DeformationSaved(*fdm, 0.5, config.model.basis)
+        d_offsets = np.zeros((CHANNELS, fdm.weight.shape[2]), fdm.weight.dtype)
         fdm_rates = {name: rates[name] for name in NAMES}
-        deformation_adam_step(d_offsets, saved, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
+        deformation_adam_step(d_offsets, fdm, saved, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
 
 
 def rehearse_residuals(constants: Any, state: Any) -> None:

@@ -56,9 +56,11 @@ class SceneSaved(NamedTuple):
 
 
 class OffsetsAhead(NamedTuple):
-    """Offsets of the FDM at a later time, computed with the update of its arrays. Valid until the next update."""
+    """Offsets of the FDM at a later time, computed with the update of its arrays.
 
-    fdm_weight: FloatArray  # the array itself: its identity shows whether the Gaussians have changed
+    Whoever changes the arrays of the FDM afterwards drops it: `optimise` replaces it, and density control sets it None.
+    """
+
     t: float  # normalised time
     offsets: FloatArray  # (10, N)
 
@@ -99,10 +101,11 @@ def scene_at(
 ) -> tuple[Scene, SceneSaved]:
     """The Gaussians at time t (normalised; any value is allowed, [0, 1] is the sequence).
 
-    ahead   of `optimise`; replaces the forward pass of the FDM if it matches the Gaussians and the time
+    ahead   of `optimise`, for these Gaussians; replaces the forward pass of the FDM at its own time
     timer   records the stages "FDM" and "Fourier"
 
     Edges: with zero coefficients, a component leaves the scene bitwise unchanged (x + 0 = x).
+    Raises: ValueError if `ahead` belongs to another number of Gaussians.
     """
     ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = parallel_calls(
         timed(timer, "FDM", lambda: _deformed(gaussians, model, t, ahead)),
@@ -124,7 +127,9 @@ def _deformed(
     if weight is None:
         return (position, quaternion, log_scale), None
     assert centre is not None and width is not None
-    if ahead is not None and ahead.fdm_weight is weight and ahead.t == t:
+    if ahead is not None and ahead.offsets.shape[1] != weight.shape[2]:
+        raise ValueError(f"ahead: offsets of {ahead.offsets.shape[1]} Gaussians, the scene has {weight.shape[2]}")
+    if ahead is not None and ahead.t == t:
         offsets, saved = ahead.offsets, DeformationSaved(weight, centre, width, float(t), model.basis)
     else:
         offsets, saved = deformation_forward(weight, centre, width, t, model.basis)

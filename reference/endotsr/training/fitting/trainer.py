@@ -1,8 +1,9 @@
 """The training: one view per iteration, on the published schedule (specification, equation 6 and B10-B12).
 
-`training_step` computes `view_gradients` (`training/fitting/view.py`) with the same functions. Only the reverse passes
-of the time bases and of the Fourier coefficients are replaced by `optimise`, which fuses them with their Adam step. No
-result depends on the number of threads.
+One iteration is `view_pass` (`training/fitting/view.py`), which ends at the gradients of the deformed scene, and then
+`optimise`, which fuses the reverse passes of the time bases and of the Fourier coefficients with their Adam step.
+`optimise`, `_optimise_frames` and density control are the only places where parameters change. No result depends on
+the number of threads.
 """
 
 import math
@@ -19,23 +20,13 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.threads import parallel_calls
 from endotsr.method.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.method.splatting.camera import Camera
-from endotsr.method.splatting.render import RenderGrads, RenderOut, render_forward, render_reverse
+from endotsr.method.splatting.render import RenderGrads, RenderOut
 from endotsr.training.fitting.adam import adam_update, add_array, regather
 from endotsr.training.fitting.coarse_start import coarse_ends, coarse_start
 from endotsr.training.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.training.fitting.fused.step import optimise
-from endotsr.training.fitting.model import (
-    SceneGrads,
-    SceneSaved,
-    raster_settings,
-    scene_at,
-    scene_reverse,
-    with_exposure,
-    with_exposure_reverse,
-    with_pose_correction,
-    with_pose_correction_reverse,
-)
-from endotsr.training.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, image_loss
+from endotsr.training.fitting.model import SceneGrads, SceneSaved, scene_reverse
+from endotsr.training.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on
 from endotsr.training.fitting.records import LogEntry, RngState
 from endotsr.training.fitting.sampling import View, drawn_view
 from endotsr.training.fitting.schedules import (
@@ -55,6 +46,7 @@ from endotsr.training.fitting.state import (
     new_training,
     training_constants,
 )
+from endotsr.training.fitting.view import view_pass
 from endotsr.training.scene.density_control import densify, gather_statistics
 from endotsr.training.scene.gaussians import Gaussians, arrays
 from endotsr.training.scene.initialisation import activate_residuals
@@ -133,29 +125,25 @@ def training_step(state: TrainingState, constants: TrainingConstants, timer: Tim
     state.drawn = state.drawn or drawn_view(state.rng, constants.sequence, config.training)
     view, rng_state = state.drawn
     targets, camera = constants.observed(view)
-    scene, scene_saved = scene_at(state.gaussians, constants.spectral, config.model, view.t, state.ahead, timer)
-    degree = active_degree(iteration, config)
-    camera, pose_saved = with_pose_correction(camera, pose_at(state.frames, view.t))
-    rendered, render_saved = render_forward(scene, camera, raster_settings(config), degree=degree, timer=timer)
-    rendered, exposure_saved = with_exposure(rendered, exposure_of(state.frames, constants.column(view)))
-    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
-    d_colour, d_exposure = with_exposure_reverse(loss.d_colour, exposure_saved)
-    moving = pose_saved is not None
-    d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, pose_gradient=moving, timer=timer)
-    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
+    found = view_pass(
+        state.gaussians, constants.spectral, targets, _weights(state, iteration, config), config, camera, view.t,
+        exposure=exposure_of(state.frames, constants.column(view)), pose=pose_at(state.frames, view.t),
+        degree=active_degree(iteration, config), ahead=state.ahead, timer=timer,
+    )  # fmt: skip
+    loss, d_scene = found.loss, found.d_scene
     watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(
-        lambda: scene_reverse(d_scene, scene_saved, coefficients=False),
+        lambda: scene_reverse(d_scene, found.scene_saved, coefficients=False),
         timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, constants)),
-        timed(timer, "density control", lambda: _watch_density(state, d_scene, camera, watched)),
+        timed(timer, "density control", lambda: _watch_density(state, d_scene, found.camera, watched)),
     )
     _refuse_not_finite(iteration, view, loss, penalty, d_scene, rng_state)
-    entry = _log_entry(iteration, view, loss, penalty, rendered, targets, state, config)
+    entry = _log_entry(iteration, view, loss, penalty, found.rendered, targets, state, config)
     dense, state.ahead = densify_now(iteration, config), None
     state.drawn = None
     if not (dense and config.optimiser.legacy_skip):
-        _optimise(state, constants, scene_saved, d_scene, back, iteration, timer)
-        _optimise_frames(state, constants, view, d_exposure, d_pose, iteration)
+        _optimise(state, constants, found.scene_saved, d_scene, back, iteration, timer)
+        _optimise_frames(state, constants, view, found.d_exposure, found.d_pose, iteration)
     if dense:
         with timer.stage("density control"):
             _control_density(state, constants, iteration)

@@ -3,10 +3,11 @@
     Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
                             camera --(B16)--^
 
-In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and the gradient of every array. The
-gradient check and the golden family `objective` call this function. Training computes the same with the same functions
-(`training_step`), but fuses the largest reverse passes with the Adam step that follows (`fused/`). One such step is
-bitwise equal to `view_gradients` followed by `adam_update` (tested).
+In: raw parameters, the targets of one frame, a camera and a time. Out: the loss, and gradients back to the deformed
+scene (`view_pass`). Two functions continue from there. `view_gradients` computes and stores the gradient of every
+array; the gradient check and the golden family `objective` call it. `training_step` gives the gradients of the deformed
+scene to the optimiser, which fuses the largest reverse passes with its step (`fused/`). One such step is bitwise equal
+to `view_gradients` followed by `adam_update` (tested).
 """
 
 from typing import NamedTuple
@@ -18,10 +19,20 @@ from endotsr.config import Config
 from endotsr.method.equations.deformation import deformation_reverse
 from endotsr.method.equations.matern import matern_penalty_forward, matern_penalty_reverse
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.kernels.timer import NO_TIMER, Timer
 from endotsr.method.splatting.camera import Camera
-from endotsr.method.splatting.render import Compositor, RenderOut, RenderSaved, render_forward, render_reverse
+from endotsr.method.splatting.render import (
+    Compositor,
+    RenderGrads,
+    RenderOut,
+    RenderSaved,
+    render_forward,
+    render_reverse,
+)
 from endotsr.method.splatting.settings import RasterSettings
 from endotsr.training.fitting.model import (
+    OffsetsAhead,
+    SceneSaved,
     Spectral,
     raster_settings,
     scene_at,
@@ -31,9 +42,22 @@ from endotsr.training.fitting.model import (
     with_pose_correction,
     with_pose_correction_reverse,
 )
-from endotsr.training.fitting.objective import LossWeights, Targets, image_loss
+from endotsr.training.fitting.objective import ImageLoss, LossWeights, Targets, image_loss
 from endotsr.training.scene.gaussians import Gaussians
 from endotsr.training.scene.parameters import Exposure, Pose
+
+
+class ViewPass(NamedTuple):
+    """One view, forward to the loss and back to the deformed scene."""
+
+    loss: ImageLoss  # the loss terms on images, and their gradients
+    rendered: RenderOut  # the images that were compared
+    render_saved: RenderSaved  # has the decisions of the render: order, contributors, clamps
+    scene_saved: SceneSaved  # of `scene_at`, for `scene_reverse`
+    d_scene: RenderGrads  # gradients with respect to the deformed scene
+    d_exposure: Exposure | None  # gradients with respect to the exposure of this frame
+    d_pose: Pose | None  # gradients with respect to the correction of its pose
+    camera: Camera  # with its correction
 
 
 class ViewGradients(NamedTuple):
@@ -46,6 +70,45 @@ class ViewGradients(NamedTuple):
     d_pose: Pose | None  # gradients with respect to the correction of its pose
     rendered: RenderOut  # the images that were compared
     render_saved: RenderSaved  # has the decisions of the render: order, contributors, clamps
+
+
+def view_pass(
+    gaussians: Gaussians,
+    spectral: Spectral,
+    targets: Targets,
+    weights: LossWeights,
+    config: Config,
+    camera: Camera,
+    t: float,
+    edges: NDArray[np.bool_] | None = None,
+    *,
+    exposure: Exposure | None = None,
+    pose: Pose | None = None,
+    raster: RasterSettings | None = None,
+    degree: int | None = None,
+    compositor: Compositor = "auto",
+    ahead: OffsetsAhead | None = None,
+    timer: Timer = NO_TIMER,
+) -> ViewPass:
+    """Loss of one view on images, and its gradients with respect to the deformed scene, exposure and pose.
+
+    The arguments are those of `view_gradients`. No array of `gaussians` is changed.
+    ahead     offsets of the FDM at t, if they are known;  timer   records the stages
+    """
+    raster = raster_settings(config) if raster is None else raster
+    degree = config.model.harmonics_degree if degree is None else degree
+
+    scene, scene_saved = scene_at(gaussians, spectral, config.model, t, ahead, timer)
+    camera, pose_saved = with_pose_correction(camera, pose)
+    rendered, render_saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor, timer=timer)
+    rendered, exposure_saved = with_exposure(rendered, exposure)
+    loss = image_loss(rendered, targets, weights, config.loss, edges, timer=timer)
+
+    d_colour, d_exposure = with_exposure_reverse(loss.d_colour, exposure_saved)
+    moving = pose_saved is not None
+    d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, pose_gradient=moving, timer=timer)
+    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
+    return ViewPass(loss, rendered, render_saved, scene_saved, d_scene, d_exposure, d_pose, camera)
 
 
 def view_gradients(
@@ -76,19 +139,12 @@ def view_gradients(
     Edges:  a term of weight 0 is not evaluated; a component without arrays gets no gradient.
     Oracle: central differences (`endotsr gradcheck objective`), golden family `objective`.
     """
-    raster = raster_settings(config) if raster is None else raster
-    degree = config.model.harmonics_degree if degree is None else degree
-
-    scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
-    camera, pose_saved = with_pose_correction(camera, pose)
-    rendered, render_saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor)
-    rendered, exposure_saved = with_exposure(rendered, exposure)
-    loss, terms, d_colour, d_depth = image_loss(rendered, targets, weights, config.loss, edges)
-
-    d_colour, d_exposure = with_exposure_reverse(d_colour, exposure_saved)
-    d_scene = render_reverse(d_colour, d_depth, None, render_saved, pose_gradient=pose is not None)
-    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
-    gradients, d_offsets = scene_reverse(d_scene, scene_saved)
+    found = view_pass(
+        gaussians, spectral, targets, weights, config, camera, t, edges,
+        exposure=exposure, pose=pose, raster=raster, degree=degree, compositor=compositor,
+    )  # fmt: skip
+    loss, terms, scene_saved = found.loss.loss, found.loss.terms, found.scene_saved
+    gradients, d_offsets = scene_reverse(found.d_scene, scene_saved)
     if scene_saved.deformation is not None and d_offsets is not None:
         fdm = deformation_reverse(d_offsets, scene_saved.deformation)
         gradients |= {"fdm_weight": fdm.d_fdm_weight, "fdm_centre": fdm.d_fdm_centre, "fdm_width": fdm.d_fdm_width}
@@ -96,4 +152,5 @@ def view_gradients(
         penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
         loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}
         gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)
-    return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered, render_saved)
+    images = (found.rendered, found.render_saved)
+    return ViewGradients(loss, terms, gradients, found.d_exposure, found.d_pose, *images)

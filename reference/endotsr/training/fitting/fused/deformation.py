@@ -47,6 +47,7 @@ class BasisTimes(NamedTuple):
 
 def deformation_adam_step(
     d_offsets: FloatArray,
+    parameters: FdmArrays,
     saved: DeformationSaved,
     state: AdamState,
     rates: dict[str, Rate],
@@ -55,10 +56,11 @@ def deformation_adam_step(
     epsilon: float,
     ahead: float | None = None,
 ) -> FloatArray | None:
-    """Update the FDM arrays of `saved`, and their moments in `state`, in place.
+    """Update the FDM arrays, and their moments in `state`, in place.
 
     d_offsets  (10, N) gradient of the loss with respect to the offsets
-    saved      from `deformation_forward`; its weight, centre and width are the parameters themselves
+    parameters the arrays that are updated
+    saved      from `deformation_forward` of the same arrays; its time and basis are used
     state      moments and steps under the names fdm_weight, fdm_centre, fdm_width
     rates      learning rates under the same names, one each or one per part of the ten channels
     ahead      normalised time at which the offsets of the updated arrays are computed; None = not computed
@@ -68,15 +70,12 @@ def deformation_adam_step(
     Raises: ValueError with the name of an array that has the wrong shape, dtype or layout.
     Oracle: `deformation_reverse`, `adam_update`, `deformation_forward`, bitwise.
     """
-    parameters = FdmArrays(saved.weight, saved.centre, saved.width)
     first, second = (FdmArrays(*(moments[name] for name in NAMES)) for moments in (state.first, state.second))
     for k, name in enumerate(NAMES):
-        check_layout(saved.weight, {name: parameters[k], f"first {name}": first[k], f"second {name}": second[k]})
-    expected = (CHANNELS, saved.weight.shape[2])
-    if d_offsets.shape != expected or d_offsets.dtype != saved.weight.dtype:
-        raise ValueError(
-            f"d_offsets: expected {saved.weight.dtype} {expected}, got {d_offsets.dtype} {d_offsets.shape}"
-        )
+        check_layout(parameters.weight, {name: parameters[k], f"first {name}": first[k], f"second {name}": second[k]})
+    count, dtype = parameters.weight.shape[2], parameters.weight.dtype
+    if d_offsets.shape != (CHANNELS, count) or d_offsets.dtype != dtype:
+        raise ValueError(f"d_offsets: expected {dtype} {(CHANNELS, count)}, got {d_offsets.dtype} {d_offsets.shape}")
     rate = np.empty((3, CHANNELS))
     root = np.empty(3)
     for k, name in enumerate(NAMES):
@@ -85,8 +84,7 @@ def deformation_adam_step(
             rate[k, part], root[k] = step_factors(state.step[name], value, beta1, beta2)
     settings = StepSettings(rate, root, float(beta1), float(beta2), float(epsilon))
     times = BasisTimes(saved.t, saved.t if ahead is None else float(ahead), saved.basis == "quartic")
-    count = saved.weight.shape[2]
-    offsets = np.empty((CHANNELS, count if ahead is not None else 0), saved.weight.dtype)
+    offsets = np.empty((CHANNELS, count if ahead is not None else 0), dtype)
     tasks = CHANNELS * ((count + GAUSSIANS_PER_PIECE - 1) // GAUSSIANS_PER_PIECE)
     parallel_for(_step_kernel, tasks, parameters, first, second, d_offsets, settings, times, offsets)
     return offsets if ahead is not None else None

@@ -14,7 +14,7 @@ from endotsr.method.splatting.render import RenderGrads
 from endotsr.training.fitting.adam import AdamState, Rate, adam_update
 from endotsr.training.fitting.fused.coefficients import coefficients_adam_step
 from endotsr.training.fitting.fused.deformation import NAMES as FDM_FIELDS
-from endotsr.training.fitting.fused.deformation import deformation_adam_step
+from endotsr.training.fitting.fused.deformation import FdmArrays, deformation_adam_step
 from endotsr.training.fitting.model import OffsetsAhead, SceneGrads, SceneSaved, Spectral
 from endotsr.training.scene.gaussians import Gaussians, arrays
 
@@ -33,7 +33,8 @@ def optimise(
 ) -> OffsetsAhead | None:
     """Update the Gaussians and their moments in place.
 
-    saved      of `scene_at`, for the same Gaussians
+    gaussians  the parameters, which are updated here and nowhere else in an iteration
+    saved      of `scene_at`, for the same Gaussians: times, atoms and slopes, which are only read
     grads      gradients with respect to the deformed scene
     back       of `scene_reverse(..., coefficients=False)`: gradients of the arrays without a fused sweep
     rates      learning rate of every array
@@ -49,25 +50,25 @@ def optimise(
             return None
         assert back.d_offsets is not None
         fdm_rates = {name: rates[name] for name in FDM_FIELDS}
-        offsets = deformation_adam_step(back.d_offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
-        if next_time is None or offsets is None:
-            return None
-        return OffsetsAhead(saved.deformation.weight, next_time, offsets)
+        fdm = FdmArrays(*(getattr(gaussians, name) for name in FDM_FIELDS))
+        offsets = deformation_adam_step(back.d_offsets, fdm, saved.deformation, adam, fdm_rates, *settings, next_time)
+        return None if next_time is None or offsets is None else OffsetsAhead(next_time, offsets)
 
     def step_appearance() -> None:
         if saved.appearance is not None:
-            assert grads.d_residual is not None
-            coefficients, atoms, _ = saved.appearance
-            d_argument = argument_gradient(grads.d_residual, saved.appearance)
+            assert grads.d_residual is not None and gaussians.appearance_coefficients is not None
+            d_argument, atoms = argument_gradient(grads.d_residual, saved.appearance), saved.appearance.phi_bar
+            coefficients = gaussians.appearance_coefficients
             coefficients_adam_step(
                 d_argument, atoms, None, coefficients, adam, "appearance_coefficients", rates, *settings
             )
 
     def step_motion() -> None:
         if saved.motion is not None:
-            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.d_position
-            rho, dtype = spectral.rho, coefficients.dtype
-            shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
+            coefficients, atoms, weight = gaussians.motion_coefficients, saved.motion.phi, config.loss.lambda_msp
+            assert coefficients is not None
+            sums, dtype = grads.d_position, coefficients.dtype
+            shrink = penalty_factors(weight, spectral.rho, gaussians.count, dtype) if weight > 0 else None
             coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
 
     ahead, *_ = parallel_calls(  # independent arrays; the longest sweep is listed first
