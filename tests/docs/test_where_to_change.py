@@ -1,4 +1,4 @@
-"""The page *Where to change what*: ten changes, every file exists, and no change takes more files than it did."""
+"""The page *Where to change what*: typical changes, every file exists, and no change takes more files than it did."""
 
 import re
 from pathlib import Path
@@ -13,12 +13,14 @@ CHANGES = {  # the most files of code that a change may take
     "camera model": 3,
     "reader of depth": 4,
     "time basis": 4,
-    "parameter of each frame": 7,
+    "parameter of each frame": 6,
     "window of the SSIM": 1,
     "flag": 3,
     "golden case": 1,
     "optimiser": 5,
     "effect of the simulator": 4,
+    "row of the report": 1,
+    "key of a reader": 1,
 }
 
 SECTIONS = re.findall(r"^## \d+\. (.+?)\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
@@ -31,7 +33,7 @@ def files_of(body: str, part: str) -> list[str]:
     return re.findall(r"^- `([^`]+)`", text, re.MULTILINE)
 
 
-def test_the_ten_changes_are_all_there():
+def test_the_changes_are_all_there():
     assert len(SECTIONS) == len(CHANGES)
     assert all(change in title for change, title in zip(CHANGES, IDS, strict=True))
 

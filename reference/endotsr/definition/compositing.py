@@ -18,19 +18,42 @@ def opacity_of(logit):
 
 def reach(projected, opacity_logit, settings, size, axis):
     """(size, N) bool: the columns (axis 0) or rows (axis 1) that the support rule gives each Gaussian."""
-    at, centre, variance = np.arange(size)[:, None], projected.mean2d[axis].real, projected.covariance2d[2 * axis].real
-    if settings.support == "everywhere":
-        return np.repeat(projected.visible[None], size, axis=0)
-    if settings.support == "ellipse":  # the cutoff implies the ellipse; this is its box, widened
-        with np.errstate(divide="ignore"):
-            squared = 2 * (-np.logaddexp(0, -opacity_logit.real) - np.log(settings.alpha_cutoff))
-        half = np.sqrt(np.maximum(squared, 0) * variance)
-        half = half + 1e-5 * (half + np.abs(centre)) + 1e-3
-        return projected.visible & (squared >= 0) & (np.abs(at + 0.5 - centre) <= half)
+    at = np.arange(size)[:, None]
+    inside = SUPPORTS[settings.support](projected, opacity_logit, settings, at, axis)
+    return projected.visible & inside
+
+
+def reach_everywhere(projected, opacity_logit, settings, at, axis):
+    """Preset `exact`: every pixel."""
+    return np.ones(np.broadcast_shapes(at.shape, projected.visible.shape), bool)
+
+
+def reach_ellipse(projected, opacity_logit, settings, at, axis):
+    """Ruling "support": the box of the ellipse on which alpha reaches the cutoff, widened by more than rounding.
+
+    alpha >= cutoff means (p - mu)^T Sigma^-1 (p - mu) <= r^2 = 2 ln(opacity / cutoff); the box has half sides r sqrt(a)
+    and r sqrt(c).
+    """
+    centre, variance = projected.mean2d[axis].real, projected.covariance2d[2 * axis].real
+    with np.errstate(divide="ignore"):
+        squared = 2 * (-np.logaddexp(0, -opacity_logit.real) - np.log(settings.alpha_cutoff))
+    half = np.sqrt(np.maximum(squared, 0) * variance)
+    half = half + 1e-5 * (half + np.abs(centre)) + 1e-3
+    return (squared >= 0) & (np.abs(at + 0.5 - centre) <= half)
+
+
+def reach_tiles(projected, opacity_logit, settings, at, axis):
+    """Preset `legacy`: the tiles of 16 px that a square of three standard deviations of the longer axis meets."""
+    centre = projected.mean2d[axis].real
     middle = (projected.covariance2d[0] + projected.covariance2d[2]).real / 2
-    radius = np.ceil(3 * np.sqrt(middle + np.sqrt(np.maximum(0.1, middle**2 - projected.determinant.real))))
-    first, last = np.trunc((centre - 0.5 - radius) / 16), np.trunc((centre - 0.5 + radius + 15) / 16)
-    return projected.visible & (at // 16 >= first) & (at // 16 < last)
+    longest = middle + np.sqrt(np.maximum(0.1, middle**2 - projected.determinant.real))
+    radius = np.ceil(3 * np.sqrt(longest))
+    first = np.trunc((centre - 0.5 - radius) / 16)
+    last = np.trunc((centre - 0.5 + radius + 15) / 16)
+    return (at // 16 >= first) & (at // 16 < last)
+
+
+SUPPORTS = {"everywhere": reach_everywhere, "ellipse": reach_ellipse, "three_sigma_tiles": reach_tiles}
 
 
 def seen(projected, opacity_logit, settings, width, height):
@@ -41,18 +64,21 @@ def seen(projected, opacity_logit, settings, width, height):
 
 def layers_of(projected, opacity_logit, settings, width, height):
     """The layers, front to back (equal depths by index), and the transmittance (H, W) behind all of them."""
-    (u, v), (a, b, c), opacity = projected.mean2d, projected.covariance2d, opacity_of(opacity_logit)
+    u, v = projected.mean2d
+    a, b, c = projected.covariance2d
+    opacity = opacity_of(opacity_logit)
     columns, rows = (reach(projected, opacity_logit, settings, n, axis) for axis, n in enumerate((width, height)))
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    t, live, layers = np.ones((height, width)), np.ones((height, width), bool), []
-    for i in np.argsort(projected.depth.real, kind="stable"):
+    t, live = np.ones((height, width)), np.ones((height, width), bool)
+    layers = []
+    for i in np.argsort(projected.depth.real, kind="stable"):  # ruling "order"
         box = np.outer(rows[:, i], columns[:, i])
         if not box.any():
             continue
         dx, dy = x - u[i], y - v[i]
         q = (c[i] * dx * dx - 2 * b[i] * dx * dy + a[i] * dy * dy) / projected.determinant[i]
         value = opacity[i] * np.exp(-q / 2)
-        alpha = np.where(value.real <= settings.alpha_max, value, settings.alpha_max)
+        alpha = np.where(value.real <= settings.alpha_max, value, settings.alpha_max)  # ruling "alpha clamp"
         wanted = live & box & (alpha.real >= settings.alpha_cutoff)
         live = live & ~(wanted & ((t * (1 - alpha)).real < settings.transmittance_stop))
         layers.append(Layer(i, dx, dy, value, alpha, t, wanted & live))
@@ -66,7 +92,8 @@ def composite_forward(projected, opacity_logit, colour, settings, background, wi
     The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles.
     """
     layers, t = layers_of(projected, opacity_logit, settings, width, height)
-    image, depth, opacity = t * background[:, None, None], 0 * t, 0 * t
+    image = t * background[:, None, None]
+    depth = opacity = 0 * t
     for layer in layers:
         weight = np.where(layer.taken, layer.alpha * layer.front, 0)
         image = image + weight * colour[:, layer.index, None, None]
@@ -83,7 +110,7 @@ def composite_reverse(d_colour, d_depth, d_opacity, saved):
     rest = (background[:, None, None] * d_colour).sum(axis=0)  # <g, R>: colour, depth and opacity behind the layer
     for i, dx, dy, value, alpha, front, taken in reversed(layers):
         own = np.einsum("c,chw->hw", colour[:, i], d_colour) + projected.depth[i] * d_depth + d_opacity
-        passes = taken & ((value <= settings.alpha_max) | settings.deviations.pass_clamped_alpha)
+        passes = taken & (value <= settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
         power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (8.3), (8.6)
         (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
         px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (8.7)
@@ -93,13 +120,4 @@ def composite_reverse(d_colour, d_depth, d_opacity, saved):
         weight = np.where(taken, alpha * front, 0)
         out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()  # (8.5)
         rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)  # (8.1)
-    return deviate(out._replace(d_background=(d_colour * t).sum((1, 2))), saved)
-
-
-def deviate(out, saved):
-    """Two deviations of `legacy`: no gradient from the depth image to z, and 1 / (det^2 + 1e-7) for 1 / det^2."""
-    deviations, square = saved.settings.deviations, saved.projected.determinant**2
-    if deviations.drop_depth_to_z:
-        out = out._replace(d_depth=0 * out.d_depth)
-    factor = square / (square + 1e-7) if deviations.conic_epsilon else 1
-    return out._replace(d_covariance2d=out.d_covariance2d * factor)
+    return out._replace(d_background=(d_colour * t).sum((1, 2)))

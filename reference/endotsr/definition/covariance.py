@@ -25,20 +25,25 @@ def unit(quaternion):
 def rotation_of(q):
     """R (3, 3, N) of unit quaternions w + v: (w^2 - v.v) I + 2 v v^T + 2 w [v]_x; the kernel writes nine entries."""
     w, v = q[0], q[1:]
-    outer, cross = np.einsum("in,jn->ijn", v, v), np.einsum("ijk,kn->ijn", CROSS, v)
+    outer = np.einsum("in,jn->ijn", v, v)
+    cross = np.einsum("ijk,kn->ijn", CROSS, v)
     return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (5.4)
 
 
 def rotation_reverse(q, g):
     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N)."""
     w, v = q[0], q[1:]
-    trace, spin = np.einsum("iin->n", g), np.einsum("ijn,ijk->kn", g, CROSS)  # (5.5)
+    trace = np.einsum("iin->n", g)
+    spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (5.5)
     along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (5.6)
-    return np.concatenate([[2 * w * trace + 2 * (spin * v).sum(axis=0)], -2 * v * trace + 2 * along + 2 * w * spin])
+    g_w = 2 * w * trace + 2 * (spin * v).sum(axis=0)
+    g_v = -2 * v * trace + 2 * along + 2 * w * spin
+    return np.concatenate([[g_w], g_v])
 
 
 def covariance_forward(quaternion, log_scale):
     """Equation (B2): Shape from raw quaternions (4, N) w, x, y, z and log-scales (3, N), clipped to +-40."""
+    # The square of a scale beyond exp(44) overflows in float32; of exp(-44) it is 0.
     scale = np.exp(np.where(np.abs(log_scale.real) <= 40, log_scale, np.copysign(40, log_scale.real)))
     return Shape(rotation_of(unit(quaternion)[0]), scale), CovarianceSaved(quaternion, log_scale)
 
@@ -49,7 +54,8 @@ def covariance_reverse(d_shape, saved):
     g = rotation_reverse(q, d_shape.rotation)
     d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (5.8)
     free = np.abs(saved.log_scale) <= 40  # (5.3)
-    return CovarianceGrads(d_quaternion, np.where(free, d_shape.scale * np.exp(np.clip(saved.log_scale, -40, 40)), 0))
+    scale = np.exp(np.clip(saved.log_scale, -40, 40))
+    return CovarianceGrads(d_quaternion, np.where(free, d_shape.scale * scale, 0))
 
 
 def covariance_matrix(shape):

@@ -36,12 +36,16 @@ def densify(gaussians, statistics, config, rng, extent, remaining=1):
     """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
-    least, calls = (config.gradient_threshold, 1) if config.growth == "threshold" else (0, remaining)
+    by_threshold = config.growth == "threshold"
+    least = config.gradient_threshold if by_threshold else 0
+    runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
-    room = -(-max(0, config.maximum - alive.sum()) // calls)  # (20.1), (20.3)
-    candidates = np.sort(candidates[np.argsort(-steepness[candidates], kind="stable")[:room]])
+    room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
+    steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
+    candidates = np.sort(steepest_first[:room])
     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
-    clone, split = candidates[~large], candidates[large]
+    clone = candidates[~large]
+    split = candidates[large]
     survivors = np.setdiff1d(np.flatnonzero(alive), split)
     source = np.concatenate([survivors, clone, split, split])
     made = type(gaussians)(*(None if array is None else array[..., source] for array in gaussians))

@@ -24,9 +24,12 @@ def dictionary_forward(t, omega):
     """
     turns = omega * t
     quarters = np.rint(4 * turns.real)
-    angle, which = 2 * np.pi * (turns - quarters / 4), quarters.astype(int) % 4  # (1.2)
+    angle = 2 * np.pi * (turns - quarters / 4)  # (1.2)
+    which = quarters.astype(np.intp) % 4  # an index has the width of a pointer
     s, c = np.sin(angle), np.cos(angle)
-    phi = np.concatenate([np.choose(which, [s, c, -s, -c]), np.choose(which, [c, -s, -c, s])])
+    sine = np.choose(which, [s, c, -s, -c])
+    cosine = np.choose(which, [c, -s, -c, s])
+    phi = np.concatenate([sine, cosine])
     return phi, DictionarySaved(t, omega)
 
 
@@ -43,7 +46,7 @@ def atom_statistics(times, omega):
     atoms = np.array([dictionary_forward(t, omega)[0] for t in np.unique(times)])
     mean = atoms.mean(axis=0)
     rms = np.sqrt(((atoms - mean) ** 2).mean(axis=0))
-    return AtomStatistics(mean, rms, rms < 1e-6)
+    return AtomStatistics(mean, rms, rms < 1e-6)  # ruling "atom statistics": an atom that is constant up to rounding
 
 
 def normalise_forward(phi, statistics):

@@ -71,7 +71,8 @@ def harmonics_forward(harmonics, residual, position, centre, degree):
 def harmonics_reverse(d_colour, saved):
     """Reverse of (B4): through the coefficients and through the viewing direction."""
     harmonics, residual, position, centre, degree, clamped = saved
-    terms, g = (degree + 1) ** 2, np.where(clamped, 0, d_colour)  # (7.1)
+    terms = (degree + 1) ** 2
+    g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (7.1)
     n, inverse = directions(position, centre)
     d_harmonics = np.zeros_like(harmonics)
     d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (7.2)

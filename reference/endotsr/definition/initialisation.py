@@ -18,7 +18,7 @@ def drawn_pixels(sequence, config, rng):
     usable = sequence.masks & (sequence.depth > 0) & np.isfinite(sequence.depth)
     first, count = sequence.train_index[0], len(sequence.images)
     for k in sequence.train_index:
-        if k > first and count > 150 and (k - first) % 2 == 0:
+        if k > first and count > 150 and (k - first) % 2 == 0:  # a long clip: every second frame
             continue
         with np.errstate(invalid="ignore"):
             moved = np.abs(sequence.depth[k] - sequence.depth[first]) > config.motion_threshold
@@ -29,9 +29,11 @@ def drawn_pixels(sequence, config, rng):
 
 def lift(sequence, k, pixels):
     """World positions (3, M) and display colours (3, M) of flat pixel indices of frame k."""
-    camera, (row, column) = sequence.cameras[k], np.divmod(pixels, sequence.masks.shape[2])
+    camera = sequence.cameras[k]
+    row, column = np.divmod(pixels, sequence.masks.shape[2])
     z = sequence.depth[k, row, column].astype(float)
-    x, y = (column + 0.5 - camera.cx) * z / camera.fx, (row + 0.5 - camera.cy) * z / camera.fy  # (13.1)
+    x = (column + 0.5 - camera.cx) * z / camera.fx  # (13.1)
+    y = (row + 0.5 - camera.cy) * z / camera.fy
     point = camera.rotation.T @ (np.array([x, y, z]) - camera.translation[:, None])  # (13.2)
     return point, sequence.images[k][:, row, column] / 255
 
@@ -44,14 +46,16 @@ def neighbour_distance(position):
 
 def gaussians_at(position, colour, model):
     """Gaussians at the start of training, at world positions (3, N) with display colours (3, N)."""
-    count, shape = position.shape[1], (10, model.bases, position.shape[1])
+    count = position.shape[1]
     harmonics = np.zeros(((model.harmonics_degree + 1) ** 2, 3, count))
-    harmonics[0], opacity_logit = (colour - 0.5) / Y00, np.full(count, np.log(0.1 / 0.9))  # (13.3), (13.5)
+    harmonics[0] = (colour - 0.5) / Y00  # (13.3)
+    opacity_logit = np.full(count, np.log(0.1 / 0.9))  # (13.5)
     log_scale = np.log(np.sqrt(np.maximum(neighbour_distance(position), 1e-7)))  # (13.4)
     quaternion = np.repeat(np.eye(4)[:, :1], count, axis=1)
     made = Gaussians(position, quaternion, np.tile(log_scale, (3, 1)), opacity_logit, harmonics)
     if not model.deformation:
         return made
+    shape = (10, model.bases, count)
     centre = np.broadcast_to(np.linspace(0, 1, model.bases)[:, None], shape)  # (13.6)
     return made._replace(fdm_weight=np.zeros(shape), fdm_centre=centre, fdm_width=np.full(shape, model.initial_width))
 
@@ -59,7 +63,8 @@ def gaussians_at(position, colour, model):
 def activate_residuals(gaussians, count, appearance, spectral_motion):
     """Add A and C (3, 2F, N) as zeros; existing arrays are kept."""
     zero = np.zeros((3, 2 * count, gaussians.opacity_logit.size))
-    a, c = gaussians.appearance_coefficients, gaussians.motion_coefficients
+    a = gaussians.appearance_coefficients
+    c = gaussians.motion_coefficients
     return gaussians._replace(
         appearance_coefficients=zero if appearance and a is None else a,
         motion_coefficients=zero if spectral_motion and c is None else c,

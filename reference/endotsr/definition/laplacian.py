@@ -46,7 +46,8 @@ def laplacian_levels(image, levels=3, upsampling="co_sited"):
 
 def support_masks(mask, levels=3, upsampling="co_sited"):
     """V_j: values to which no excluded pixel of `mask` (H, W) contributes. S_0 = mask is propagated through D and U."""
-    bands, valid = [], mask
+    bands = []
+    valid = mask
     for _ in range(levels):
         d_rows, u_rows, d_columns, u_columns = (matrix != 0 for matrix in matrices(valid.shape, upsampling))
         coarse = ~(d_rows @ ~valid @ d_columns.T)

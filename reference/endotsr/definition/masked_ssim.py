@@ -33,8 +33,10 @@ def masked_ssim_forward(rendered, target):
     """
     x, y = np.where(target.mask, rendered, 0), target.image
     mu_x, mu_y = blurred(x), blurred(y)
-    a1, a2 = 2 * mu_x * mu_y + C1, 2 * (blurred(x * y) - mu_x * mu_y) + C2
-    b1, b2 = mu_x**2 + mu_y**2 + C1, blurred(x**2) - mu_x**2 + blurred(y**2) - mu_y**2 + C2
+    a1 = 2 * mu_x * mu_y + C1
+    a2 = 2 * (blurred(x * y) - mu_x * mu_y) + C2
+    b1 = mu_x**2 + mu_y**2 + C1
+    b2 = blurred(x**2) - mu_x**2 + blurred(y**2) - mu_y**2 + C2
     s = a1 * a2 / (b1 * b2)
     by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)  # (10.4)
     mean = np.where(target.mask, s, 0).sum() / target.count if target.count else 1.0

@@ -18,9 +18,9 @@ def matern_weights(omega, length):
 
 def matern_penalty_forward(motion_coefficients, rho):
     """Equation (4), lower line: scene units squared; both atoms of a frequency share its weight."""
-    n, count = motion_coefficients.shape[2], rho.size
+    n = motion_coefficients.shape[2]
     squares = np.einsum("dkn,dkn->k", motion_coefficients, motion_coefficients)
-    return np.tile(rho, 2) @ squares / (6 * max(n, 1) * count), MaternSaved(motion_coefficients, rho)  # (4.4)
+    return np.tile(rho, 2) @ squares / (6 * max(n, 1) * rho.size), MaternSaved(motion_coefficients, rho)  # (4.4)
 
 
 def matern_penalty_reverse(d_penalty, saved):

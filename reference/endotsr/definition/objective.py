@@ -18,7 +18,8 @@ ImageLoss = namedtuple("ImageLoss", "loss terms d_colour d_depth")
 
 def frame_targets(frame, config):
     """Targets of a Frame: image (3, H, W), mask (H, W), prior depth (H, W)."""
-    target, supports = ssim_target(frame.image, frame.mask), support_masks(frame.mask, 3, config.loss.upsampling)
+    target = ssim_target(frame.image, frame.mask)
+    supports = support_masks(frame.mask, 3, config.loss.upsampling)
     return Targets(target.image, frame.mask, target, depth_target(frame.depth, frame.mask), supports)
 
 
@@ -37,17 +38,20 @@ def no_edges(depth):
 
 def image_loss(rendered, targets, weights, config, edges=no_edges):
     """Equation (6) without the Matern penalty; `edges` (H, W) bool, or a function that detects them in the depth."""
-    colour, depth = rendered.colour, rendered.depth
+    colour = rendered.colour
+    depth = rendered.depth
     loss, terms, d_colour = photometric_loss(colour, targets, weights.ssim)
     d_depth = np.zeros_like(depth)
     if weights.depth > 0:
         terms["depth"], saved = normalised_depth_forward(depth, targets.depth)
         d_depth = d_depth + normalised_depth_reverse(weights.depth, saved)
     if weights.smoothness > 0:
-        found, factor = edges(depth) if callable(edges) else edges, config.total_variation_factor
+        found = edges(depth) if callable(edges) else edges
+        factor = config.total_variation_factor
         terms["smoothness"], saved = smoothness_forward(depth, colour, targets.mask, found, factor)
         by_colour, by_depth = smoothness_reverse(weights.smoothness, saved)
-        d_colour, d_depth = d_colour + by_colour, d_depth + by_depth
+        d_colour = d_colour + by_colour
+        d_depth = d_depth + by_depth
     if weights.laplacian > 0:
         terms["laplacian"], saved = laplacian_loss_forward(colour, targets.image, targets.supports, config.upsampling)
         d_colour = d_colour + laplacian_loss_reverse(weights.laplacian, saved)

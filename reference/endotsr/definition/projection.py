@@ -17,8 +17,11 @@ ProjectionGrads = namedtuple("ProjectionGrads", "d_position d_rotation d_scale d
 
 def jacobian(point, camera, settings):
     """J (2, 3, N) at points (3, N) in camera axes, its slopes x'/z, y'/z (2, N), and which slopes are unclamped."""
-    (x, y, z), fx, fy = point, camera.fx, camera.fy
-    kappa, sizes = settings.jacobian_clamp, np.array([[camera.width / fx], [camera.height / fy]])
+    x, y, z = point
+    fx, fy = camera.fx, camera.fy
+    # Ruling "off-axis clamp of J": slopes up to kappa tan(fov / 2), symmetric; kappa = 0 means no clamp.
+    kappa = settings.jacobian_clamp
+    sizes = np.array([[camera.width / fx], [camera.height / fy]])
     limit = kappa * sizes / 2 if kappa > 0 else np.inf * sizes
     slope = np.array([x / z, y / z])
     free = np.abs(np.real(slope)) <= limit
@@ -33,7 +36,7 @@ def projection_forward(position, shape, camera, settings):
     The kernel sums the determinant from nonnegative terms, and clips axes above 1e60 px.
     """
     point = camera.rotation @ position + camera.translation[:, None]
-    visible = point[2].real > settings.near
+    visible = point[2].real > settings.near  # ruling "near plane"
     x, y, z = point = np.where(visible, point, 1)
     t = np.einsum("ijn,jk->ikn", jacobian(point, camera, settings)[0], camera.rotation)
     cov = np.einsum("ikn,kln,jln->ijn", t, covariance_matrix(shape), t)
@@ -49,28 +52,36 @@ def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
     """Reverse of (B3): b represents two entries. For needles, the kernel of the render starts from A, m, r."""
     position, shape, camera, settings, visible = saved
     d_mean2d, d_covariance2d, d_depth = (np.where(visible, g, 0) for g in (d_mean2d, d_covariance2d, d_depth))
-    w, point = camera.rotation, camera.rotation @ position + camera.translation[:, None]
-    point = np.where(visible, point, 1)
+    w = camera.rotation
+    point = np.where(visible, w @ position + camera.translation[:, None], 1)
     j, slope, free = jacobian(point, camera, settings)
-    sigma, t = covariance_matrix(shape), np.einsum("ijn,jk->ikn", j, w)
-    g_a, g_b, g_c = d_covariance2d
-    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])  # (6.1)
-    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)  # (6.2)
-    g_t = 2 * np.einsum("ijn,jkn,kln->iln", g2, t, sigma)
+    g_sigma, g_t = covariance_reverse_parts(d_covariance2d, saved, point)
     g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (5.1)
-    g_point = point_reverse(point, slope, free, np.einsum("ikn,jk->ijn", g_t, w), d_mean2d, d_depth, camera, settings)
-    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (6.4), (6.11)
     d_scale = (shape.rotation * g_m).sum(axis=0)  # (5.2), (6.3)
+    g_j = np.einsum("ikn,jk->ijn", g_t, w)
+    g_point = point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera)
+    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (6.4), (6.11)
     return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (6.10)
 
 
-def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera, settings):
+def covariance_reverse_parts(d_covariance2d, saved, point):
+    """dL/dSigma (3, 3, N) and dL/dT (2, 3, N), T = J W, from the gradient (3, N) of a, b, c."""
+    t = np.einsum("ijn,jk->ikn", jacobian(point, saved.camera, saved.settings)[0], saved.camera.rotation)
+    g_a, g_b, g_c = d_covariance2d
+    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])  # (6.1)
+    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)  # (6.2)
+    g_t = 2 * np.einsum("ijn,jkn,kln->iln", g2, t, covariance_matrix(saved.shape))
+    return g_sigma, g_t
+
+
+def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera):
     """dL/d(point in camera axes) (3, N), from the derivatives with respect to J, (u, v) and depth."""
-    z, focal = point[2], np.array([[camera.fx], [camera.fy]])
-    g_slope = -focal / z * np.array([g_j[0, 2], g_j[1, 2]])  # J_02 = -f x'/z / z; (6.6)
-    g_clipped = np.where(free, g_slope, 0)  # (6.7)
-    clamp = np.where(free | (not settings.deviations.double_clamp_term), 0, g_slope * slope)  # `legacy`: counted twice
+    z = point[2]
+    focal = np.array([[camera.fx], [camera.fy]])
+    by_slope = np.array([g_j[0, 2], g_j[1, 2]])
+    g_slope = -focal / z * by_slope  # J_02 = -f (x'/z) / z; (6.6)
+    g_clipped = np.where(free, g_slope, 0)  # ruling: exact derivative of the clamp; (6.7)
     g_xy = (focal * d_mean2d + g_clipped) / z  # (6.8)
-    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * np.array([g_j[0, 2], g_j[1, 2]]))  # (6.9)
-    g_z = d_depth + (by_scale - g_xy * point[:2] / z - clamp / z).sum(axis=0)
+    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * by_slope)  # (6.9)
+    g_z = d_depth + (by_scale - g_xy * point[:2] / z).sum(axis=0)
     return np.concatenate([g_xy, [g_z]])

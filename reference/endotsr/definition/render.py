@@ -4,10 +4,11 @@ from collections import namedtuple
 
 import numpy as np
 
-from endotsr.definition.compositing import composite_forward, composite_reverse, seen
+from endotsr.definition.compositing import composite_forward, seen
 from endotsr.definition.covariance import Shape, covariance_forward, covariance_reverse
 from endotsr.definition.harmonics import harmonics_forward, harmonics_reverse
-from endotsr.definition.projection import CameraGrads, projection_forward, projection_reverse
+from endotsr.definition.legacy import composite_reverse, projection_reverse
+from endotsr.definition.projection import CameraGrads, projection_forward
 
 # Raw parameters of N Gaussians at one time.
 Scene = namedtuple("Scene", "position quaternion log_scale opacity_logit harmonics residual", defaults=[None])
@@ -35,11 +36,13 @@ def render_forward(scene, camera, settings, *, degree=3, background=None):
 
 def render_reverse(d_colour, d_depth, d_opacity, saved):
     """Reverse of the view, from images (3, H, W), (H, W), (H, W); the last may be None."""
-    back = composite_reverse(d_colour, d_depth, 0 * d_depth if d_opacity is None else d_opacity, saved.composite)
+    d_opacity = 0 * d_depth if d_opacity is None else d_opacity
+    back = composite_reverse(d_colour, d_depth, d_opacity, saved.composite)
     harmonics = harmonics_reverse(back.d_colour, saved.harmonics)
     projection = projection_reverse(back.d_mean2d, back.d_covariance2d, back.d_depth, saved.projection)
     covariance = covariance_reverse(Shape(projection.d_rotation, projection.d_scale), saved.covariance)
-    camera, d_centre = saved.projection.camera, harmonics.d_centre  # centre = -rotation^T translation
+    camera = saved.projection.camera
+    d_centre = harmonics.d_centre  # centre = -rotation^T translation
     d_camera = CameraGrads(
         projection.d_camera.d_rotation - np.outer(camera.translation, d_centre),
         projection.d_camera.d_translation - camera.rotation @ d_centre,

@@ -17,21 +17,26 @@ def steps_reverse(d_steps, axis):
 
 def squared_steps(depth, smooth):
     """Q and its derivative (H, W): squared differences of neighbours that are both smooth, over their number."""
-    total, gradient, number = 0.0, np.zeros_like(depth), smooth.sum() + 1e-6
+    total = 0.0
+    gradient = np.zeros_like(depth)
+    number = smooth.sum() + 1e-6
     for axis in (0, 1):
         both = np.minimum(np.roll(smooth, -1, axis), smooth).take(range(smooth.shape[axis] - 1), axis)
         step = np.where(both, np.diff(depth, axis=axis), 0)
-        total, gradient = total + (step**2).sum() / number, gradient + steps_reverse(2 * step / number, axis)
+        total = total + (step**2).sum() / number
+        gradient = gradient + steps_reverse(2 * step / number, axis)
     return total, gradient
 
 
 def total_variation(image, mask):
     """TV of an image (C, H, W) that is 0 on tissue, and its derivative, 0 on tissue; sign(0) = 0."""
     outside = np.where(mask, 0, image)
-    total, gradient = 0.0, np.zeros_like(outside)
+    total = 0.0
+    gradient = np.zeros_like(outside)
     for axis in (1, 2):
         step = np.diff(outside, axis=axis)
-        total, gradient = total + np.abs(step).sum(), gradient + steps_reverse(np.sign(step), axis)
+        total = total + np.abs(step).sum()
+        gradient = gradient + steps_reverse(np.sign(step), axis)
     return total / image.size, np.where(mask, 0, gradient) / image.size  # (10.11)
 
 

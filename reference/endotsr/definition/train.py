@@ -33,7 +33,8 @@ def frame_of(sequence, k):
 
 def weights_at(iteration, config):
     """Weights of the image terms at this iteration."""
-    loss, ramp = config.loss, schedules.laplacian_ramp(iteration, config)
+    loss = config.loss
+    ramp = schedules.laplacian_ramp(iteration, config)
     smoothness = loss.smoothness_weight if schedules.smoothness_active(iteration, config) else 0.0
     return LossWeights(loss.ssim_weight, loss.depth_weight, smoothness, ramp * loss.lambda_lap)
 
@@ -47,7 +48,8 @@ def activated(state, config):
 
 def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges):
     """One iteration on a uniformly drawn training frame: the new state and the ViewGradients."""
-    i, o = state.iteration + 1, config.optimiser
+    i = state.iteration + 1
+    o = config.optimiser
     if schedules.residuals_active(i, config) and not schedules.residuals_active(i - 1, config):
         state = activated(state, config)
     frame = frame_of(sequence, sequence.train_index[rng.integers(len(sequence.train_index))])
@@ -55,12 +57,15 @@ def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges
         state.gaussians, spectral, frame_targets(frame, config), weights_at(i, config), config, frame.camera,
         frame.time, edges, raster=raster, degree=schedules.active_degree(i, config),
     )  # fmt: skip
-    statistics, adam, gaussians = state.statistics, state.adam, state.gaussians
+    statistics = state.statistics
+    adam = state.adam
+    gaussians = state.gaussians
     if schedules.statistics_active(i, config):
         statistics = gather_statistics(statistics, view.d_mean2d, view.visible, frame.camera.width, frame.camera.height)
     if not (schedules.densify_now(i, config) and o.legacy_skip):
-        rates, numbers = schedules.learning_rates(i, config), (o.beta1, o.beta2, o.epsilon)
-        adam, parameters = adam_update(adam, arrays(gaussians), view.gradients, rates, *numbers)
+        rates = schedules.learning_rates(i, config)
+        given = (arrays(gaussians), view.gradients, rates, o.beta1, o.beta2, o.epsilon)
+        adam, parameters = adam_update(adam, *given)
         gaussians = gaussians._replace(**parameters)
     state = State(gaussians, adam, statistics, i)
     return controlled(state, sequence, config, rng) if schedules.densify_now(i, config) else state, view
@@ -69,7 +74,8 @@ def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges
 def controlled(state, sequence, config, rng):
     """The state after density control: new Gaussians have moments 0, all statistics are 0."""
     cameras = [sequence.cameras[k] for k in sequence.train_index]
-    extent, left = scene_extent(config.density, cameras), schedules.densifications_left(state.iteration, config)
+    extent = scene_extent(config.density, cameras)
+    left = schedules.densifications_left(state.iteration, config)
     made = densify(state.gaussians, state.statistics, config.density, rng, extent, left)
     new = np.arange(made.plan.source.size) >= made.plan.survivors
     adam = {
@@ -81,11 +87,13 @@ def controlled(state, sequence, config, rng):
 
 def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
     """lambda_lap of equation (7), from training views rendered without A and S."""
-    base, views = gaussians._replace(appearance_coefficients=None, motion_coefficients=None), []
+    base = gaussians._replace(appearance_coefficients=None, motion_coefficients=None)
+    views = []
     chosen = calibration_views(len(sequence.train_index), config.loss.calibration_views)
     for k in sequence.train_index[chosen]:
         frame = frame_of(sequence, k)
-        targets, (scene, _) = frame_targets(frame, config), scene_at(base, spectral, config.model, frame.time)
+        targets = frame_targets(frame, config)
+        scene, _ = scene_at(base, spectral, config.model, frame.time)
         colour = render_forward(scene, frame.camera, raster, degree=config.model.harmonics_degree)[0].colour
         _, _, d_rgb = photometric_loss(colour, targets, config.loss.ssim_weight)
         _, saved = laplacian_loss_forward(colour, targets.image, targets.supports, config.loss.upsampling)

@@ -21,6 +21,7 @@ from endotsr.definition import (
     covariance,
     density_control,
     initialisation,
+    legacy,
     objective,
     projection,
     render,
@@ -115,7 +116,7 @@ def _projection(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
 
 def _projection_reverse(cotangents: Inputs, saved: Any) -> Found:
     given = _of(cotangents, ("mean2d", "covariance2d", "depth"))
-    *grads, (d_rotation, d_translation) = projection.projection_reverse(*given, saved=saved)
+    *grads, (d_rotation, d_translation) = legacy.projection_reverse(*given, saved=saved)
     named = dict(zip(("d_position", "d_rotation", "d_scale"), grads))
     return named | {"d_rotation_matrix": d_rotation, "d_translation": d_translation}
 
@@ -132,7 +133,7 @@ def _composite(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
 
 
 def _composite_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return compositing.composite_reverse(*_of(cotangents, IMAGES), saved=saved)._asdict()
+    return legacy.composite_reverse(*_of(cotangents, IMAGES), saved=saved)._asdict()
 
 
 def _render(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:

@@ -1,0 +1,60 @@
+"""What the docstring of `endotsr.definition` says of its compiled twins is true."""
+
+import ast
+
+import endotsr.definition
+import house
+
+DIFFERENT = {"composite_forward", "rotation_of", "rotation_reverse", "exponential", "calibrated_weight", "train"}
+OTHER_FIELDS = {"Calibration", "ViewGradients"}
+TREES = house.modules().items()
+
+
+def parameters(function: ast.FunctionDef) -> list[str]:
+    """Names of the arguments, in order."""
+    return [a.arg for a in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+
+
+def functions(compiled: bool) -> dict[str, list[str]]:
+    """Arguments of the public functions of the method, by name; `legacy` repeats names of its own storey."""
+    found = {}
+    for name, tree in TREES:
+        if house.room(name) in house.METHOD and (house.room(name) != "definition") == compiled and "legacy" not in name:
+            public = [n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name[0] != "_"]
+            found |= {n.name: parameters(n) for n in public if n.name not in found}
+    return found
+
+
+def fields(compiled: bool) -> dict[str, list[str]]:
+    """Fields of the named tuples of the method, by name."""
+    found = {}
+    for name, tree in TREES:
+        if house.room(name) not in house.METHOD or (house.room(name) != "definition") != compiled:
+            continue
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and "NamedTuple" in map(ast.unparse, node.bases):
+                found[node.name] = [ast.unparse(n.target) for n in node.body if isinstance(n, ast.AnnAssign)]
+            elif isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("namedtuple("):
+                found[ast.unparse(node.targets[0])] = ast.literal_eval(node.value.args[1]).split()
+    return found
+
+
+def follows(short: list[str], long: list[str]) -> bool:
+    """Whether `long` has all of `short`, in the same order."""
+    rest = iter(long)
+    return all(name in rest for name in short)
+
+
+def test_compiled_functions_take_the_same_arguments_in_the_same_order():
+    here, there = functions(compiled=False), functions(compiled=True)
+    shared = here.keys() & there.keys()
+    assert len(shared) > 70
+    assert {name for name in shared if not follows(here[name], there[name])} == DIFFERENT
+    assert all(f"`{name}`" in (endotsr.definition.__doc__ or "") for name in DIFFERENT | OTHER_FIELDS)
+
+
+def test_tuples_have_the_same_fields():
+    here, there = fields(compiled=False), fields(compiled=True)
+    shared = {name for name in here.keys() & there.keys() if not name.endswith("Saved")}
+    assert len(shared) > 30
+    assert {name for name in shared if here[name] != there[name]} == OTHER_FIELDS
