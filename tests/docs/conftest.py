@@ -1,7 +1,7 @@
-"""The extensions of the book, as Sphinx has them, and the makers of its pages are importable."""
+"""The extensions of the book are importable, as Sphinx has them; `pages` is, by the conftest of all tests."""
 
 import sys
 from pathlib import Path
 
 DOCS = Path(__file__).parents[2] / "docs"
-sys.path[:0] = [str(DOCS / "_extensions"), str(DOCS)]
+sys.path.insert(0, str(DOCS / "_extensions"))
