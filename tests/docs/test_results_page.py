@@ -5,7 +5,7 @@ from pathlib import Path
 from statistics import fmean
 
 import pytest
-from pages.full_size import levers
+from pages.full_size import interpolation, levers
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
@@ -68,3 +68,8 @@ def test_differences_are_paired_by_seed():
     found = {"scenes": {"clip": runs}, "seeds": 2, "iterations": 9, "date": "-", "machine": {"processor": "x"}}
     rows = [line for line in levers.table(found).splitlines() if line.startswith("| clip")]
     assert rows == ["| clip | `sharp` | 35.00 | - |", "| clip | `paper` | -1.00 ± 0.00 | - |"]
+
+
+def test_the_table_of_interpolation_is_what_its_record_says():
+    found = json.loads((RESULTS / "interpolation.json").read_text(encoding="utf-8"))
+    assert interpolation.table(found) in interpolation.PAGE.read_text(encoding="utf-8")

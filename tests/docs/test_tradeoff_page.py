@@ -6,7 +6,7 @@ import re
 import pytest
 from pages.store.marks import replaced
 from pages.tradeoff import page as tradeoff
-from pages.tradeoff.parts import fragments
+from pages.tradeoff.parts import fragments, promise, scatter_of_equal, time_sentence
 
 MARKED = re.compile(r"<!-- tradeoff:(\w+):start -->")
 
@@ -62,3 +62,14 @@ def test_what_the_page_says_of_a_looser_stop():
     found = json.loads((tradeoff.RESULTS / "stop.json").read_text(encoding="utf-8"))["psnr_tissue"]
     tight, loose = found["0.001"], found["0.01"]
     assert tight["1e-06"] - loose["1e-06"] > max(row["1e-06"] - row["0.01"] for row in (tight, loose)) > 0
+
+
+def test_the_headline_states_no_time_below_the_scatter_of_equal_arithmetic(result):
+    """Of exactly the setting that it names, against exactly `paper`, not of a faster one with the same error."""
+    by_name = {p["name"]: p for p in result["points"]}
+    paper, chosen = by_name["paper"], by_name["float32, cutoff 1e-4, stop 1e-6"]
+    scatter = scatter_of_equal(result)
+    assert scatter > 0.1 and "*float32, cutoff 1e-4, stop 1e-6*" in promise(result, {})
+    for factor, words in ((1 + 0.9 * scatter, "not distinguished"), (1 + 1.2 * scatter, "takes +")):
+        slower = chosen | {"forward": {"median": factor * paper["forward"]["median"]}}
+        assert words in time_sentence(result, slower, paper)

@@ -42,47 +42,64 @@ def fragments(
 
 
 def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
-    """The cost of a smaller error in one sentence, and the setting that is right to 8 bits on every scene."""
+    """The cost of a smaller error in one sentence, and the setting that is within one level of 8 bits on every scene.
+
+    The costs are visited pairs, which are counted exactly. A time is stated only if it differs by more than settings
+    with equal visits do in the same record.
+    """
     by_name, chosen = {p["name"]: p for p in result["points"]}, eight_bit_setting(result)
     if chosen is None:
-        return "No setting of float32 is right to the last of 8 bits."
+        return "No setting of float32 is within one level of 8 bits."
     paper, exact = (by_name[result["presets"][name]] for name in ("paper", "exact"))
     smaller = paper["error"]["max"] / chosen["error"]["max"]
-    more = 100 * (_seconds(result, chosen) / _seconds(result, paper) - 1)
     return (
-        f"**On the simulated scene {more:.0f} % more time per frame makes the largest error {smaller:.0f} times "
-        f"smaller than with `paper`; the exact picture takes "
-        f"{_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
+        f"**On the simulated scene, *{chosen['name']}* makes the largest error {smaller:.0f} times smaller than "
+        f"`paper` does, for {chosen['visits'] / paper['visits']:.1f} times the visited pairs. The exact picture visits "
+        f"{exact['visits'] / paper['visits']:.0f} times the pairs of `paper`.** {time_sentence(result, chosen, paper)}"
         f"{_everywhere(result, others)}"
     )
 
 
+def time_sentence(result: dict[str, Any], point: dict[str, Any], paper: dict[str, Any]) -> str:
+    """The time of a frame of exactly this setting against exactly `paper`, if it exceeds the scatter of the record."""
+    more, scatter = point["forward"]["median"] / paper["forward"]["median"] - 1, scatter_of_equal(result)
+    if abs(more) <= scatter:
+        return (
+            f"Its time per frame is not distinguished from that of `paper`: settings with equal visits differ by up to "
+            f"{100 * scatter:.0f} % in this record."
+        )
+    return f"A frame takes {100 * more:+.0f} % time; settings with equal visits differ by up to {100 * scatter:.0f} %."
+
+
+def scatter_of_equal(result: dict[str, Any]) -> float:
+    """The largest relative difference of median times between settings of one precision with equal visits."""
+    groups: dict[tuple[str, int], list[float]] = {}
+    for point in result["points"]:
+        if point["name"] in {*result["joint"], *result["presets"].values()} and point["setting"]["threads"] is None:
+            key = (point["setting"]["precision"], point["visits"])
+            groups.setdefault(key, []).append(point["forward"]["median"])
+    return max((max(times) / min(times) - 1 for times in groups.values()), default=0.0)
+
+
 def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
-    """The float32 setting with the fewest visits that is right to half a step of 8 bit on every measured scene."""
+    """The float32 setting with the fewest visits whose error is at most half a step of 8 bits on every scene."""
     every = {"simulated": result} | others
-    found: dict[str, list[tuple[float, float]]] = {}  # setting -> (time, visits) relative to `paper`, by scene
+    found: dict[str, list[float]] = {}  # setting -> visits relative to `paper`, by scene
     for scene in every.values():
         by_name = {p["name"]: p for p in scene["points"]}
         paper = by_name[scene["presets"]["paper"]]
         for point in (by_name[name] for name in scene["joint"]):
             if point["setting"]["precision"] == "float32" and point["error"]["max"] <= scene["lines"]["eight_bit"]:
-                ratios = _seconds(scene, point) / _seconds(scene, paper), point["visits"] / paper["visits"]
-                found.setdefault(point["name"], []).append(ratios)
+                found.setdefault(point["name"], []).append(point["visits"] / paper["visits"])
     kept = {name: ratios for name, ratios in found.items() if len(ratios) == len(every)}
     if len(every) < 2 or not kept:
         return ""
-    best = min(kept, key=lambda name: (sum(visits for _, visits in kept[name]), name))
-    listed = ", ".join(f"{100 * (r - 1):.0f} % ({scene})" for scene, (r, _) in zip(every, kept[best], strict=True))
+    best = min(kept, key=lambda name: (sum(kept[name]), name))
+    listed = ", ".join(f"{ratio:.1f} ({scene})" for scene, ratio in zip(every, kept[best], strict=True))
     return (
-        f" The setting *{best}* is right to the last of 8 bits on all {len(every)} scenes of this page. Extra time "
-        f"per frame against `paper`: {listed}."
+        f" The setting *{best}* is never off by more than one level of 8 bits on all {len(every)} scenes of this page. "
+        f"Its visited pairs, as multiples of those of `paper`: {listed}."
     )
-
-
-def _seconds(scene: dict[str, Any], point: dict[str, Any]) -> float:
-    """Shortest time of a frame among the settings of the sweep with the same largest error."""
-    same = [p for p in scene["points"] if p["name"] in scene["joint"] and p["error"]["max"] == point["error"]["max"]]
-    return min(p["forward"]["median"] for p in (point, *same))
 
 
 def preset_lines(result: dict[str, Any]) -> list[str]:
@@ -91,7 +108,7 @@ def preset_lines(result: dict[str, Any]) -> list[str]:
     for name, verdict in judge_presets(result["points"], result["presets"]).items():
         better, reason = verdict["dominated_by"], verdict["reason"]
         if not better:
-            lines.append(f"`{name}`: no measured setting dominates it.")
+            lines.append(f"`{name}`: not dominated.")
         else:
             stays = f" It is kept because it {reason}." if reason else " No reason to keep it is listed."
             lines.append(f"`{name}`: dominated by {better[0]}{_more(len(better) - 1)}.{stays}")
@@ -147,11 +164,11 @@ def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any])
     """Whether the first two sentences of advice are right on a scene, and otherwise the alternative."""
     wrong = []
     if paper["error"]["rms"] > scene["lines"]["eight_bit"]:
-        wrong.append("the average error of `paper` exceeds half a step of 8 bit")
+        wrong.append("the RMS error of `paper` exceeds half a step of 8 bits")
     if here["error"]["max"] > scene["lines"]["eight_bit"]:
         better = eight_bit_setting(scene)
         instead = f"take {better['name']}" if better else "no float32 setting keeps it"
-        wrong.append(f"the 8-bit setting misses half a step: {instead}")
+        wrong.append(f"the 8-bit setting exceeds half a step: {instead}")
     return "holds" if not wrong else "does not hold: " + "; ".join(wrong)
 
 

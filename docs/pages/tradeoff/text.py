@@ -24,13 +24,14 @@ def advice(result: dict[str, Any]) -> list[str]:
     paper = by_name[result["presets"]["paper"]]
     chosen = eight_bit_setting(result)
     sentences = [
-        f"For pictures and for training use `paper`: its error is {levels(paper['error']['rms'])} on average and "
-        f"{levels(paper['error']['max'])} at the worst pixel{_against_noise(paper, result)}."
+        f"For pictures and for training use `paper`: its RMS error is {levels(paper['error']['rms'])}, its error "
+        f"at the worst pixel {levels(paper['error']['max'])}{_against_noise(paper, result)}."
     ]
     if chosen is not None:
         raster = chosen["setting"]["raster"]
         sentences.append(
-            f"For an image that is right to the last of 8 bits, lower the cutoff to {small(raster['alpha_cutoff'])} "
+            f"For an image that is never off by more than one level of 8 bits, lower the cutoff to "
+            f"{small(raster['alpha_cutoff'])} "
             f"and the stop to {small(raster['transmittance_stop'])}, in float32: "
             f"{chosen['visits'] / paper['visits']:.1f} times the visits of `paper`, and a largest error of "
             f"{levels(chosen['error']['max'])}."
@@ -71,7 +72,7 @@ def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:
     if noise is None:
         return ""
     words = "below" if point["error"]["rms"] < noise else "above"
-    return f", its average {words} the sensor noise of {levels(noise)}"
+    return f"; the RMS is {words} the sensor noise of {levels(noise)}"
 
 
 def _joint(result: dict[str, Any], precision: str) -> list[dict[str, Any]]:

@@ -1,6 +1,7 @@
 """Image-space baselines: predictions of a held-out frame without a model.
 
-Every evaluation reports four predictions, each from training frames only:
+Every evaluation reports six predictions, each from training frames only: the four below, and two that read tissue
+alone (`tissue_baselines`).
 
 temporal_mean      per-pixel mean over the training frames in which the pixel is tissue; 0 if it never is
 nearest_frame      copy of the training frame nearest in time; of two, the earlier
@@ -9,11 +10,11 @@ two_neighbours     the training frames before and after, blended linearly in tim
 flow_interpolation dense optical flow (DIS, medium) in both directions between the same two frames, each warped to
                    the target time and blended with the same weights
 
-Excluded pixels: only the temporal mean uses the masks of the training frames, because a passing instrument would
-otherwise be smeared over the tissue. The other three use all training pixels, including the instrument. The metric sets
-the excluded pixels of the *test* frame to zero. On EndoNeRF `pulling` the four reach 27.17, 37.71, 40.51 and 41.61 dB
-(full image, 7:1 split). Zeroing the neighbours by their own masks would cost 10 dB; ignoring the masks in the temporal
-mean would cost 1.2 dB.
+Excluded pixels: of these four, only the temporal mean uses the masks of the training frames, because a passing
+instrument would otherwise be smeared over the tissue. The other three use all training pixels, including the
+instrument, which a reconstruction may not read. The metric sets the excluded pixels of the *test* frame to zero. On
+EndoNeRF `pulling` the four reach 27.17, 37.71, 40.51 and 41.61 dB (full image, 7:1 split). Zeroing the neighbours by
+their own masks would cost 10 dB; ignoring the masks in the temporal mean would cost 1.2 dB.
 """
 
 from collections.abc import Callable
@@ -26,6 +27,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 
 RenderFrame = Callable[[int], FloatArray]
+MakeRenderer = Callable[[Sequence], RenderFrame]
 
 
 class Neighbours(NamedTuple):
@@ -121,7 +123,7 @@ def _temporal_mean_once(sequence: Sequence) -> RenderFrame:
     return lambda index: image
 
 
-BASELINES: dict[str, tuple[str, Callable[[Sequence], RenderFrame]]] = {
+BASELINES: dict[str, tuple[str, MakeRenderer]] = {
     "temporal_mean": ("Temporal mean of the training frames", _temporal_mean_once),
     "nearest_frame": ("Copy of the nearest training frame", lambda s: lambda i: nearest_frame(s, i)),
     "two_neighbours": ("Blend of the two neighbouring training frames", lambda s: lambda i: two_neighbours(s, i)),

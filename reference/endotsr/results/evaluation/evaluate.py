@@ -27,11 +27,13 @@ from endotsr.results.evaluation.records import (
     LabelledFrames,
     Means,
 )
+from endotsr.results.evaluation.tissue_baselines import TISSUE_BASELINES
 
 RenderFrame = Callable[[int], FloatArray]
 
 FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
 LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
+EVERY_BASELINE = {**BASELINES, **TISSUE_BASELINES}
 EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
 
 
@@ -76,10 +78,10 @@ def left_out(evaluation: EvaluationRecord) -> list[str]:
 
 
 def baseline_table(sequence: Sequence, lpips_weights: LpipsWeights | None = None) -> dict[str, LabelledFrames]:
-    """Held-out metrics of the four baselines, in the order of BASELINES."""
+    """Held-out metrics of the baselines, in the order of `EVERY_BASELINE`."""
     return {
         name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights)}
-        for name, (label, make) in BASELINES.items()
+        for name, (label, make) in EVERY_BASELINE.items()
     }
 
 

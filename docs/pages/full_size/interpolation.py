@@ -1,0 +1,100 @@
+"""Predictions without a model on both EndoNeRF clips: the plain ones, and those that obey the masks.
+
+    python docs/make.py full_size.interpolation CLIP [--lpips FILE] [--splits NAME ...]   measure, then write the table
+    python docs/make.py full_size.interpolation                                          rewrite the table
+
+A measurement replaces the splits of its clip in the record and keeps the others.
+The table is in docs/results/README.md between its marks, and the headline of README.md reads the same record.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import endotsr
+from endotsr.results.evaluation.baselines import RenderFrame
+from endotsr.results.evaluation.evaluate import EVERY_BASELINE, evaluate_frames
+from endotsr.results.evaluation.lpips import load_lpips_weights
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine, now, versions
+from pages.store.marks import read_json, write_marked
+
+DOCS = Path(__file__).parents[2]
+PAGE, FILE = DOCS / "results" / "README.md", DOCS / "results" / "interpolation.json"
+SPLITS: dict[str, dict[str, Any]] = {
+    "every eighth frame": {},
+    "blocks of 4 frames": {"split": "blocks", "block_length": 4},
+    "blocks of 8 frames": {"split": "blocks", "block_length": 8},
+    "blocks of 16 frames": {"split": "blocks", "block_length": 16},
+}
+LEFT_OUT = {"endonerf_cutting": (73,)}  # its mask shows a region that no training frame shows
+NAMES = [name for name in EVERY_BASELINE if name != "temporal_mean"]
+KEYS = ("psnr_full", "psnr_tissue", "ssim_full", "lpips")
+
+
+def measured(folder: str, split: str, weights: Any) -> dict[str, Any]:
+    """Baseline -> metric -> value of every held-out frame of a split."""
+    sequence = endotsr.load_sequence(folder, **SPLITS[split])
+    rows = {}
+    for name in NAMES:
+        render: RenderFrame = EVERY_BASELINE[name][1](sequence)
+        frames = evaluate_frames(sequence, sequence.test_index, render, weights)["per_frame"]
+        rows[name] = {key: [row[key] for row in frames] for key in KEYS}
+    return {"frames": [int(i) for i in sequence.test_index], "baselines": rows}
+
+
+def mean(part: dict[str, Any], name: str, key: str, without: tuple[int, ...] = ()) -> float:
+    """Mean of a metric over the held-out frames, some of them left out; NaN if it was not measured."""
+    pairs = zip(part["frames"], part["baselines"][name][key])
+    values = [value for frame, value in pairs if frame not in without and value is not None]
+    return float(np.mean(values)) if values else float("nan")
+
+
+def row(part: dict[str, Any], name: str, without: tuple[int, ...]) -> list[str]:
+    """Cells of a baseline: full and tissue PSNR, SSIM, LPIPS; in brackets without the frames that are left out."""
+    cells = []
+    for key, digits in (("psnr_full", 2), ("psnr_tissue", 2), ("ssim_full", 4), ("lpips", 4)):
+        cell = f"{mean(part, name, key):.{digits}f}"
+        cells.append(cell + (f" ({mean(part, name, key, without):.{digits}f})" if without else ""))
+    return [EVERY_BASELINE[name][0], *(cell.replace("nan", "-") for cell in cells)]
+
+
+def table(result: dict[str, Any]) -> str:
+    """One table for each clip and split."""
+    parts = []
+    for clip, splits in result["clips"].items():
+        for split, part in splits.items():
+            without = tuple(k for k in LEFT_OUT.get(clip, ()) if k in part["frames"])
+            frames = f"{len(part['frames'])} frames" + (f"; in brackets without frame {without[0]}" if without else "")
+            head = (
+                f"{clip}, {split} held out ({frames})",
+                "PSNR full, dB",
+                "PSNR tissue, dB",
+                "SSIM full",
+                "LPIPS [0,1]",
+            )
+            parts.append(markdown(head, [row(part, name, without) for name in NAMES]))
+    made = f"{result['machine']['processor']}, {result['date'][:10]}."
+    note = "The first three rows read every pixel of the other frames, instruments included."
+    return "\n\n".join([*parts, f"{made} {note}"])
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("clip", nargs="?")
+    parser.add_argument("--lpips", type=Path)
+    parser.add_argument("--splits", nargs="+", choices=SPLITS, default=list(SPLITS))
+    options = parser.parse_args(words)
+    if options.clip:
+        weights = load_lpips_weights(options.lpips)
+        found = read_json(FILE, "this command") if FILE.exists() else {"clips": {}}
+        of_clip = found["clips"].setdefault(Path(options.clip).name, {})
+        for split in options.splits:
+            of_clip[split] = measured(options.clip, split, weights)
+            write_json(FILE, found | {"date": now(), "machine": machine(), "versions": versions()})
+    record = read_json(FILE, "python docs/make.py full_size.interpolation")
+    write_marked(PAGE, {"table": table(record)}, "interpolation")
