@@ -1,13 +1,14 @@
 """Generate the golden vectors of this folder, and ports with one mistake each.
 
     python golden/make.py check [--within-tolerance] [--golden DIR]    compare the files with a fresh computation
-    python golden/make.py write [--golden DIR]                         replace the files, and print what moved
+    python golden/make.py write [FAMILY ...] [--golden DIR]            replace the files, and print what moved
     python golden/make.py wrong                                        list the mistakes
     python golden/make.py wrong FLAG OUTDIR [--golden DIR]             write what a port with this mistake answers
 
 `check` compares bitwise on the class of machine named in the manifest, and otherwise, or with `--within-tolerance`,
-within the float64 tolerance. It ends with exit code 1 if anything differs. `write` always ends with exit code 1: no
-test run may rewrite its own expected values. `wrong` writes in float64.
+within the float64 tolerance. It ends with exit code 1 if anything differs. `write` computes the named families, or all,
+and keeps the stored bytes of values that agree within the tolerance. It always ends with exit code 1: no test run may
+rewrite its own expected values. `wrong` writes in float64.
 """
 
 import argparse
@@ -33,7 +34,7 @@ def run_check(options: argparse.Namespace) -> int:
 def run_write(options: argparse.Namespace) -> int:
     """Replace the generated files of the folder."""
     folder = golden_folder(options.golden)
-    lines = write(folder)
+    lines = write(folder, options.families)
     print("\n".join(lines) or "no expected value moved")
     print(f"golden: written, {len(lines)} changes; if values moved, raise {folder / 'VERSION'}", file=sys.stderr)
     return 1
@@ -62,6 +63,8 @@ def main(words: list[str]) -> int:
         command.set_defaults(call=call)
         if name == "check":
             command.add_argument("--within-tolerance", action="store_true", help="accept other bits on any machine")
+        if name == "write":
+            command.add_argument("families", nargs="*", metavar="FAMILY", help="only these; default: all")
         if name == "wrong":
             command.add_argument("flag", nargs="?", metavar="FLAG", help="name of the mistake")
             command.add_argument("outdir", nargs="?", type=Path, metavar="OUTDIR", help="folder for the outputs")

@@ -7,7 +7,7 @@ from endotsr.port.contract import all_operations
 from endotsr.port.judge.format import Manifest, read_struct
 from endotsr.port.judge.store import golden_folder
 from makers import registry
-from makers.files import rendered_files
+from makers.files import fresh_files, rendered_files
 from makers.generate import solve_these
 from makers.registry import FAMILIES, all_specs, all_wrong_ports, families
 from makers.wrong import wrong_ports
@@ -51,7 +51,7 @@ def test_what_is_published_keeps_its_place_and_what_is_new_follows():
     files = tuple(next(f for f in PUBLISHED.files if f.path == f"cases/{name}/case.json") for name in names)
     flags = {flag: PUBLISHED.flags[flag] for flag in ("upsampling_swapped", "mask_before_pyramid")}
     before = msgspec.structs.replace(PUBLISHED, files=files, flags=flags)
-    fresh = rendered_files(solved, all_wrong_ports(), "1.0.0", before)
+    fresh = rendered_files([fresh_files(one) for one in solved], all_wrong_ports(), "1.0.0", before)
     manifest = msgspec.json.decode(fresh["manifest.json"], type=Manifest)
     assert manifest.families == {"laplacian": ("tiny", "co_sited"), "motion": ("generic",)}
     assert list(manifest.flags)[:2] == list(flags) and set(manifest.flags) == set(all_wrong_ports())

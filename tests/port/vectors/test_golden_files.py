@@ -245,6 +245,30 @@ def test_regeneration_says_what_moved(copy):
     assert line.startswith("motion/generic/translation: ") and "e-0" in line and "tolerance" not in line
 
 
+def test_one_family_is_written_alone_and_other_bits_are_not_noise(copy):
+    """A value that is off by one bit keeps its bytes; a lost and a wrong one are made again; nothing else moves."""
+    before = {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()}
+    stored = copy / "cases/motion/generic/expected/translation.npy"
+    value = np.load(stored)
+    lost, wrong = stored.with_name("d_phi.npy"), stored.with_name("d_motion_coefficients.npy")
+    stored.write_bytes(npy_bytes(np.nextafter(value, np.inf)))
+    noisy = stored.read_bytes()
+    lost.unlink()
+    wrong.write_bytes(npy_bytes(1.001 * np.load(wrong)))
+    assert make.main(["write", "motion", "--golden", str(copy)]) == 1
+    after = {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()}
+    assert after.keys() == before.keys() and after[stored] == noisy
+    np.testing.assert_allclose(np.load(lost), np.load(FOLDER / lost.relative_to(copy)), rtol=1e-12)
+    np.testing.assert_allclose(np.load(wrong), np.load(FOLDER / wrong.relative_to(copy)), rtol=1e-12)
+    changed = {p.relative_to(copy).as_posix() for p in before if after[p] != before[p]}
+    case = "cases/motion/generic"
+    paths = ("case.json", "expected/translation.npy", "expected/d_phi.npy", "expected/d_motion_coefficients.npy")
+    assert changed <= {"manifest.json", *(f"{case}/{path}" for path in paths)}
+    read_golden(copy)  # checksums and all
+    with pytest.raises(SystemExit, match="'motoin' is not a family; use one of: adam, "):
+        make.main(["write", "motoin", "--golden", str(copy)])
+
+
 @pytest.mark.slow
 def test_writing_ends_with_exit_code_1(copy):
     (copy / "cases/motion/generic/expected/translation.npy").unlink()
