@@ -23,7 +23,7 @@ TYPE_CHECKING = False  # as in `typing`, whose import would be the heaviest part
 if TYPE_CHECKING:
     from typing import Any
 
-    from endotsr.api import LoadedSequence, Run, StopTraining, inspect, load_sequence, make_config, open_run, train
+    from endotsr.api import Run, StopTraining, inspect, load_sequence, make_config, open_run, train
     from endotsr.clips.sequences.sequence import Sequence
     from endotsr.config import Config
     from endotsr.errors import CalibrationError, InputError
@@ -37,7 +37,6 @@ __all__ = [
     "Camera",
     "Config",
     "InputError",
-    "LoadedSequence",
     "RenderOut",
     "Run",
     "Sequence",
@@ -55,7 +54,6 @@ _MODULES = {
     "Camera": "endotsr.method.splatting.camera",
     "Config": "endotsr.config",
     "InputError": "endotsr.errors",
-    "LoadedSequence": "endotsr.api",
     "RenderOut": "endotsr.method.splatting.render",
     "Run": "endotsr.api",
     "Sequence": "endotsr.clips.sequences.sequence",

@@ -19,7 +19,7 @@ names the argument and the allowed values.
 import shutil
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,7 +31,6 @@ from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.config import (
     PAPER,
     Config,
-    SequenceConfig,
     checked,
     config_from_dict,
     lengthened,
@@ -67,15 +66,6 @@ class StopTraining(Exception):
     """Raise it in `on_iteration` or `on_run` to end the training after this iteration; `train` returns the run."""
 
 
-@dataclass(frozen=True, eq=False)
-class LoadedSequence(Sequence):
-    """A sequence from `load_sequence`, with its source and settings for the record of a run."""
-
-    source: str = sources.IN_MEMORY  # folder, or `simulated`
-    settings: SequenceConfig = PAPER.sequence
-    simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
-
-
 def make_config(
     preset: str | None = None,
     *,
@@ -106,7 +96,7 @@ def load_sequence(
     *,
     simulator: Mapping[str, Any] | None = None,
     **settings: Any,
-) -> LoadedSequence:
+) -> Sequence:
     """The complete sequence in memory, checked.
 
     source      sequence folder, or the word "simulated"
@@ -124,8 +114,7 @@ def load_sequence(
     refuse_unknown_keys(wanted, SimulatorSettings, "simulator")
     shown = checked(wanted, SimulatorSettings, "simulator")
     sequence = sources.load_sequence(str(source), config, shown)
-    arrays = {entry.name: getattr(sequence, entry.name) for entry in fields(Sequence) if entry.init}
-    return LoadedSequence(**arrays, source=str(source), settings=config.sequence, simulator=shown)
+    return replace(sequence, source=str(source), settings=config.sequence, simulator=shown)
 
 
 def train(
@@ -142,7 +131,7 @@ def train(
 ) -> "Run":
     """Train on a sequence; returns the trained run. Bitwise equal to `endotsr train` with these settings.
 
-    sequence       from `load_sequence`, with its settings; or a `Sequence` of arrays
+    sequence       from `load_sequence`, which keeps its settings; or a `Sequence` made of arrays
     config         from `make_config`; iterations and sections are applied to it. Without it, the settings are
                    make_config(preset, iterations=iterations, **sections)
     on_iteration   called after every iteration with its log entry: iteration, frame, loss, terms of the loss,
@@ -169,15 +158,14 @@ def train(
         raise InputError(f"train: preset = {preset!r} with a config is not allowed; allowed: one of the two")
     else:
         config = _changed(config, iterations, sections)
-    loaded = isinstance(sequence, LoadedSequence)
-    source, simulator = (sequence.source, sequence.simulator) if loaded else (sources.IN_MEMORY, SimulatorSettings())
-    if loaded:
+    if sequence.settings is not None:
         config = msgspec.structs.replace(config, sequence=sequence.settings)
+    simulator = sequence.simulator if isinstance(sequence.simulator, SimulatorSettings) else SimulatorSettings()
     config = lengthened(config, len(sequence.train_index))
     config, found = _called_for(sequence, config, effects, sections, on_message)
     state = new_training(sequence, config)
     threads = use_threads(config.training.threads)
-    record = sources.start_record(["endotsr.train"], source, sequence, config, simulator, threads) | found
+    record = sources.start_record(["endotsr.train"], sequence.source, sequence, config, simulator, threads) | found
     seen = record_of(sequence)
     run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message, on_run)

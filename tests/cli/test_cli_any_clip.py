@@ -6,8 +6,8 @@ from tiny import SETTINGS, assert_refused
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.common import open_common
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.truth import read_truth
 from endotsr.config import SequenceConfig
 from film_reader import read_video
@@ -45,8 +45,8 @@ def test_the_raw_folder_is_in_the_published_layout(chain):
 
 def test_prepare_finds_cameras_pictures_masks_and_depth_of_the_scene(chain):
     said("simulate", *SCENE, "--out", chain / "clean")
-    clean = read_endonerf(chain / "clean", SequenceConfig(masks="gt_masks", depth_percentiles=(0.0, 100.0)))
-    clip = open_common(chain / "clip")
+    clean = read_sequence(chain / "clean", SequenceConfig(masks="gt_masks", depth_percentiles=(0.0, 100.0)))
+    clip = describe(chain / "clip")
     truth = read_truth(chain / "clean")
     assert clip.intrinsics and clip.poses and clip.masks and clip.depth
     camera = clean.cameras[0]

@@ -8,7 +8,7 @@ import pytest
 from tiny import assert_refused, written_folder
 
 from endotsr.cli.main import main
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import SequenceConfig
 from endotsr.results.evaluation.baselines import flow_interpolation
 from endotsr.training.runs.folder import open_run
@@ -44,7 +44,7 @@ def test_pictures_of_the_flow_baseline_equal_its_row(finished_run, flow_pictures
 
 def test_pictures_on_a_named_sequence(tmp_path, capsys):
     folder = written_folder(tmp_path)
-    sequence = read_endonerf(folder, SequenceConfig(scale=0.5))
+    sequence = read_sequence(folder, SequenceConfig(scale=0.5))
     pictures = tmp_path / "pictures"
     pictures.mkdir()
     for i in sequence.test_index:

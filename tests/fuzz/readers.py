@@ -73,10 +73,10 @@ def pose_seeds() -> list[bytes]:
 
 
 def read_poses(path: Path) -> object:
-    """As `read_endonerf` does."""
-    from endotsr.clips.sequences.poses import cameras_from_rows, read_pose_rows
+    """As the layout of EndoNeRF does."""
+    from endotsr.clips.sequences.poses import cameras_of_rows, read_pose_rows
 
-    return cameras_from_rows(read_pose_rows(path, 9), 48, 32, path, range(9))
+    return cameras_of_rows(read_pose_rows(path, 9), 48, 32, path)
 
 
 @cache

@@ -160,9 +160,9 @@ def real(folders: list[Path]) -> dict[str, Any]:
 
 
 def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
-    from endotsr.clips.sequences.endonerf import read_endonerf
+    from endotsr.clips.sequences.read import read_sequence
 
-    return read_endonerf(folder, msgspec.structs.replace(PAPER.sequence, scale=scale), PAPER.raster.near)
+    return read_sequence(folder, msgspec.structs.replace(PAPER.sequence, scale=scale), PAPER.raster.near)
 
 
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:

@@ -23,7 +23,7 @@ import numpy as np
 
 from endotsr.cli.main import main as endotsr
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.common import open_common
+from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.simulator.truth import read_truth
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
@@ -109,7 +109,7 @@ def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> d
 
     wanted    frame -> reference depth, (H, W) in mm; 0 = not compared
     """
-    clip = open_common(prepared)
+    clip = describe(prepared)
     errors, covered = [], []
     assert clip.depth is not None and clip.masks is not None
     for i in range(clip.count):

@@ -9,7 +9,7 @@ import numpy as np
 
 from endotsr.clips.sequences.checks.check import SAMPLED
 from endotsr.clips.sequences.checks.flips import FLIPS, shading_finding, shading_fit
-from endotsr.clips.sequences.layouts import read_sequence
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import PAPER
 from endotsr.results.report.tables import markdown
 from pages.store.marks import write_marked

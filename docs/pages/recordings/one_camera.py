@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.common import open_common
+from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.simulator.truth import read_truth
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
@@ -108,10 +108,10 @@ def _forget_depth(clip: Path) -> None:
 
 def _interpolate(clip: Path) -> None:
     """Planes between the points, as computed by `endotsr prepare` from a reconstruction."""
-    from endotsr.clips.sequences.clip import CameraPose
+    from endotsr.clips.sequences.camera import CameraPose
     from endotsr.clips.sequences.points import depth_from_points
 
-    opened = open_common(clip)
+    opened = describe(clip)
     intrinsics = opened.intrinsics
     assert opened.depth is not None and intrinsics is not None
     for i, file in enumerate(sorted((clip / "depth").iterdir())):
@@ -138,7 +138,7 @@ def measured(root: Path, scene: str, way: str) -> dict[str, float]:
 
 def _depth_error(clip: Path, clean: Path) -> dict[str, float]:
     """Median relative error of the prior depth on tissue, after one scale for the clip if its unit is arbitrary."""
-    opened, truth = open_common(clip), read_truth(clean)
+    opened, truth = describe(clip), read_truth(clean)
     assert opened.depth is not None and opened.masks is not None
     ratios = []
     for i in range(opened.count):

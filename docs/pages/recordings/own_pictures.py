@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.common import open_common
+from endotsr.clips.sequences.layouts import describe
 from endotsr.method.splatting.camera import Camera
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
@@ -115,7 +115,7 @@ def about_input(clips: dict[str, Path], way: str) -> dict[str, float]:
     """Pictures against the lossless ones, and depth against the given one on tissue."""
     if way == GIVEN:
         return {}
-    given = open_common(clips[GIVEN]).depth
+    given = describe(clips[GIVEN]).depth
     assert given is not None
     loss = video_psnr(clips[GIVEN], clips[way])
     return depth_error(clips[way], given) | ({"pictures": loss} if np.isfinite(loss) else {})

@@ -13,7 +13,7 @@ from matplotlib import colormaps
 from endotsr.cli.main import main as endotsr
 from endotsr.clips.opencv import read_png
 from endotsr.clips.opencv.pictures import write_jpeg
-from endotsr.clips.sequences.common import open_common
+from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.propose_masks import overlay
 from endotsr.clips.sequences.video_file import video_pictures
 
@@ -44,7 +44,7 @@ def recorded(raw: Path) -> Picture:
 
 def prepared(clip: Path) -> Picture:
     """Rows of picture, mask and depth."""
-    opened = open_common(clip)
+    opened = describe(clip)
     assert opened.masks is not None and opened.depth is not None
     rows = []
     for i, pair in zip(SHOWN, opened.pictures(list(SHOWN))):

@@ -93,13 +93,13 @@ def _refuse_contradictions(options: DepthOptions) -> None:
 
 def _made(options: DepthOptions) -> "DepthReport":
     """Compute or read the depth and write it."""
-    from endotsr.clips.sequences.common import list_contents
+    from endotsr.clips.sequences.layouts.common import describe_prepared
     from endotsr.clips.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
     from endotsr.clips.sequences.relative_depth import flat_depth
 
     folder, given = options.sequence, options.given
     if options.flat:
-        made = flat_depth(list_contents(folder))
+        made = flat_depth(describe_prepared(folder))
     elif given is not None and options.kind == "relative":
         farthest, trusted = options.farthest_over_nearest, options.trust_depth
         made = from_relative(folder, given, options.align, farthest, trusted, options.replace)

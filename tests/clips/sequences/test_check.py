@@ -18,7 +18,7 @@ from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.cost import Standing, estimated_cost, work_left
 from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
 from endotsr.clips.sequences.frame_store import FrameStore
-from endotsr.clips.sequences.layouts import read_sequence
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate

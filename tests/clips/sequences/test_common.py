@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.pictures import write_jpeg
-from endotsr.clips.sequences.common import open_common, read_common
-from endotsr.clips.sequences.layouts import layout_of, layouts
+from endotsr.clips.sequences.layouts import describe, layout_of, layouts
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.record import checked_record, record_of
 from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.clips.simulator.settings import SimulatorSettings
@@ -33,7 +33,7 @@ def test_the_file_is_read_as_it_was_written(tmp_path):
 
 def test_pictures_masks_depth_and_camera(tmp_path):
     written(tmp_path)
-    sequence = read_common(tmp_path, WHOLE, 0.2)
+    sequence = read_sequence(tmp_path, WHOLE, 0.2)
     for i in range(FRAMES):
         np.testing.assert_array_equal(sequence.images[i], read_png(tmp_path / f"images/{i:06d}.png").transpose(2, 0, 1))
         np.testing.assert_array_equal(sequence.masks[i], read_png(tmp_path / f"masks/{i:06d}.png") == 0)
@@ -67,7 +67,7 @@ def test_the_seconds_of_a_recording_are_kept(stated, frames, seconds, tmp_path):
     """From time 0 to time 1: frame i shows the second `duration` times its time."""
     written(tmp_path, **stated)
     config = msgspec.structs.replace(WHOLE, frames=frames)
-    record = record_of(read_common(tmp_path, config, 0.2))
+    record = record_of(read_sequence(tmp_path, config, 0.2))
     assert record.duration == pytest.approx(seconds)
     assert checked_record(msgspec.to_builtins(record), "a") == record
     if "times" in stated and seconds:
@@ -76,31 +76,31 @@ def test_the_seconds_of_a_recording_are_kept(stated, frames, seconds, tmp_path):
 
 def test_a_record_from_before_seconds_were_kept_is_read(tmp_path):
     written(tmp_path, frame_rate=25.0)
-    data = msgspec.to_builtins(record_of(read_common(tmp_path, WHOLE, 0.2)))
+    data = msgspec.to_builtins(record_of(read_sequence(tmp_path, WHOLE, 0.2)))
     del data["duration"]
     assert checked_record(data, "a").duration == 0
 
 
 def test_without_masks_every_pixel_is_tissue(tmp_path):
     written(tmp_path, masks=False)
-    sequence = read_common(tmp_path, WHOLE, 0.2)
+    sequence = read_sequence(tmp_path, WHOLE, 0.2)
     assert sequence.masks.all() and any("no masks" in note for note in sequence.notes)
 
 
 def test_masks_may_be_left_out(tmp_path):
     written(tmp_path)
-    assert read_common(tmp_path, SequenceConfig(masks="none"), 0.2).masks.all()
+    assert read_sequence(tmp_path, SequenceConfig(masks="none"), 0.2).masks.all()
 
 
 def test_jpeg_pictures(tmp_path):
     written(tmp_path)
-    before = read_common(tmp_path, WHOLE, 0.2).images.astype(int)
+    before = read_sequence(tmp_path, WHOLE, 0.2).images.astype(int)
     smooth = np.full((HEIGHT, WIDTH, 3), (180, 70, 60), np.uint8)
     for i, file in enumerate(sorted((tmp_path / "images").iterdir())):
         smooth[..., 0] = 180 - 2 * i + np.arange(WIDTH)  # a frame of one colour shows nothing
         write_jpeg(file.with_suffix(".jpg"), smooth)
         file.unlink()
-    after = read_common(tmp_path, SequenceConfig(masks="none"), 0.2).images.astype(int)
+    after = read_sequence(tmp_path, SequenceConfig(masks="none"), 0.2).images.astype(int)
     expected = np.broadcast_to(smooth.transpose(2, 0, 1), after.shape).copy()
     expected[:, 0] += 2 * (len(after) - 1 - np.arange(len(after), dtype=np.uint8))[:, None, None]
     assert after.shape == before.shape and np.abs(after - expected).max() <= 3
@@ -109,13 +109,13 @@ def test_jpeg_pictures(tmp_path):
 @pytest.mark.parametrize("ending", [".npy", ".tiff", ".pfm"])
 def test_depth_in_other_files(tmp_path, ending):
     written(tmp_path)
-    before = read_common(tmp_path, WHOLE, 0.2).depth
+    before = read_sequence(tmp_path, WHOLE, 0.2).depth
     for i, file in enumerate(sorted((tmp_path / "depth").iterdir())):
         plane = (before[i].astype(np.float64) / 0.01).astype(np.float32)
         plane[0, 0], plane[0, 1] = np.nan, -5.0
         write_plane(file.with_suffix(ending), plane)
         file.unlink()
-    after = read_common(tmp_path, WHOLE, 0.2).depth
+    after = read_sequence(tmp_path, WHOLE, 0.2).depth
     assert not after[:, 0, :2].any()  # not a number and negative: no depth
     np.testing.assert_allclose(after[:, 1:], before[:, 1:], rtol=1e-6)
 
@@ -148,7 +148,7 @@ def test_every_unit_becomes_millimetres(tmp_path, unit, factor):
     (tmp_path / "b" / FILE_NAME).write_text(data.replace('[depth]\nfolder = "depth"\nunit = "mm"',
                                                          f'[depth]\nfolder = "depth"\nunit = "{unit}"'))  # fmt: skip
     assert other.unit == unit
-    a, b = (read_common(tmp_path / name, WHOLE, 0.2) for name in "ab")
+    a, b = (read_sequence(tmp_path / name, WHOLE, 0.2) for name in "ab")
     np.testing.assert_allclose(a.depth, b.depth, rtol=1e-6)
     for first, second in zip(a.cameras, b.cameras):
         np.testing.assert_allclose(first.translation, second.translation, rtol=1e-12)
@@ -174,14 +174,14 @@ def test_directions_and_axes_say_the_same(tmp_path):
             **{n: getattr(found, n) for n in ("format", "frames", "camera", "masks", "depth")}, poses=entry
         )
         write_sequence_file(data, tmp_path)
-        camera = read_common(tmp_path, WHOLE, 0.2).cameras[0]
+        camera = read_sequence(tmp_path, WHOLE, 0.2).cameras[0]
         np.testing.assert_allclose(camera.rotation, rotation, atol=1e-14)
         np.testing.assert_allclose(camera_centre(camera), centre, atol=1e-13)
 
 
 def test_a_recording_of_the_folder_gives_the_same_frames(tmp_path):
     written(tmp_path, right=True, poses=moving())
-    sequence, clip = read_common(tmp_path, WHOLE, 0.2), open_common(tmp_path)
+    sequence, clip = read_sequence(tmp_path, WHOLE, 0.2), describe(tmp_path)
     pairs = list(clip.pictures([1, 3]))
     for i, pair in zip((1, 3), pairs, strict=True):
         np.testing.assert_array_equal(pair.left.transpose(2, 0, 1), sequence.images[i])
@@ -233,7 +233,7 @@ def test_a_wrong_folder_has_one_line(tmp_path, case):
     written(tmp_path, poses=moving())
     damage(tmp_path)
     with pytest.raises(InputError, match=re.compile(message)) as caught:
-        read_common(tmp_path, WHOLE, 0.2)
+        read_sequence(tmp_path, WHOLE, 0.2)
     assert str(tmp_path) in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -241,9 +241,9 @@ def test_without_depth_the_remedy_is_named(tmp_path):
     written(tmp_path / "stereo", depth=False, right=True)
     written(tmp_path / "mono", depth=False)
     with pytest.raises(InputError, match="`endotsr depth` makes it"):
-        read_common(tmp_path / "stereo", WHOLE, 0.2)
+        read_sequence(tmp_path / "stereo", WHOLE, 0.2)
     with pytest.raises(InputError, match=r"no depth.*one camera: endotsr depth --given FILES --kind relative"):
-        read_common(tmp_path / "mono", WHOLE, 0.2)
+        read_sequence(tmp_path / "mono", WHOLE, 0.2)
 
 
 def inverted(folder):
@@ -256,7 +256,7 @@ def inverted(folder):
 def test_the_remedy_for_inverted_masks_works(tmp_path, stated, capsys):
     """What the message says to set makes the same folder readable, in `check` and in the training."""
     written(tmp_path, masks=True)
-    right = read_common(tmp_path, WHOLE, 0.2).masks
+    right = read_sequence(tmp_path, WHOLE, 0.2).masks
     if stated == "white":
         inverted(tmp_path)
     else:
@@ -272,8 +272,8 @@ def test_the_remedy_for_inverted_masks_works(tmp_path, stated, capsys):
         (tmp_path / FILE_NAME).write_text(text)
         config, words = SequenceConfig(), []
     with pytest.raises(InputError, match="other polarity") if stated == "white" else contextlib.nullcontext():
-        read_common(tmp_path, SequenceConfig(), 0.2)
+        read_sequence(tmp_path, SequenceConfig(), 0.2)
     assert main(["check", str(tmp_path), *words]) == 0
-    sequence = read_common(tmp_path, config, 0.2)
+    sequence = read_sequence(tmp_path, config, 0.2)
     np.testing.assert_array_equal(sequence.masks, right)
     assert any("overrides the value" in note for note in sequence.notes) == (stated == "white")

@@ -7,10 +7,12 @@ from made_videos import CAMERA, UNEVEN, picture, pictures, write
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.clip import Clip, Intrinsics, PicturePair, StereoCalibration
-from endotsr.clips.sequences.common import open_common, read_common
+from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
 from endotsr.clips.sequences.editing import chosen_frames, cropped, without
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
 from endotsr.config import PAPER
 from endotsr.errors import InputError
@@ -64,8 +66,9 @@ def test_a_crop_moves_the_principal_point_of_every_camera():
     intrinsics = Intrinsics(30.0, 31.0, 16.0, 12.0, 32, 24)
     calibration = StereoCalibration(intrinsics, intrinsics._replace(cx=15.0), np.eye(3), np.array([-4.0, 0, 0]))
     found = cropped(recording(intrinsics=intrinsics, calibration=calibration,
-                              depth=lambda i: np.arange(768, dtype=np.float32).reshape(24, 32),
-                              masks=lambda i: None if i else np.ones((24, 32), bool)), (5, 3, 20, 12))  # fmt: skip
+                              depth=Depth(lambda i: np.arange(768, dtype=np.float32).reshape(24, 32)),
+                              masks=Masks(lambda i: None if i else np.ones((24, 32), bool))),
+                    (5, 3, 20, 12))  # fmt: skip
     assert found.intrinsics == Intrinsics(30.0, 31.0, 11.0, 9.0, 20, 12) and found.calibration.right.cx == 10.0
     pair = next(found.pictures([7]))
     assert pair.left[0, 0].tolist() == [5, 3, 7] and pair.left[-1, -1].tolist() == [24, 14, 7]
@@ -84,7 +87,7 @@ def test_a_cropped_clip_sees_the_same_world(tmp_path):
     written(tmp_path / "clip", poses=moving())
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--crop", "4", "3", "20", "18"]
     assert main(words) == 0
-    whole, part = open_common(tmp_path / "clip"), open_common(tmp_path / "o")
+    whole, part = describe(tmp_path / "clip"), describe(tmp_path / "o")
     assert (part.intrinsics.cx, part.intrinsics.cy) == (whole.intrinsics.cx - 4, whole.intrinsics.cy - 3)
     np.testing.assert_allclose(part.depth(2), whole.depth(2)[3:21, 4:24], atol=0.01)
     assert (part.masks(2) == whole.masks(2)[3:21, 4:24]).all()
@@ -115,7 +118,7 @@ def test_masks_are_united(tmp_path, capsys):
         write_png(tmp_path / "logo" / f"{i:03d}.png", logo)
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--unite-masks"]
     assert main([*words, str(tmp_path / "border.png"), str(tmp_path / "logo")]) == 0
-    before, after = open_common(tmp_path / "clip"), open_common(tmp_path / "o")
+    before, after = describe(tmp_path / "clip"), describe(tmp_path / "o")
     for i in range(FRAMES):
         expected = before.masks(i).copy()
         expected[-3:] = expected[15, i] = False
@@ -152,12 +155,12 @@ def test_a_fault_in_one_frame_is_mended_by_dropping_it_as_check_says(what, tmp_p
     written(tmp_path / "clip", poses=moving())
     broken(tmp_path / "clip", what)
     with pytest.raises(InputError):
-        read_common(tmp_path / "clip", PAPER.sequence, 0.2)
+        read_sequence(tmp_path / "clip", PAPER.sequence, 0.2)
     found = [f for f in check_sequence(tmp_path / "clip", PAPER).findings if f.level == "refusal"]
     assert found and all("--replace --drop FRAME" in f.remedy for f in found)
     clip = str(tmp_path / "clip")
     assert main(["prepare", clip, "--out", clip, "--replace", "--drop", "3"]) == 0
-    assert len(read_common(tmp_path / "clip", PAPER.sequence, 0.2).images) == FRAMES - 1
+    assert len(read_sequence(tmp_path / "clip", PAPER.sequence, 0.2).images) == FRAMES - 1
 
 
 def test_what_is_assumed_of_the_depth_survives_an_edit(tmp_path):

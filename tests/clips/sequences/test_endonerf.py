@@ -11,8 +11,8 @@ import pytest
 from data_folder import data_folder
 from endonerf_writer import write_endonerf
 from endotsr.clips.sequences.depth_files import clip_depth
-from endotsr.clips.sequences.endonerf import input_hashes, read_endonerf
 from endotsr.clips.sequences.files import check_pairing
+from endotsr.clips.sequences.read import file_hashes, read_sequence
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from synthetic_folder import FOCAL, identity_rows, write_synthetic_folder
@@ -34,7 +34,7 @@ def test_reads_exactly_what_was_written(tmp_path, excluded, mask_folder, white, 
         tmp_path, excluded=excluded, mask_folder=mask_folder, white=white, name=name, pose_file=pose_file
     )
     config = SequenceConfig(masks=mask_folder, excluded_value=excluded, depth_percentiles=(0.0, 100.0))
-    sequence = read_endonerf(tmp_path, config)
+    sequence = read_sequence(tmp_path, config)
     np.testing.assert_array_equal(sequence.images, written.images)  # also: 10 follows 9 although it sorts before
     np.testing.assert_array_equal(sequence.masks, written.tissue)
     np.testing.assert_array_equal(sequence.depth, written.depth)
@@ -48,7 +48,7 @@ def test_reads_exactly_what_was_written(tmp_path, excluded, mask_folder, white, 
 
 def test_frame_converts_to_the_precision_asked_for(tmp_path):
     written = write_synthetic_folder(tmp_path)
-    sequence = read_endonerf(tmp_path, EVERYTHING)
+    sequence = read_sequence(tmp_path, EVERYTHING)
     for dtype in (np.float32, np.float64):
         frame = sequence.frame(2, dtype)
         assert frame.image.dtype == dtype and frame.depth.dtype == dtype and frame.time == 0.4
@@ -72,7 +72,7 @@ def test_a_known_point_lands_on_its_pixel_for_every_pose(tmp_path):
         world = position + rotation @ [right, up, -ahead]
         truth.append((world, 16 + FOCAL * right / ahead, 12 - FOCAL * up / ahead))
     write_synthetic_folder(tmp_path, rows=rows)
-    sequence = read_endonerf(tmp_path, EVERYTHING)
+    sequence = read_sequence(tmp_path, EVERYTHING)
     assert not sequence.static_camera
     for camera, (world, column, row) in zip(sequence.cameras, truth):
         x, y, z = camera.rotation @ world + camera.translation
@@ -84,9 +84,9 @@ def test_write_then_read_returns_the_same_sequence(tmp_path):
     rows = identity_rows(5, 32, 24)
     rows[3, 3] = 2.5  # the camera moves
     write_synthetic_folder(tmp_path / "a", rows=rows)
-    first = read_endonerf(tmp_path / "a", EVERYTHING)
+    first = read_sequence(tmp_path / "a", EVERYTHING)
     write_endonerf(first, tmp_path / "b")
-    second = read_endonerf(tmp_path / "b", EVERYTHING)
+    second = read_sequence(tmp_path / "b", EVERYTHING)
     for name in ("images", "masks", "depth", "times"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     for a, b in zip(first.cameras, second.cameras):
@@ -99,7 +99,7 @@ def test_write_then_read_returns_the_same_sequence(tmp_path):
 
 def test_write_refuses_a_camera_the_format_cannot_hold(tmp_path):
     write_synthetic_folder(tmp_path / "a")
-    sequence = read_endonerf(tmp_path / "a", EVERYTHING)
+    sequence = read_sequence(tmp_path / "a", EVERYTHING)
     sequence.cameras[:] = [sequence.cameras[0]._replace(cx=15.0)] * 5
     with pytest.raises(InputError, match=r"frame 0.*central principal point.*cx 15"):
         write_endonerf(sequence, tmp_path / "b")
@@ -107,7 +107,7 @@ def test_write_refuses_a_camera_the_format_cannot_hold(tmp_path):
 
 def test_frame_range_comes_before_split_and_time(tmp_path):
     written = write_synthetic_folder(tmp_path, frames=12)
-    sequence = read_endonerf(tmp_path, SequenceConfig(frames="1:12:2", depth_percentiles=(0.0, 100.0)))
+    sequence = read_sequence(tmp_path, SequenceConfig(frames="1:12:2", depth_percentiles=(0.0, 100.0)))
     np.testing.assert_array_equal(sequence.images, written.images[1:12:2])
     np.testing.assert_array_equal(sequence.times, np.arange(6) / 6)
     np.testing.assert_array_equal(sequence.test_index, [1])
@@ -128,7 +128,7 @@ def test_depth_is_clipped_to_percentiles_of_its_non_zero_values():
 
 def test_scale_keeps_only_what_all_parents_agree_on(tmp_path):
     written = write_synthetic_folder(tmp_path, width=48, height=40)
-    sequence = read_endonerf(tmp_path, SequenceConfig(scale=0.5, depth_percentiles=(0.0, 100.0)))
+    sequence = read_sequence(tmp_path, SequenceConfig(scale=0.5, depth_percentiles=(0.0, 100.0)))
     parents = lambda a: a.reshape(*a.shape[:-2], 20, 2, 24, 2).swapaxes(-3, -2).reshape(*a.shape[:-2], 20, 24, 4)
     np.testing.assert_array_equal(sequence.masks, parents(written.tissue).all(axis=-1))
     count = np.maximum((parents(written.depth) > 0).sum(axis=-1), 1)
@@ -148,9 +148,9 @@ def test_hard_E1_wrong_polarity_is_recognised(tmp_path, mask_folder, depth_behin
     with pytest.raises(
         InputError, match=rf"{mask_folder}: .*other polarity: set --sequence.excluded-value white {toml}"
     ):
-        read_endonerf(tmp_path, wrong)
+        read_sequence(tmp_path, wrong)
     forced = SequenceConfig(masks=mask_folder, excluded_value="black", allow_tissue_fraction=True)
-    assert read_endonerf(tmp_path, forced).tissue_fraction < 0.5
+    assert read_sequence(tmp_path, forced).tissue_fraction < 0.5
 
 
 def test_hard_E1_implausible_tissue_share_is_refused_unless_allowed(tmp_path):
@@ -162,8 +162,8 @@ def test_hard_E1_implausible_tissue_share_is_refused_unless_allowed(tmp_path):
             InputError,
             match=rf"masks: {share} of the pixels count as tissue; .*--sequence.allow-tissue-fraction .*_fraction",
         ):
-            read_endonerf(tmp_path, SequenceConfig())
-        sequence = read_endonerf(tmp_path, SequenceConfig(allow_tissue_fraction=True))
+            read_sequence(tmp_path, SequenceConfig())
+        sequence = read_sequence(tmp_path, SequenceConfig(allow_tissue_fraction=True))
         assert sequence.tissue_fraction == (value == 0)
 
 
@@ -173,12 +173,12 @@ def test_hard_E2_soft_masks_are_thresholded_and_noted_or_refused(tmp_path):
     mask = np.where(written.tissue[3], 0, 255).astype(np.uint8)
     mask[20, 5:9] = [1, 127, 128, 254]
     cv2.imwrite(str(file), mask)
-    sequence = read_endonerf(tmp_path, SequenceConfig())
+    sequence = read_sequence(tmp_path, SequenceConfig())
     np.testing.assert_array_equal(sequence.masks[3, 20, 4:10], [True, True, True, False, False, True])
     assert any("4 mask pixels are between 0 and 255" in note for note in sequence.notes)
     cv2.imwrite(str(file), np.where(written.tissue[3], 0, 1).astype(np.uint8))  # one file on another scale
     with pytest.raises(InputError, match=r"frame-000003.mask.png: .* neither 0 nor 255"):
-        read_endonerf(tmp_path, SequenceConfig())
+        read_sequence(tmp_path, SequenceConfig())
 
 
 def _rewrite_rows(change):
@@ -303,17 +303,17 @@ def test_bad_input_names_file_frame_and_reason(tmp_path, case):
     write_synthetic_folder(tmp_path)
     damage(tmp_path)
     with pytest.raises(InputError, match=message) as caught:
-        read_endonerf(tmp_path, SequenceConfig(**settings))
+        read_sequence(tmp_path, SequenceConfig(**settings))
     assert "\n" not in str(caught.value) and str(tmp_path) in str(caught.value)
 
 
 def test_hard_E3_time_stamps_in_file_names_order_and_pair_the_frames(tmp_path):
     stamp = lambda i, kind: f"2021-03-04 12_{59 + i // 2 - 1}_{(i * 30) % 60:02d} {kind}.png"
     written = write_synthetic_folder(tmp_path, name=stamp)
-    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).images, written.images)
+    np.testing.assert_array_equal(read_sequence(tmp_path, EVERYTHING).images, written.images)
     (tmp_path / "masks" / stamp(4, "mask")).rename(tmp_path / "masks" / stamp(5, "mask"))
     with pytest.raises(InputError, match=r"masks: has no file for frame 60-0 "):
-        read_endonerf(tmp_path, EVERYTHING)
+        read_sequence(tmp_path, EVERYTHING)
 
 
 NUMBERED = lambda i, kind: f"frame{i + 1}.png"
@@ -355,7 +355,7 @@ def test_hard_E3_a_name_out_of_pattern_never_shifts_the_others(tmp_path, name, o
     if old is not None:
         (tmp_path / old).unlink()
     with pytest.raises(InputError, match=message):
-        read_endonerf(tmp_path, EVERYTHING)
+        read_sequence(tmp_path, EVERYTHING)
 
 
 def test_hard_E3_one_name_in_two_spellings_does_not_pair():
@@ -367,39 +367,39 @@ def test_hard_E3_one_name_in_two_spellings_does_not_pair():
 @pytest.mark.parametrize("where", ["images", "masks", "depth"])
 def test_a_file_name_that_is_not_utf8_is_named(tmp_path, where):
     written = write_synthetic_folder(tmp_path, name=NUMBERED)
-    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).images, written.images)
+    np.testing.assert_array_equal(read_sequence(tmp_path, EVERYTHING).images, written.images)
     file = tmp_path / where / "frame3.png"
     try:
         file.rename(tmp_path / where / os.fsdecode(b"caf\xe9-frame3.png"))
     except (OSError, UnicodeDecodeError):
         pytest.skip("this file system takes UTF-8 names only")
     with pytest.raises(InputError, match=rf"{where}/caf\\xe9-frame3.png: the name is not UTF-8; allowed") as caught:
-        input_hashes(tmp_path, EVERYTHING)
+        file_hashes(tmp_path, EVERYTHING)
     str(caught.value).encode("utf-8")
 
 
 @pytest.mark.parametrize("name", [NUMBERED, LETTERS, VERSIONED])
 def test_hard_E3_names_in_one_pattern_pair(tmp_path, name):
     written = write_synthetic_folder(tmp_path, frames=10, width=40, name=name)
-    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).masks, written.tissue)
+    np.testing.assert_array_equal(read_sequence(tmp_path, EVERYTHING).masks, written.tissue)
 
 
 @pytest.mark.parametrize("percentiles", [(99.0, 3.0), (-1.0, 99.0), (1.0, 100.5), (float("nan"), 99.0)])
 def test_bad_percentiles_are_named(tmp_path, percentiles):
     write_synthetic_folder(tmp_path)
     with pytest.raises(InputError, match="depth_percentiles"):
-        read_endonerf(tmp_path, SequenceConfig(depth_percentiles=percentiles))
+        read_sequence(tmp_path, SequenceConfig(depth_percentiles=percentiles))
 
 
 def test_missing_sequence_folder(tmp_path):
     with pytest.raises(InputError, match=r"nowhere: sequence folder not found"):
-        read_endonerf(tmp_path / "nowhere", SequenceConfig())
+        read_sequence(tmp_path / "nowhere", SequenceConfig())
 
 
 def test_a_file_in_place_of_the_sequence_folder(tmp_path):
     (tmp_path / "clip.mp4").write_bytes(b"")
-    with pytest.raises(InputError, match=r"clip.mp4: is a file; allowed: a folder with images/, depth/, masks/"):
-        read_endonerf(tmp_path / "clip.mp4", SequenceConfig())
+    with pytest.raises(InputError, match=r"clip.mp4: a video file; `endotsr prepare"):
+        read_sequence(tmp_path / "clip.mp4", SequenceConfig())
 
 
 @pytest.mark.parametrize("content", [b"1 0 0 0 24\n", b"", b"PK\x03\x04zip", None])
@@ -410,23 +410,23 @@ def test_a_pose_file_that_is_no_array_gets_no_advice_on_pickles(tmp_path, conten
     else:
         (tmp_path / "poses_bounds.npy").write_bytes(content)
     with pytest.raises(InputError, match=r"poses_bounds.npy: not a plain .* an .npy file of numbers") as caught:
-        read_endonerf(tmp_path, SequenceConfig())
+        read_sequence(tmp_path, SequenceConfig())
     assert "pickle" not in str(caught.value)
 
 
 def test_all_depth_in_front_of_the_near_plane(tmp_path):
     write_synthetic_folder(tmp_path)
     with pytest.raises(InputError, match=r"largest depth is 60, in front of the near plane at 80"):
-        read_endonerf(tmp_path, EVERYTHING, near=80.0)
-    assert any("in front of the near plane" in note for note in read_endonerf(tmp_path, EVERYTHING, near=50.0).notes)
+        read_sequence(tmp_path, EVERYTHING, near=80.0)
+    assert any("in front of the near plane" in note for note in read_sequence(tmp_path, EVERYTHING, near=50.0).notes)
 
 
 def test_input_hashes_cover_every_file_that_is_read_and_notice_a_change(tmp_path):
     write_synthetic_folder(tmp_path)
-    hashes = input_hashes(tmp_path, SequenceConfig())
+    hashes = file_hashes(tmp_path, SequenceConfig())
     assert len(hashes) == 3 * 5 + 1 and "poses_bounds.npy" in hashes
     _flip_byte(MASK)(tmp_path)
-    after = input_hashes(tmp_path, SequenceConfig())
+    after = file_hashes(tmp_path, SequenceConfig())
     assert [name for name in hashes if hashes[name] != after[name]] == [MASK]
 
 
@@ -435,7 +435,7 @@ def test_input_hashes_cover_every_file_that_is_read_and_notice_a_change(tmp_path
 def test_real_sequence(masks, share):
     folder = data_folder("endonerf_pulling")
     start = time.process_time()
-    sequence = read_endonerf(folder, SequenceConfig(masks=masks))
+    sequence = read_sequence(folder, SequenceConfig(masks=masks))
     assert time.process_time() - start < 3.0
     assert sequence.images.shape == (63, 3, 512, 640)
     assert (len(sequence.train_index), len(sequence.test_index)) == (55, 8)
@@ -444,4 +444,4 @@ def test_real_sequence(masks, share):
     assert (sequence.cameras[0].cx, sequence.cameras[0].cy) == (320, 256)
     assert len(sequence.notes) == 2
     with pytest.raises(InputError, match="other polarity"):
-        read_endonerf(folder, SequenceConfig(masks=masks, excluded_value="black", frames="0:12"))
+        read_sequence(folder, SequenceConfig(masks=masks, excluded_value="black", frames="0:12"))

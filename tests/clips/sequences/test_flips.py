@@ -11,7 +11,7 @@ from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.flips import FLIPS, shading_finding, shading_fit, stereo_finding
-from endotsr.clips.sequences.layouts import read_sequence
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, SequenceConfig

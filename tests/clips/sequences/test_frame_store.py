@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from endonerf_writer import write_endonerf
-from endotsr.clips.sequences.endonerf import read_endonerf
 from endotsr.clips.sequences.frame_store import FrameStore
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import DEMO, SequenceConfig
@@ -33,8 +33,8 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("masks", ["masks", "none"])
 def test_a_clip_in_a_file_is_the_clip_in_memory(folder, scale, masks, monkeypatch, tmp_path):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    here = read_endonerf(folder, SequenceConfig(scale=scale, masks=masks))
-    there = read_endonerf(folder, SequenceConfig(scale=scale, masks=masks, memory=TINY))
+    here = read_sequence(folder, SequenceConfig(scale=scale, masks=masks))
+    there = read_sequence(folder, SequenceConfig(scale=scale, masks=masks, memory=TINY))
     for name in ("images", "masks", "depth"):
         np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
     assert isinstance(there.images.base, np.memmap) and not isinstance(here.images.base, np.memmap)
@@ -46,7 +46,7 @@ def test_a_clip_in_a_file_is_the_clip_in_memory(folder, scale, masks, monkeypatc
 def trained(folder, memory, steps=24):
     training = msgspec.structs.replace(DEMO.training, iterations=steps)
     config = msgspec.structs.replace(DEMO, sequence=SequenceConfig(memory=memory), training=training)
-    sequence = read_endonerf(folder, config.sequence)
+    sequence = read_sequence(folder, config.sequence)
     state, constants = new_training(sequence, config), training_constants(sequence, config)
     log = [training_step(state, constants) for _ in range(steps)]
     return arrays(state.gaussians), log, constants

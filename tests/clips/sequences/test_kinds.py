@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from endotsr.clips.sequences import checks
+from endotsr.clips import sequences
 from endotsr.clips.sequences.checks.kinds import KINDS, finding, worst_first
 
-SOURCES = [ast.parse(path.read_text(encoding="utf-8")) for path in Path(checks.__path__[0]).glob("*.py")]
+SOURCES = [ast.parse(path.read_text(encoding="utf-8")) for path in Path(sequences.__path__[0]).rglob("*.py")]
 GUIDE = Path(__file__).parents[3] / "docs" / "guides" / "prepare.md"
 
 

@@ -10,7 +10,7 @@ from PIL import Image
 from endonerf_writer import write_endonerf
 from endotsr.clips.opencv.pictures import other_profile, read_picture
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, SequenceConfig
@@ -149,13 +149,13 @@ def test_every_folder_of_pictures_takes_them(ending, tmp_path):
     """Pictures and masks of a clip, its check, and the renders of another program."""
     clip = simulate(SimulatorSettings(width=64, height=48, frames=9)).sequence
     write_endonerf(clip, tmp_path / "clip")
-    expected = read_endonerf(tmp_path / "clip", SequenceConfig())
+    expected = read_sequence(tmp_path / "clip", SequenceConfig())
     for file in [*(tmp_path / "clip/images").iterdir(), *(tmp_path / "clip/masks").iterdir()]:
         written(file.parent, saved(Image.open(file), ending, **LOSSLESS[ending]), ending).rename(
             file.with_suffix(f".{ending}")
         )
         file.unlink()
-    found = read_endonerf(tmp_path / "clip", SequenceConfig())
+    found = read_sequence(tmp_path / "clip", SequenceConfig())
     np.testing.assert_array_equal(found.images, expected.images)
     np.testing.assert_array_equal(found.masks, expected.masks)
     assert check_sequence(tmp_path / "clip", PAPER).findings == []

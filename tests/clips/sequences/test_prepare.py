@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.stereo import rectification_maps
-from endotsr.clips.sequences.clip import intrinsics_of_matrix
-from endotsr.clips.sequences.common import open_common, read_common
+from endotsr.clips.sequences.camera import intrinsics_of_matrix
 from endotsr.clips.sequences.depth_files import step_of_depth
-from endotsr.clips.sequences.layouts import describe, layout_of, read_sequence
+from endotsr.clips.sequences.layouts import describe, layout_of
 from endotsr.clips.sequences.prepare import PrepareSettings, prepare
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.straighten import straightener
@@ -40,7 +40,7 @@ def test_a_folder_of_pictures_keeps_every_pixel(tmp_path):
     assert found.frames == 4 and found.depth is None and found.masks is None
     for i in range(4):  # 8, 9, 10, 11: ordered by number
         np.testing.assert_array_equal(read_png(tmp_path / f"out/images/{i:06d}.png"), scene_picture(i))
-    assert open_common(tmp_path / "out").intrinsics == (*CAMERA, WIDTH, HEIGHT, ())
+    assert describe(tmp_path / "out").intrinsics == (*CAMERA, WIDTH, HEIGHT, ())
 
 
 def test_a_lossless_video_gives_the_pictures_it_was_made_of(tmp_path):
@@ -74,12 +74,12 @@ def test_the_rate_thins_the_frames_evenly(tmp_path):
 def test_resizing_moves_the_camera_along(tmp_path):
     written(tmp_path / "a", right=True, poses=moving())
     prepared(tmp_path / "a", tmp_path / "b", PrepareSettings(scale=0.75))
-    whole, half = (open_common(tmp_path / name) for name in "ab")
+    whole, half = (describe(tmp_path / name) for name in "ab")
     assert half.intrinsics and whole.intrinsics and half.intrinsics[:6] == tuple(np.array(whole.intrinsics[:6]) * 0.75)
     assert half.baseline == whole.baseline and half.poses and whole.poses
     np.testing.assert_array_equal(half.poses[3].translation, whole.poses[3].translation)
-    same = read_common(tmp_path / "a", SequenceConfig(scale=0.75), 0.2)
-    ours = read_common(tmp_path / "b", SequenceConfig(), 0.2)
+    same = read_sequence(tmp_path / "a", SequenceConfig(scale=0.75), 0.2)
+    ours = read_sequence(tmp_path / "b", SequenceConfig(), 0.2)
     np.testing.assert_array_equal(same.images, ours.images)
     np.testing.assert_array_equal(same.masks, ours.masks)
     np.testing.assert_allclose(same.depth, ours.depth, atol=0.01)
@@ -94,18 +94,18 @@ def test_depth_is_reduced_as_a_training_reduces_it(tmp_path, scale):
         plane[20, 25] = 60000  # 600 mm among 40 to 60
         write_png(file, plane)
     prepared(tmp_path / "a", tmp_path / "b", PrepareSettings(scale=scale))
-    whole = read_common(tmp_path / "a", SequenceConfig(scale=scale), 0.2)
-    clip = open_common(tmp_path / "a")
+    whole = read_sequence(tmp_path / "a", SequenceConfig(scale=scale), 0.2)
+    clip = describe(tmp_path / "a")
     straight = straightener(clip, 32, 24, scale)
     for i in range(whole.count):
         np.testing.assert_array_equal(straight.depth(clip.depth(i)), whole.depth[i])  # pyright: ignore
-    reduced = read_common(tmp_path / "b", SequenceConfig(), 0.2)
+    reduced = read_sequence(tmp_path / "b", SequenceConfig(), 0.2)
     step = read_sequence_file(tmp_path / "b").depth.scale  # pyright: ignore[reportOptionalMemberAccess]
     np.testing.assert_allclose(reduced.depth, whole.depth, rtol=0, atol=0.51 * step)
     assert reduced.depth.max() < 61 and any("when it was resized, and not again" in note for note in reduced.notes)
     prepared(tmp_path / "b", tmp_path / "c")
     np.testing.assert_allclose(
-        read_common(tmp_path / "c", SequenceConfig(), 0.2).depth, reduced.depth, atol=1.01 * step
+        read_sequence(tmp_path / "c", SequenceConfig(), 0.2).depth, reduced.depth, atol=1.01 * step
     )
 
 
@@ -143,7 +143,7 @@ def test_stereomis_as_it_is_distributed(tmp_path):
     found, notes = prepared(tmp_path / "P2_8", tmp_path / "out")
     assert (found.frames, found.unit, found.frame_rate) == (6, "mm", 25.0)
     assert found.camera.baseline == pytest.approx(4.0) and any("rectified: baseline 4 mm" in note for note in notes)
-    clip = open_common(tmp_path / "out")
+    clip = describe(tmp_path / "out")
     pair = next(clip.pictures([2]))
     assert pair.right is not None and pair.right.shape == (HEIGHT, WIDTH, 3)
     assert clip.masks is not None
@@ -157,7 +157,7 @@ def test_a_turned_rig_turns_the_poses(tmp_path):
     rotation = Rotation.from_euler("xyz", [0.0, 0.05, 0.02]).as_matrix()
     stereomis(tmp_path / "raw", calibration=ini(rotation=rotation, translation=(-4.0, 0.1, 0.2)))
     prepared(tmp_path / "raw", tmp_path / "out")
-    poses = open_common(tmp_path / "out").poses
+    poses = describe(tmp_path / "out").poses
     assert poses and poses[3] is not None
     assert np.abs(poses[3].rotation - np.eye(3)).max() > 0.01
     np.testing.assert_allclose(-poses[3].rotation.T @ poses[3].translation, [3.0, 0, 0], atol=1e-9)
@@ -187,7 +187,7 @@ def test_colmap(tmp_path, binary):
     points, poses = colmap(tmp_path / "model", binary)
     assert layout_of(tmp_path / "model").name == "colmap"
     found, _ = prepared(tmp_path / "model", tmp_path / "out", PrepareSettings(points="sparse"))
-    clip = open_common(tmp_path / "out")
+    clip = describe(tmp_path / "out")
     assert found.unit == "arbitrary" and clip.intrinsics == (60.0, 61.0, 30.0, 25.0, 64, 48, ())
     assert clip.poses and clip.depth
     for pose, (rotation, translation) in zip(clip.poses, poses):
@@ -205,7 +205,7 @@ def test_colmap(tmp_path, binary):
 
 def test_depth_between_points_lies_on_their_planes(tmp_path):
     """The points of a slanted plane: 1 / z is linear in the picture, so the interpolation is exact."""
-    from endotsr.clips.sequences.clip import CameraPose, Intrinsics
+    from endotsr.clips.sequences.camera import CameraPose, Intrinsics
     from endotsr.clips.sequences.points import depth_from_points
 
     rng = np.random.default_rng(0)
@@ -222,7 +222,7 @@ def test_depth_between_points_lies_on_their_planes(tmp_path):
 def test_tum(tmp_path):
     tum(tmp_path / "desk")
     found, _ = prepared(tmp_path / "desk", tmp_path / "out", camera=CAMERA)
-    sequence = read_common(tmp_path / "out", WHOLE, 0.2)
+    sequence = read_sequence(tmp_path / "out", WHOLE, 0.2)
     assert found.frame_rate == pytest.approx(25.0, rel=1e-4) and sequence.unit == "mm"
     for i in range(5):
         np.testing.assert_allclose(sequence.depth[i, 1:], (300 + i) / 5, atol=0.02)  # 5000 steps a metre
@@ -259,7 +259,7 @@ def test_depth_and_masks_of_other_programs(tmp_path):
         tmp_path / "clip", tmp_path / "out", camera=CAMERA, masks=tmp_path / "masks", excluded_value="black",
         depth=tmp_path / "depth", depth_unit="m",
     )  # fmt: skip
-    sequence = read_common(tmp_path / "out", WHOLE, 0.2)
+    sequence = read_sequence(tmp_path / "out", WHOLE, 0.2)
     np.testing.assert_allclose(sequence.depth[:, 1:], 50.0, atol=0.01)
     assert [int((~mask).sum()) for mask in sequence.masks] == [HEIGHT * (20 + i) for i in range(3)]
 

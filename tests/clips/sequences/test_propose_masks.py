@@ -12,8 +12,8 @@ from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.common import read_common
 from endotsr.clips.sequences.propose_masks import Proposal, propose_masks
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene
@@ -134,7 +134,7 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
     assert "inspect " in capsys.readouterr().out and (clip / "proposed_masks.png").is_file()
     found = read_sequence_file(clip)
     assert found.masks is not None and found.masks.proposed and found.masks.excluded_value == "white"
-    sequence = read_common(clip, SequenceConfig(), 0.2)
+    sequence = read_sequence(clip, SequenceConfig(), 0.2)
     assert iou(~sequence.masks, true) > 0.7 and any("proposed by a program" in note for note in sequence.notes)
     assert "proposed-masks" in [finding.code for finding in check_sequence(clip, PAPER).findings]
     assert main(["masks", str(clip)]) == 2 and "has masks already" in capsys.readouterr().err

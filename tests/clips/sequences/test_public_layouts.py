@@ -7,7 +7,6 @@ import pytest
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.common import open_common
 from endotsr.clips.sequences.layouts import c3vd as c3vd_layout
 from endotsr.clips.sequences.layouts import describe, layout_of
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -19,7 +18,7 @@ LENS = (100.0, 101.0, 64.0, 48.0)  # of the pictures: half a pixel more than K o
 def prepared(folder, *words):
     """The raw folder as a prepared recording."""
     assert main(["prepare", str(folder / "raw"), "--out", str(folder / "o"), *words]) == 0
-    return open_common(folder / "o")
+    return describe(folder / "o")
 
 
 def same_poses(found, scale=1.0):

@@ -6,7 +6,8 @@ import pytest
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.common import open_common, read_common
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import SequenceConfig
 from endotsr.method.splatting.camera import camera_centre
 
@@ -18,7 +19,7 @@ def test_one_frame_of_a_phantom_with_true_depth(tmp_path):
     words += ["--depth", folder / "depth_index_u8.png", "--depth-unit", "arbitrary", "--scale", "0.5"]
     said = ["prepare", folder / "color.png", "--out", tmp_path / "clip", *words]
     assert main([str(word) for word in said]) == 0
-    clip = open_common(tmp_path / "clip")
+    clip = describe(tmp_path / "clip")
     assert (clip.count, clip.unit) == (1, "arbitrary") and clip.intrinsics
     assert clip.intrinsics[:6] == (385.0, 385.0, 337.5, 270.0, 675, 540)
     assert clip.depth and clip.masks
@@ -35,7 +36,7 @@ def test_a_moving_camera_with_poses_of_its_own_files(tmp_path):
     folder = data_folder("sinus_endoscopy")
     said = ["prepare", folder, "--out", tmp_path / "clip", "--frames", "0:6", "--scale", "0.1"]
     assert main([str(word) for word in said]) == 0
-    sequence = read_common(tmp_path / "clip", SequenceConfig(), 0.2)
+    sequence = read_sequence(tmp_path / "clip", SequenceConfig(), 0.2)
     assert sequence.count == 6 and not sequence.static_camera and (sequence.width, sequence.height) == (192, 108)
     with np.load(folder / "cameras_points.npz") as stored:
         poses = stored["w2c"][:6]

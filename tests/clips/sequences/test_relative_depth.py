@@ -8,7 +8,8 @@ from test_stated_depth import FRAMES, recording, true_depth
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.common import open_common, read_common
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.relative_depth import FEWEST, StraightLine, fitted_line
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 from endotsr.config import PAPER
@@ -44,7 +45,7 @@ def sparse(where, count=60, wrong=0.0):
 
 def error(where):
     """The largest relative error of the depth of every frame."""
-    read = open_common(where).depth
+    read = describe(where).depth
     return max(np.abs(read(i) / true_depth(i) - 1).max() for i in range(FRAMES))
 
 
@@ -95,13 +96,13 @@ def test_without_depth_the_shape_has_the_assumed_ratio_and_every_output_says_so(
     where, files = clip(tmp_path, lambda i: 1800 / true_depth(i) - 3)
     assert given(where, files, "--farthest-over-nearest", "2") == 0
     assert "not metric (scale and shift of the depth assumed)" in capsys.readouterr().out
-    read = open_common(where).depth
+    read = describe(where).depth
     planes = np.stack([read(i) for i in range(FRAMES)])
     assert planes.min() == 1 and planes.max() == 2  # the assumed ratio
     inverse = 1 / np.stack([true_depth(i) for i in range(FRAMES)])
     inside = (planes > 1.01) & (planes < 1.99)
     assert np.corrcoef(1 / planes[inside], inverse[inside])[0, 1] > 0.9999
-    sequence = read_common(where, PAPER.sequence, 0.2)
+    sequence = read_sequence(where, PAPER.sequence, 0.2)
     assert sequence.unit == "arbitrary unit, scale and shift of the depth assumed"
     assert any(note.startswith("not metric: relative inverse depth of relative; assumed") for note in sequence.notes)
     found = {found.code: found for found in check_sequence(where, PAPER).findings}
@@ -122,7 +123,7 @@ def test_frames_that_are_rescaled_each_need_a_line_of_their_own(tmp_path):
     spans = {}
     for align in ("sequence", "frame"):
         assert given(where, files, "--replace", "--align", align) == 0
-        read = open_common(where).depth
+        read = describe(where).depth
         spans[align] = np.ptp([np.median(read(i)) for i in range(FRAMES)])
     assert spans["frame"] < 0.1 < 0.5 < spans["sequence"]
 
@@ -140,7 +141,7 @@ def test_numbers_that_fall_towards_the_camera_are_refused(tmp_path, capsys):
 def test_a_plane_is_trained_on_with_a_warning_and_a_measured_one_is_still_refused(tmp_path, capsys):
     where, _ = clip(tmp_path)
     assert main(["depth", str(where), "--flat"]) == 0
-    assert read_common(where, PAPER.sequence, 0.2).unit.endswith("shape of the depth assumed")
+    assert read_sequence(where, PAPER.sequence, 0.2).unit.endswith("shape of the depth assumed")
     assert not check_sequence(where, PAPER).refused
     file = where / "sequence.toml"
     file.write_text(file.read_text().replace('assumed = "shape"', 'assumed = ""'))

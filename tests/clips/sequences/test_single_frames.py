@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from synthetic_folder import write_synthetic_folder
@@ -25,8 +25,8 @@ def test_hard_E5_an_inverted_mask_among_right_ones_is_named(tmp_path, inverted, 
         _write_mask(tmp_path, frame, ~written.tissue[frame])
     name = f"masks/frame-{inverted[0]:06d}.mask.png: "
     with pytest.raises(InputError, match=rf"{name}.* set --sequence.allow-tissue-fraction \(TOML: \[sequence\] allow_"):
-        read_endonerf(tmp_path, SequenceConfig())
-    allowed = read_endonerf(tmp_path, SequenceConfig(allow_tissue_fraction=True))
+        read_sequence(tmp_path, SequenceConfig())
+    allowed = read_sequence(tmp_path, SequenceConfig(allow_tissue_fraction=True))
     assert any(name in note for note in allowed.notes)
 
 
@@ -34,18 +34,18 @@ def test_hard_E5_a_mask_with_hardly_any_tissue_is_named(tmp_path):
     written = write_synthetic_folder(tmp_path, frames=10)
     _write_mask(tmp_path, 6, written.tissue[6] & (np.arange(24) == 23)[:, None])
     with pytest.raises(InputError, match=r"masks/frame-000006.mask.png: 4.2% of the pixels count as tissue, .* 78.1%"):
-        read_endonerf(tmp_path, SequenceConfig())
-    assert read_endonerf(tmp_path, SequenceConfig(allow_tissue_fraction=True)).masks[6].mean() < 0.05
+        read_sequence(tmp_path, SequenceConfig())
+    assert read_sequence(tmp_path, SequenceConfig(allow_tissue_fraction=True)).masks[6].mean() < 0.05
 
 
 def test_hard_E5_masks_of_one_side_only_are_noted(tmp_path):
     """Legal: the instrument leaves the view, or covers it."""
     written = write_synthetic_folder(tmp_path, frames=10)
-    assert len(read_endonerf(tmp_path, SequenceConfig()).notes) == 2
+    assert len(read_sequence(tmp_path, SequenceConfig()).notes) == 2
     for frame in (2, 4):
         _write_mask(tmp_path, frame, np.zeros_like(written.tissue[frame]))
     _write_mask(tmp_path, 7, np.ones_like(written.tissue[7]))
-    notes = read_endonerf(tmp_path, SequenceConfig()).notes
+    notes = read_sequence(tmp_path, SequenceConfig()).notes
     assert notes[2:] == [
         "no tissue, hence nothing to compare: mask frame-000002.mask.png, frame-000004.mask.png",
         "nothing excluded: mask frame-000007.mask.png",
@@ -63,7 +63,7 @@ def test_hard_E5_an_instrument_that_covers_most_of_the_view_for_a_while_is_accep
         cv2.imwrite(str(tmp_path / "images" / f"frame-{frame:06d}.color.png"), picture)
         depth = np.where(tissue, written.depth[frame], 0).astype(np.uint16)
         cv2.imwrite(str(tmp_path / "depth" / f"frame-{frame:06d}.depth.png"), depth)
-    assert len(read_endonerf(tmp_path, SequenceConfig()).notes) == 2
+    assert len(read_sequence(tmp_path, SequenceConfig()).notes) == 2
 
 
 def test_hard_E5_masks_of_mixed_bit_depth_are_named(tmp_path):
@@ -73,7 +73,7 @@ def test_hard_E5_masks_of_mixed_bit_depth_are_named(tmp_path):
     with pytest.raises(
         InputError, match=r"frame-000003.mask.png: 16-bit picture; 9 of the 10 masks have 8 bits, frame"
     ):
-        read_endonerf(tmp_path, SequenceConfig())
+        read_sequence(tmp_path, SequenceConfig())
 
 
 @pytest.mark.parametrize("stretched", [0, 4])
@@ -85,15 +85,15 @@ def test_hard_E6_one_depth_picture_stretched_to_16_bits_is_named(tmp_path, stret
         cv2.imwrite(str(path), written.depth[frame] * np.uint16(256) if deep else written.depth[frame].astype(np.uint8))
     message = rf"depth/frame-00000{stretched}.depth.png: 16-bit picture, .* 25\d times the usual one, .* has 8 bits"
     with pytest.raises(InputError, match=message):
-        read_endonerf(tmp_path, SequenceConfig())
+        read_sequence(tmp_path, SequenceConfig())
     whole = written.depth[stretched].copy()  # millimetres again, with one far value that needs 16 bits: legal
     whole[5, 25] = 6000
     cv2.imwrite(str(tmp_path / "depth" / f"frame-00000{stretched}.depth.png"), whole)
-    assert len(read_endonerf(tmp_path, SequenceConfig()).notes) == 2
+    assert len(read_sequence(tmp_path, SequenceConfig()).notes) == 2
 
 
 def test_hard_E6_a_depth_picture_on_another_scale_is_noted(tmp_path):
     written = write_synthetic_folder(tmp_path)
     cv2.imwrite(str(tmp_path / "depth" / "frame-000002.depth.png"), written.depth[2] * np.uint16(10))
-    notes = read_endonerf(tmp_path, EVERYTHING).notes
+    notes = read_sequence(tmp_path, EVERYTHING).notes
     assert any("depth-far-off: frame 2: median of frame-000002.depth.png is" in note for note in notes)

@@ -9,7 +9,7 @@ from test_stereo_depth import slanted_pair
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.common import read_common
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import PAPER, SequenceConfig
 
 WIDTH, HEIGHT, FRAMES = 128, 96, 6
@@ -87,7 +87,7 @@ def test_lengths_are_read(unit, tmp_path):
     words = recording(tmp_path, lambda i: true_depth(i) / (1 if unit == "mm" else 1000))
     assert main([*words, "--depth-unit", unit]) == 0
     config = SequenceConfig(depth_percentiles=(0.0, 100.0))
-    sequence = read_common(tmp_path / "o", config, 0.2)
+    sequence = read_sequence(tmp_path / "o", config, 0.2)
     np.testing.assert_allclose(sequence.depth[3], true_depth(3), atol=0.02)
     assert "depth-against-light" not in [found.code for found in check_sequence(tmp_path / "o", PAPER).findings]
 

@@ -11,9 +11,9 @@ from test_common import write_plane
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.clip import Intrinsics
-from endotsr.clips.sequences.common import read_common
+from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.make_depth import depth_of_values, from_files, write_depth
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
 from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.config import SequenceConfig
@@ -111,7 +111,7 @@ def test_disparity_of_another_program(tmp_path, ending):
         plane[1] = 0
         write_plane(tmp_path / "raft" / f"{i:06d}{ending}", plane)
     report = write_depth(tmp_path / "clip", from_files(tmp_path / "clip", tmp_path / "raft", "disparity", 1.0))
-    sequence = read_common(tmp_path / "clip", SequenceConfig(depth_percentiles=(0.0, 100.0)), 0.2)
+    sequence = read_sequence(tmp_path / "clip", SequenceConfig(depth_percentiles=(0.0, 100.0)), 0.2)
     assert not sequence.depth[:, :2].any()
     expected = 30.0 * 4.0 / (2 + column / 16)
     np.testing.assert_allclose(sequence.depth[:, 2:], np.broadcast_to(expected, (FRAMES, HEIGHT - 2, WIDTH)), atol=0.01)
@@ -147,7 +147,7 @@ def test_the_command_makes_a_sequence_that_can_be_trained_on(tmp_path, capsys):
     words = ["depth", str(tmp_path / "clip"), "--nearest", "25", "--farthest", "120"]
     assert main(words) == 0
     assert "next: endotsr train" in capsys.readouterr().out
-    sequence = read_common(tmp_path / "clip", SequenceConfig(), 0.2)
+    sequence = read_sequence(tmp_path / "clip", SequenceConfig(), 0.2)
     assert np.median(sequence.depth[sequence.depth > 0]) == pytest.approx(53, abs=3)
     assert main(words) == 2 and "--replace" in capsys.readouterr().err
     before = read_png(tmp_path / "clip/depth/000001.png")

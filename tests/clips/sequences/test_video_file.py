@@ -9,7 +9,8 @@ from made_videos import CAMERA, HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pict
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.common import open_common, read_common
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 from endotsr.clips.sequences.video_file import video_facts, video_pictures
 from endotsr.errors import InputError
@@ -55,7 +56,7 @@ def test_uneven_times_become_the_times_of_the_sequence(name, codec, tmp_path, ca
     stated = read_sequence_file(tmp_path / "o")
     assert stated.times == pytest.approx(np.array(UNEVEN) / 1000, abs=1e-3)
     assert stated.frame_rate == pytest.approx(11 / 1.333, rel=1e-2)
-    clip = open_common(tmp_path / "o")
+    clip = describe(tmp_path / "o")
     assert clip.times is not None and len(clip.times) == 12
 
 
@@ -66,10 +67,10 @@ def test_a_training_has_the_times_of_the_file(tmp_path):
     from endotsr.config import SequenceConfig
 
     written(tmp_path, times=[0.0, 0.1, 0.2, 0.9, 1.0])
-    sequence = read_common(tmp_path, SequenceConfig(), 0.2)
+    sequence = read_sequence(tmp_path, SequenceConfig(), 0.2)
     np.testing.assert_allclose(sequence.times, np.array([0.0, 0.1, 0.2, 0.9, 1.0]) * 4 / 5, rtol=1e-15)
     assert any("uneven-times: the frames are 0.1 to 0.7 s apart" in note for note in sequence.notes)
-    part = read_common(tmp_path, SequenceConfig(frames="2:5"), 0.2)
+    part = read_sequence(tmp_path, SequenceConfig(frames="2:5"), 0.2)
     np.testing.assert_allclose(part.times, np.array([0.0, 0.7, 0.8]) / 0.8 * 2 / 3, rtol=1e-14)
     from endotsr.results.evaluation.baselines import neighbours
 

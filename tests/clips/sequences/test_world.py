@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from common_folder import moving, written
 
-from endotsr.clips.sequences.common import read_common
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.world import USUAL_DEPTH, World, fitting_world, moved_camera
 from endotsr.config import SequenceConfig
 from endotsr.method.splatting.camera import Camera, backproject, camera_centre
@@ -17,7 +16,7 @@ DEPTH = np.full((1, 4, 4), 50.0, np.float32)
 
 def test_near_the_origin_nothing_changes(tmp_path):
     written(tmp_path, poses=moving())
-    sequence = read_common(tmp_path, WHOLE, 0.2)
+    sequence = read_sequence(tmp_path, WHOLE, 0.2)
     assert not any("world" in note for note in sequence.notes)
     for i, camera in enumerate(sequence.cameras):
         assert camera.translation.tolist() == [-2.0 * i, 0.0, 0.0]
@@ -28,7 +27,7 @@ def test_a_camera_far_away_is_read_like_one_at_the_origin(tmp_path, offset):
     """Offsets that float64 holds exactly together with steps of 2 mm."""
     written(tmp_path / "near", poses=moving())
     written(tmp_path / "far", poses=moving(offset))
-    near, far = (read_common(tmp_path / name, WHOLE, 0.2) for name in ("near", "far"))
+    near, far = (read_sequence(tmp_path / name, WHOLE, 0.2) for name in ("near", "far"))
     assert any("world: scene" in note for note in far.notes)
     apart = [camera_centre(b) - camera_centre(a) for a, b in zip(near.cameras, far.cameras)]
     assert np.ptp(apart, axis=0).max() == 0  # the same motion, exactly
@@ -40,7 +39,7 @@ def test_an_endonerf_folder_far_away_too(tmp_path):
     rows = identity_rows(5, 32, 24)
     rows[:, 3] = 1e9 + np.arange(5.0)
     write_synthetic_folder(tmp_path, rows=rows)
-    sequence = read_endonerf(tmp_path, WHOLE)
+    sequence = read_sequence(tmp_path, WHOLE)
     assert [camera_centre(c)[0] for c in sequence.cameras] == [-2.0, -1.0, 0.0, 1.0, 2.0]
 
 
@@ -52,7 +51,7 @@ def test_an_arbitrary_unit_is_scaled_to_the_usual_depth(tmp_path):
         '[depth]\nfolder = "depth"\nunit = "mm"', '[depth]\nfolder = "depth"\nunit = "arbitrary"'
     )
     file.write_text(text.replace("scale = 0.01", "scale = 0.0001"))
-    sequence = read_common(tmp_path, WHOLE, 0.2)
+    sequence = read_sequence(tmp_path, WHOLE, 0.2)
     assert np.median(sequence.depth[sequence.depth > 0]) == pytest.approx(USUAL_DEPTH, rel=0.02)
     step = camera_centre(sequence.cameras[1])[0] - camera_centre(sequence.cameras[0])[0]
     scale = sequence.depth.max() / 0.5999

@@ -9,7 +9,7 @@ import pytest
 from endotsr.api import train
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.depth_files import clip_depth
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.field_of_view import check_field_of_view
 from endotsr.clips.simulator.folder import check_scene, write_sequence
@@ -39,7 +39,7 @@ def written(request, tmp_path_factory):
 
 def test_every_scene_is_read_as_it_is_and_equals_the_one_in_memory(written):
     _, folder, simulated = written
-    back, here = read_endonerf(folder, EXACT), simulated.sequence
+    back, here = read_sequence(folder, EXACT), simulated.sequence
     for array in ("images", "masks", "depth", "times", "train_index", "test_index"):
         np.testing.assert_array_equal(getattr(back, array), getattr(here, array))
     assert back.static_camera == here.static_camera
@@ -51,7 +51,7 @@ def test_every_scene_is_read_as_it_is_and_equals_the_one_in_memory(written):
 def test_the_usual_clip_of_the_reader_is_the_only_difference(written):
     _, folder, simulated = written
     config = SequenceConfig()
-    back, here = read_endonerf(folder, config), simulated.sequence
+    back, here = read_sequence(folder, config), simulated.sequence
     clipped = np.stack([clip_depth(frame, config.depth_percentiles) for frame in here.depth])
     np.testing.assert_array_equal(back.depth, clipped)
     assert not any("tissue" in note and "flag" in note for note in back.notes)
@@ -89,7 +89,7 @@ TINY = {
 @pytest.mark.parametrize("name", ["moving-camera", "pulling"])
 def test_training_from_files_equals_training_in_memory(tmp_path, name):
     write_sequence(tmp_path, small(name))
-    runs = [train(sequence, **TINY) for sequence in (read_endonerf(tmp_path, EXACT), simulate(small(name)).sequence)]
+    runs = [train(sequence, **TINY) for sequence in (read_sequence(tmp_path, EXACT), simulate(small(name)).sequence)]
     first, second = (run.render(time=0.4) for run in runs)
     np.testing.assert_array_equal(first.colour, second.colour)
     np.testing.assert_array_equal(first.depth, second.depth)
@@ -150,4 +150,4 @@ def test_without_stereo_there_is_no_right_picture(tmp_path):
     settings = changed(small("pulling"), "stereo", on=False)
     write_sequence(tmp_path, settings)
     assert not (tmp_path / "images_right").exists()
-    np.testing.assert_array_equal(read_endonerf(tmp_path, EXACT).masks, simulate(settings).sequence.masks)
+    np.testing.assert_array_equal(read_sequence(tmp_path, EXACT).masks, simulate(settings).sequence.masks)

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator import simulate
 from endotsr.clips.simulator.folder import write_sequence
 from endotsr.clips.simulator.recorded import check_truth, has_truth, recorded_positions
@@ -33,7 +33,7 @@ def changeable(folder, tmp_path):
 def test_positions_are_those_in_memory_but_for_the_rounding_of_the_file(folder):
     """Material points are stored as float32; the scene moves, and frames of a wound have none."""
     simulated = simulate(SETTINGS)
-    positions = recorded_positions(folder, read_endonerf(folder, SequenceConfig()))
+    positions = recorded_positions(folder, read_sequence(folder, SequenceConfig()))
     assert positions is not None
     for pair in ((0, 4), (4, 1), (5, 5)):
         np.testing.assert_allclose(positions(*pair), simulated.true_positions(*pair), rtol=0, atol=2e-5)
@@ -43,7 +43,7 @@ def test_positions_are_those_in_memory_but_for_the_rounding_of_the_file(folder):
 
 def test_chosen_frames_keep_their_own_times(folder):
     """Frames 1, 3 and 5 of the files: the reader gives them new times, the scene keeps its own."""
-    sequence = read_endonerf(folder, SequenceConfig(frames="1::2"))
+    sequence = read_sequence(folder, SequenceConfig(frames="1::2"))
     positions, simulated = recorded_positions(folder, sequence), simulate(SETTINGS)
     assert sequence.count == 3 and positions is not None
     np.testing.assert_allclose(positions(0, 2), simulated.true_positions(1, 5), rtol=0, atol=2e-5)
@@ -52,10 +52,10 @@ def test_chosen_frames_keep_their_own_times(folder):
 def test_no_truth_and_another_size_have_no_positions(folder, changeable):
     import shutil
 
-    assert recorded_positions(folder, read_endonerf(folder, SequenceConfig(scale=0.5))) is None
+    assert recorded_positions(folder, read_sequence(folder, SequenceConfig(scale=0.5))) is None
     shutil.rmtree(changeable / "truth")
     assert not has_truth(changeable)
-    assert recorded_positions(changeable, read_endonerf(changeable, SequenceConfig())) is None
+    assert recorded_positions(changeable, read_sequence(changeable, SequenceConfig())) is None
 
 
 def test_tracks_of_other_settings_are_refused(changeable):
@@ -68,14 +68,14 @@ def test_tracks_of_other_settings_are_refused(changeable):
 
 
 def test_frames_of_another_scene_are_refused(folder):
-    sequence = read_endonerf(folder, SequenceConfig())
+    sequence = read_sequence(folder, SequenceConfig())
     sequence.names[2] = "000017"
     with pytest.raises(InputError, match=r"frame '000017' of the sequence .* allowed: 000000 to 000005"):
         recorded_positions(folder, sequence)
 
 
 def test_a_damaged_frame_is_refused_with_its_name(changeable):
-    positions = recorded_positions(changeable, read_endonerf(changeable, SequenceConfig()))
+    positions = recorded_positions(changeable, read_sequence(changeable, SequenceConfig()))
     assert positions is not None
     np.savez(changeable / "truth" / "frames" / "000002.npz", depth=np.zeros((2, 2), np.float32))
     with pytest.raises(InputError, match=r"000002\.npz"):

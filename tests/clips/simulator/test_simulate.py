@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endonerf_writer import write_endonerf
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.sections import Breathing, Pull
 from endotsr.clips.simulator.slit import parting
@@ -225,7 +225,7 @@ def test_unknown_effects_are_refused():
 
 def test_a_simulated_folder_can_be_read_back(tmp_path, everything):
     write_endonerf(everything.sequence, tmp_path)
-    back = read_endonerf(tmp_path, SequenceConfig(depth_percentiles=(0.0, 100.0)))
+    back = read_sequence(tmp_path, SequenceConfig(depth_percentiles=(0.0, 100.0)))
     np.testing.assert_array_equal(back.images, everything.sequence.images)
     np.testing.assert_array_equal(back.masks, everything.sequence.masks)
     assert np.abs(back.depth - everything.sequence.depth).max() <= 0.5

@@ -126,11 +126,11 @@ def test_baseline_rows_rank_as_the_data_says(sequence):
 
 @pytest.mark.data
 def test_known_row_on_pulling_with_lpips():
-    from endotsr.clips.sequences.endonerf import read_endonerf
+    from endotsr.clips.sequences.read import read_sequence
     from endotsr.config import SequenceConfig
     from endotsr.results.evaluation.lpips import load_lpips_weights
 
-    sequence = read_endonerf(data_folder("endonerf_pulling"), SequenceConfig())
+    sequence = read_sequence(data_folder("endonerf_pulling"), SequenceConfig())
     weights = load_lpips_weights(data_folder("lpips_alex") / "lpips_alex_v0_1.npz")
     result = evaluate.evaluate_frames(sequence, sequence.test_index, lambda i: two_neighbours(sequence, i), weights)
     assert result["mean"]["psnr_full"] == pytest.approx(40.51, abs=0.01)

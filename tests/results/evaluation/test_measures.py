@@ -6,7 +6,7 @@ import pytest
 
 from data_folder import data_folder
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.endonerf import read_endonerf
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.simulator.folder import write_sequence
 from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
@@ -118,7 +118,7 @@ def pair(tmp_path_factory):
     size = SimulatorSettings(width=128, height=96, frames=9)
     settings = with_effects(size, "stereo", "depth_rounding", "instrument")
     write_sequence(folder, settings)
-    return folder, read_endonerf(folder, SequenceConfig()), settings
+    return folder, read_sequence(folder, SequenceConfig()), settings
 
 
 def right_pictures(folder):
@@ -186,7 +186,7 @@ def test_a_pair_without_one_baseline_is_not_measured(pair):
     folder, sequence, _ = pair
     wrong = msgspec.structs.replace(SequenceConfig(), scale=1.0)
     rng = np.random.default_rng(1)
-    sequence = read_endonerf(folder, wrong)
+    sequence = read_sequence(folder, wrong)
     sequence.depth[:] = np.where(sequence.depth > 0, rng.uniform(20, 200, sequence.depth.shape), 0)
     found = right_view(sequence, str(folder), wrong, lambda i, camera: pytest.fail("rendered"))
     assert "give no consistent baseline" in found["reason"]
@@ -204,6 +204,6 @@ def test_unknown_measures_are_refused_and_lines_are_plain():
 @pytest.mark.data
 def test_the_pair_of_endonerf_is_calibrated():
     folder = data_folder("endonerf_pulling")
-    sequence = read_endonerf(folder, SequenceConfig(frames="0:9"))
+    sequence = read_sequence(folder, SequenceConfig(frames="0:9"))
     found = stereo_baseline(sequence, right_pictures(folder))
     assert found is not None and found[0] > 0 and found[1] < 0.15

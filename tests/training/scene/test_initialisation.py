@@ -194,10 +194,10 @@ def test_activation_allocates_zeros_for_what_is_on():
 @pytest.mark.data
 def test_pulling_sequence_starts_with_the_published_counts():
     """35 000 + up to 79 from each of the 54 other training frames of 63."""
-    from endotsr.clips.sequences.endonerf import read_endonerf
+    from endotsr.clips.sequences.read import read_sequence
     from endotsr.config import RasterConfig, SequenceConfig
 
-    sequence = read_endonerf(data_folder("endonerf_pulling"), SequenceConfig())
+    sequence = read_sequence(data_folder("endonerf_pulling"), SequenceConfig())
     gaussians = initialise(sequence, InitialisationConfig(), MODEL, np.random.default_rng(0))
     assert 35_000 < gaussians.count <= 35_000 + 79 * 54
     assert all(a is None or np.isfinite(a).all() for a in gaussians)

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.sequences.calibration_formats import FORMATS, StoredCalibration, StoredIntrinsics
-from endotsr.clips.sequences.clip import Intrinsics, StereoCalibration, intrinsics_of_matrix
-from endotsr.clips.sequences.sequence_file import checked_rotation
+from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration, checked_rotation, intrinsics_of_matrix
 from endotsr.errors import InputError
 from endotsr.untrusted.yaml import read_yaml
 

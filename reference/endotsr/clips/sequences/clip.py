@@ -1,8 +1,8 @@
-"""A clip: the contents of a path in some layout, decoded on demand.
+"""A clip: what the files of one recording hold, with one meaning for every layout.
 
-Every layout returns a `Clip`: frames that are decoded on demand, with masks, depth, calibration and poses if they
-exist. `prepare` converts it into the common format. Conventions: pixel edges are at integers (the first pixel centre is
-at 0.5), poses are world-to-camera in OpenCV axes, masks are True on tissue, and a depth of 0 means no depth.
+`layouts.describe(path)` returns a `Clip` for every layout. Reader, `check`, hashes, `prepare`, `masks` and `depth` take
+it. Frames are decoded on demand. Conventions: those of `camera`; masks are True on tissue; a depth of 0 means no depth;
+times are seconds.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,50 +13,17 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics, StereoCalibration
+from endotsr.clips.sequences.checks.kinds import Finding
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import Camera
 
 Picture = NDArray[np.uint8]  # (H, W, 3) RGB
-MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
-ARBITRARY = "arbitrary"
-
-
-def scene_factor(unit: str) -> float:
-    """The factor from lengths in `unit` to scene units: millimetres, or the arbitrary unit itself."""
-    return 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
-
-
-class Intrinsics(NamedTuple):
-    """Intrinsics of one camera, pixels; pixel edges at integers."""
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
-    distortion: tuple[float, ...] = ()  # OpenCV's order k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
-
-    def scaled(self, width: int, height: int) -> "Intrinsics":
-        """The intrinsics of the picture resized to width x height, with aligned picture edges."""
-        x, y = width / self.width, height / self.height
-        return self._replace(fx=self.fx * x, cx=self.cx * x, fy=self.fy * y, cy=self.cy * y, width=width, height=height)
-
-
-class StereoCalibration(NamedTuple):
-    """Two cameras before rectification: x_right = rotation @ x_left + translation."""
-
-    left: Intrinsics
-    right: Intrinsics
-    rotation: FloatArray  # (3, 3)
-    translation: FloatArray  # (3,) millimetres
-
-
-class CameraPose(NamedTuple):
-    """World-to-camera, OpenCV axes: x_camera = rotation @ x_world + translation."""
-
-    rotation: FloatArray  # (3, 3)
-    translation: FloatArray  # (3,) in the unit of the clip
+Numbers = list[int] | range  # of frames
+Assumed = Literal["", "scale and shift", "shape"]  # properties of the depth that are not measured
+STILL = 1e-9  # ruling: a camera moves if an entry of its pose varies by more
+REST = CameraPose(np.eye(3), np.zeros(3))
 
 
 class PicturePair(NamedTuple):
@@ -66,12 +33,36 @@ class PicturePair(NamedTuple):
     right: Picture | None = None
 
 
-class StatedDepth(NamedTuple):
-    """Depth files stated by a user."""
+@dataclass(frozen=True)
+class Masks:
+    """The masks of a clip. `masks(i)` is (H, W), True on tissue; None: frame i has no mask."""
 
-    path: Path
-    step: float  # length per stored unit, in the unit of the clip
-    trusted: bool  # the user confirms that they contain lengths
+    read: Callable[[int], NDArray[np.bool_] | None]
+    files: list[Path] = field(default_factory=list)  # one per frame; empty: masks of some frames only, or edited ones
+    excluded_value: str = "white"  # of the files; `white` or `black`
+    stated_in: str = ""  # the file that states this value; "": a setting or an option does
+    proposed: bool = False  # a program made the masks, and no person has checked them
+
+    def __call__(self, i: int) -> NDArray[np.bool_] | None:
+        return self.read(i)
+
+
+@dataclass(frozen=True)
+class Depth:
+    """The depth of a clip. `depth(i)` is (H, W) in the unit of the clip, 0 = none; None: frame i has no depth."""
+
+    read: Callable[[int], NDArray[np.float32] | None]
+    files: list[Path] = field(default_factory=list)  # as in `Masks`
+    scale: float = 1.0  # length per stored value, in the unit of the clip
+    unit: str = "mm"  # of the stored values times their scale
+    clipped: tuple[float, ...] = ()  # percentiles to which the depth was clipped before resizing
+    method: str = "given"  # in words
+    assumed: Assumed = ""
+    stated: Path | None = None  # files that a user stated
+    trusted: bool = False  # the user confirms that they contain lengths
+
+    def __call__(self, i: int) -> NDArray[np.float32] | None:
+        return self.read(i)
 
 
 @dataclass(frozen=True)
@@ -82,76 +73,74 @@ class Clip:
     where: Path
     names: list[str]
     pictures: Callable[[list[int]], Iterator[PicturePair]]  # of ascending frame numbers
-    masks: Callable[[int], NDArray[np.bool_] | None] | None = None  # None: this frame has no mask
-    proposed: bool = False  # a program made the masks, and no person has checked them
-    depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
-    stated_depth: StatedDepth | None = None  # source of `depth`, if the user stated it
-    depth_clipped: bool = False  # to the percentiles of training, before resizing
-    depth_method: str = "given"  # in words
-    depth_assumed: Literal["", "scale and shift", "shape"] = ""  # properties of the depth that are not measured
+    images: list[Path] = field(default_factory=list)  # one file per frame; empty: frames of a video
+    right: list[Path] = field(default_factory=list)  # right pictures of a stereo pair, likewise
+    masks: Masks | None = None
+    depth: Depth | None = None
     points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions visible in a frame, in `unit`
     unit: str = "mm"
     intrinsics: Intrinsics | None = None
     calibration: StereoCalibration | None = None
     baseline: float | None = None  # of a rectified pair, in `unit`
-    poses: list[CameraPose | None] | None = None
+    poses: list[CameraPose | None] | None = None  # None: the camera rests at `rest`
+    rest: CameraPose = REST
     rate: float | None = None  # frames per second
     times: NDArray[np.float64] | None = None  # seconds of every frame, ascending; None: evenly spaced
     notes: list[str] = field(default_factory=list)
+    stated_in: Path | None = None  # the file that states the camera
+    size_said: str = "the first image has"  # source of the size in `intrinsics`, for messages
+    faults: list[Finding] = field(default_factory=list)  # missing or unusable parts
+    pose_faults: dict[int, str] = field(default_factory=dict)  # why a frame has no pose
 
     @property
     def count(self) -> int:
         """Number of frames."""
         return len(self.names)
 
-    def seconds(self, frames: list[int]) -> NDArray[np.float64]:
+    @property
+    def arbitrary(self) -> bool:
+        """Whether the unit of the lengths is unknown."""
+        return self.unit == ARBITRARY
+
+    @property
+    def unit_in_words(self) -> str:
+        """The unit of all lengths, with their assumptions; it accompanies every reported length."""
+        assumed = f", {self.depth.assumed} of the depth assumed" if self.depth and self.depth.assumed else ""
+        return f"arbitrary unit{assumed}" if self.arbitrary else self.unit
+
+    def times_of(self, frames: Numbers) -> NDArray[np.float64]:
         """Times of these frames, seconds; their numbers if neither times nor a rate are known."""
-        return np.array(frames) / (self.rate or 1.0) if self.times is None else self.times[frames]
+        return np.array(frames) / (self.rate or 1.0) if self.times is None else self.times[list(frames)]
+
+    def duration(self, frames: Numbers) -> float:
+        """Seconds from time 0 to time 1 of these frames, n / (n - 1) (s_{n-1} - s_0); 0 where the rate is unknown."""
+        if not self.rate or len(frames) < 2:
+            return 0.0
+        first, last = frames[0], frames[-1]
+        elapsed = (last - first) / self.rate if self.times is None else self.times[last] - self.times[first]
+        return float(elapsed) * len(frames) / (len(frames) - 1)
+
+    def cameras(self, frames: Numbers) -> list[Camera]:
+        """One camera per frame; the same object for all frames of a static camera.
+
+        Raises:  InputError for a frame without a pose, or without intrinsics.
+        """
+        if self.intrinsics is None:
+            raise InputError(f"{self.where}: the intrinsics are unknown")
+        poses: list[CameraPose] = []
+        for i in frames:
+            pose = self.rest if self.poses is None else self.poses[i]
+            if pose is None:
+                raise InputError(self.pose_faults.get(i, f"{self.where}: frame {self.names[i]} has no pose"))
+            poses.append(pose)
+        cameras = [Camera(*pose, *self.intrinsics[:6]) for pose in poses]
+        return cameras[:1] * len(frames) if rests(poses) else cameras
 
 
-def intrinsics_of_matrix(
-    matrix: FloatArray, width: int, height: int, distortion: tuple[float, ...] = (), *, where: object
-) -> Intrinsics:
-    """The intrinsics of a 3x3 matrix in OpenCV's convention, with pixel centres at integers: half a pixel is added.
-
-    Raises:  InputError for a matrix that is not finite or has skew, and as `checked_intrinsics`.
-    """
-    numbers = np.asarray(matrix, np.float64)
-    if numbers.shape != (3, 3) or not np.isfinite(numbers).all():
-        raise InputError(f"{where}: camera matrix: allowed: 3x3 finite numbers")
-    if numbers[0, 1] != 0:
-        raise InputError(f"{where}: camera matrix: skew {numbers[0, 1]:g}; allowed: 0 (square angles)")
-    fx, fy, cx, cy = (
-        float(value) for value in (numbers[0, 0], numbers[1, 1], numbers[0, 2] + 0.5, numbers[1, 2] + 0.5)
-    )
-    return checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, distortion), where)
-
-
-def checked_intrinsics(found: Intrinsics, where: object) -> Intrinsics:
-    """The intrinsics, checked.
-
-    Raises:  InputError for values that are not finite, a focal length that is not positive, a principal point far
-             outside the picture, or another number of distortion coefficients than 0, 4, 5 or 8.
-    """
-    fx, fy, cx, cy, width, height, distortion = found
-    if not np.isfinite([fx, fy, cx, cy, *distortion]).all():
-        raise InputError(f"{where}: camera: allowed: finite numbers, got {found[:4]} and distortion {distortion}")
-    if fx <= 0 or fy <= 0:
-        raise InputError(f"{where}: focal length {min(fx, fy):g}: allowed: numbers > 0")
-    if not -width <= cx <= 2 * width or not -height <= cy <= 2 * height:
-        raise InputError(
-            f"{where}: principal point ({cx:g}, {cy:g}) is far outside the {width}x{height} pixels; is the calibration"
-            " of another picture size?"
-        )
-    if len(distortion) not in (0, 4, 5, 8):
-        raise InputError(f"{where}: {len(distortion)} distortion coefficients; allowed: none, 4, 5 or 8")
-    return found
-
-
-def opencv_matrix(intrinsics: Intrinsics) -> FloatArray:
-    """The 3x3 matrix in OpenCV's convention (pixel centres at integers)."""
-    fx, fy, cx, cy, *_ = intrinsics
-    return np.array([[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]])
+def rests(poses: list[CameraPose]) -> bool:
+    """Whether no entry of the poses varies by more than `STILL`."""
+    rows = np.array([[*pose.rotation.ravel(), *pose.translation] for pose in poses])
+    return bool((np.ptp(rows, axis=0) <= STILL).all())
 
 
 def grey_plane(pixels: NDArray[Any], where: object) -> NDArray[Any]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.clip import CameraPose, Intrinsics, checked_intrinsics
+from endotsr.clips.sequences.camera import CameraPose, Intrinsics, checked_intrinsics
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_bytes, read_text

@@ -3,15 +3,18 @@
 In: a `Clip` and option values. Out: frame numbers, or an edited `Clip`.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.clip import Clip, Intrinsics, Picture, PicturePair
+from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.sequences.clip import Clip, Masks, Picture, PicturePair
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import masks_are_proposed, stated_masks
+from endotsr.clips.sequences.sources import stated_masks
 from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -70,7 +73,7 @@ def _seconds(part: str, clip: Clip) -> list[int]:
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
         raise InputError(f"--frames {part!r}: no span of seconds; {ALLOWED}")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
-    times = clip.seconds(list(range(clip.count)))
+    times = clip.times_of(range(clip.count))
     elapsed: FloatArray = times - times[0]
     if np.isfinite(last) and last > elapsed[-1] + 1.5 / (clip.rate or 1.0):
         raise InputError(f"--frames {part!r}: the source ends after {elapsed[-1]:.3f} seconds")
@@ -87,9 +90,9 @@ def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str])
         raise InputError(f"{clip.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
     if rate > clip.rate:
         raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; allowed: no more")
-    seconds = clip.seconds(frames)
-    wanted = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * rate + 1e-6) + 1) / rate
-    kept = np.unique(np.abs(seconds[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
+    times = clip.times_of(frames)
+    wanted = times[0] + np.arange(int((times[-1] - times[0]) * rate + 1e-6) + 1) / rate
+    kept = np.unique(np.abs(times[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
     notes.append(f"{len(kept)} of {len(frames)} frames kept for {rate:g} a second, by their times")
     return [frames[k] for k in kept]
 
@@ -101,22 +104,22 @@ def written_times(
 
     rate     the requested frame rate, or None
     """
-    seconds = clip.seconds(frames)
+    times = clip.times_of(frames)
     if len(frames) < 2:
         return None, float(clip.rate or 0.0)
-    mean = (len(frames) - 1) / float(seconds[-1] - seconds[0])
+    mean = (len(frames) - 1) / float(times[-1] - times[0])
     whole = clip.rate and frames == list(range(frames[0], frames[-1] + 1))
     known = clip.rate or clip.times is not None
-    even = evenly_spaced(seconds)
+    even = evenly_spaced(times)
     stated = float(rate if rate and even else clip.rate if whole and even and clip.rate else mean)
     if even:
         return None, stated if known else 0.0
-    steps, unit = np.diff(seconds), "s" if known else "frames"
+    steps, unit = np.diff(times), "s" if known else "frames"
     notes.append(
         f"the frames are not evenly spaced ({steps.min():.3g} to {steps.max():.3g} {unit} apart): sequence.toml states"
         " their times, and a training uses them"
     )
-    return [round(float(s), 6) for s in seconds - seconds[0]], stated if known else 0.0
+    return [round(float(s), 6) for s in times - times[0]], stated if known else 0.0
 
 
 def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
@@ -136,6 +139,10 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
             )
         return np.ascontiguousarray(plane[y : y + height, x : x + width])
 
+    def part(read: Callable[[int], NDArray | None], what: str, i: int) -> NDArray | None:
+        plane = read(i)
+        return None if plane is None else cut(plane, what)
+
     def picture(found: Picture) -> Picture:
         return cut(found, "pictures")
 
@@ -149,8 +156,8 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
             PicturePair(picture(pair.left), None if pair.right is None else picture(pair.right))
             for pair in clip.pictures(wanted)
         ),
-        masks=None if masks is None else lambda i: None if (plane := masks(i)) is None else cut(plane, "masks"),
-        depth=None if depth is None else lambda i: None if (plane := depth(i)) is None else cut(plane, "depth"),
+        masks=None if masks is None else replace(masks, read=partial(part, masks.read, "masks"), files=[]),
+        depth=None if depth is None else replace(depth, read=partial(part, depth.read, "depth"), files=[]),
         intrinsics=None if clip.intrinsics is None else intrinsics(clip.intrinsics),
         calibration=None
         if calibration is None
@@ -178,10 +185,8 @@ def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Cli
         return np.logical_and.reduce(planes) if len(planes) == len(every) else None
 
     names = ", ".join(folder.name for folder in folders)
-    proposed = any(masks_are_proposed(replace(options, masks=folder)) for folder in folders)
     return replace(
         clip,
-        masks=mask,
-        proposed=clip.proposed or proposed,
+        masks=Masks(mask, proposed=any(one.proposed for one in every)),
         notes=[*clip.notes, f"masks: united with {names}"],
     )

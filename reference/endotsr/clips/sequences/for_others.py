@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
-from endotsr.clips.sequences.clip import CameraPose, Clip, Intrinsics
-from endotsr.clips.sequences.common import open_common
-from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, OPENGL, inverse_pose, read_sequence_file
+from endotsr.clips.sequences.camera import CameraPose, Intrinsics, camera_to_world
+from endotsr.clips.sequences.clip import REST, Clip
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.writing import replace_text
 
@@ -36,7 +37,7 @@ class SeenPoint(NamedTuple):
 
 def describe_for(folder: Path, others: tuple[Other, ...]) -> list[str]:
     """Write the descriptions. Returns a note on each. Raises InputError."""
-    clip, notes = open_common(folder), []
+    clip, notes = describe(folder), []
     for name in others:
         notes.append(_nerfstudio(folder, clip) if name == "nerfstudio" else _colmap(folder, clip))
     return notes
@@ -44,35 +45,33 @@ def describe_for(folder: Path, others: tuple[Other, ...]) -> list[str]:
 
 def _intrinsics_and_poses(clip: Clip) -> tuple[Intrinsics, list[CameraPose]]:
     assert clip.intrinsics is not None
-    rest = CameraPose(np.eye(3), np.zeros(3))
-    return clip.intrinsics, [pose or rest for pose in clip.poses or [rest] * clip.count]
+    return clip.intrinsics, [pose or REST for pose in clip.poses or [REST] * clip.count]
 
 
 def _nerfstudio(folder: Path, clip: Clip) -> str:
     intrinsics, poses = _intrinsics_and_poses(clip)
-    file = read_sequence_file(folder)
-    step = THOUSANDTHS * file.depth_scale if file.depth else 1.0
+    step = THOUSANDTHS * clip.depth.scale if clip.depth else 1.0
     if clip.masks is not None:
         (folder / KEPT).mkdir()
     frames = []
     for i, pose in enumerate(poses):
         name = clip.names[i]
-        rotation, centre = inverse_pose(*pose)
+        rotation, centre = camera_to_world(pose, "opengl")
         entry = {"file_path": f"{IMAGES}/{_file(folder, IMAGES, name)}"}
         matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = rotation @ OPENGL, centre / step
+        matrix[:3, :3], matrix[:3, 3] = rotation, centre / step
         if clip.masks is not None:
             tissue = clip.masks(i)
             assert tissue is not None
             write_png(folder / KEPT / f"{name}.png", tissue * np.uint8(255))
             entry["mask_path"] = f"{KEPT}/{name}.png"
-        if file.depth:
+        if clip.depth:
             entry["depth_file_path"] = f"{DEPTH}/{_file(folder, DEPTH, name)}"
         frames.append(entry | {"transform_matrix": matrix.tolist()})
     about = {"camera_model": "OPENCV"} | dict(zip(("fl_x", "fl_y", "cx", "cy", "w", "h"), intrinsics))
     about |= dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
     replace_text(folder / "transforms.json", json.dumps(about | {"frames": frames}, indent=1) + "\n")
-    unit = "of the unknown unit" if file.arbitrary else "mm"
+    unit = "of the unknown unit" if clip.arbitrary else "mm"
     return f"transforms.json: lengths in {step:g} {unit}; a step of the depth files is a thousandth of this"
 
 
@@ -118,7 +117,7 @@ def _points(clip: Clip, intrinsics: Intrinsics, poses: list[CameraPose]) -> list
         assert depth is not None
         places = np.flatnonzero((depth > 0) & (True if tissue is None else tissue))
         rows, columns = np.unravel_index(places[:: max(1, len(places) // POINTS)], depth.shape)
-        rotation, centre = inverse_pose(*poses[i])
+        rotation, centre = camera_to_world(poses[i])
         for row, column in zip(rows.tolist(), columns.tolist()):
             z, u, v = float(depth[row, column]), column + 0.5, row + 0.5
             view = np.array([(u - intrinsics.cx) * z / intrinsics.fx, (v - intrinsics.cy) * z / intrinsics.fy, z])

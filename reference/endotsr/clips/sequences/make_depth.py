@@ -12,13 +12,21 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
-from endotsr.clips.sequences.clip import ARBITRARY, Clip, Intrinsics, PicturePair
-from endotsr.clips.sequences.common import list_contents, open_common
+from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.relative_depth import Align, MadeDepth, relative_depth
-from endotsr.clips.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
+from endotsr.clips.sequences.sequence_file import (
+    DEPTH,
+    FILE_NAME,
+    DepthEntry,
+    SequenceFile,
+    read_sequence_file,
+    sequence_text,
+)
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.errors import InputError
@@ -83,14 +91,15 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
     """Depth from the stereo pairs of a folder. Raises InputError; for a single frame, when the frame is requested."""
     smooth = " and weighted least squares" if settings.smooth else ""
     method = f"semi-global matching, left-right check{smooth}{', median along the flow' if settings.temporal else ''}"
-    return MadeDepth(stereo_frames(open_common(folder), settings), method, "")
+    return MadeDepth(stereo_frames(describe_prepared(folder), settings), method, "")
 
 
 def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDepth:
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
-    contents, files = list_contents(folder), list_pictures(source, DEPTH_ENDINGS)
-    check_pairing(contents.images, files)
-    intrinsics, baseline = contents.file.camera.intrinsics(folder), contents.file.baseline
+    clip, files = describe_prepared(folder), list_pictures(source, DEPTH_ENDINGS)
+    check_pairing(clip.images, files)
+    intrinsics, baseline = clip.intrinsics, clip.baseline
+    assert intrinsics is not None
     frames = (
         _without_mark(depth_of_values(read_plane(file), kind, scale, intrinsics, baseline, file), kind, file)
         for file in files
@@ -133,12 +142,12 @@ def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray
 
 def from_relative(folder: Path, source: Path, align: Align, farthest: float, trusted: bool, replace: bool) -> MadeDepth:
     """Depth from the relative inverse depth of a network; see `relative_depth`. Raises InputError."""
-    contents = list_contents(folder)
-    if contents.depth and not replace:
+    clip = describe_prepared(folder)
+    if clip.depth and not replace:
         raise InputError(
             f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
-    return relative_depth(contents, source, align, farthest, trusted)
+    return relative_depth(clip, source, align, farthest, trusted)
 
 
 def write_depth(
@@ -151,8 +160,8 @@ def write_depth(
 
     Raises:  InputError, leaving the folder unchanged.
     """
-    contents = list_contents(folder)
-    if (contents.file.depth or (folder / DEPTH).exists()) and not replace:
+    names, file = describe_prepared(folder).names, read_sequence_file(folder)
+    if (file.depth or (folder / DEPTH).exists()) and not replace:
         raise InputError(f"{folder}: has depth already; allowed: --replace")
     coverage, medians, step = [], [], 0.0
     with replacing_folder(folder / DEPTH) as place:
@@ -162,12 +171,12 @@ def write_depth(
                 step = step or step_of_depth(float(np.percentile(known, 99.8)))
                 medians.append(float(np.median(known)))
             coverage.append(known.size / depth.size)
-            write_levels(place / f"{contents.images[k].stem}.png", depth, step or 1.0)
-            on_frame(k + 1, len(contents.images))
+            write_levels(place / f"{names[k]}.png", depth, step or 1.0)
+            on_frame(k + 1, len(names))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
-    unit = ARBITRARY if contents.file.arbitrary or made.assumed else "mm"
+    unit = ARBITRARY if file.arbitrary or made.assumed else "mm"
     entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
-    found = msgspec.structs.replace(contents.file, depth=entry, unit=unit if made.assumed else contents.file.unit)
+    found = msgspec.structs.replace(file, depth=entry, unit=unit if made.assumed else file.unit)
     replace_text(folder / FILE_NAME, sequence_text(found))
     return DepthReport(found, coverage, float(np.median(medians)))

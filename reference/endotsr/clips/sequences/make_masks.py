@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, write_png
 from endotsr.clips.sequences.clip import Clip, Picture
-from endotsr.clips.sequences.common import Contents, list_contents, open_common
 from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.propose_masks import Proposal, overlay, propose_masks
-from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, sequence_text
+from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.sources import PROPOSAL
 from endotsr.errors import InputError
 from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
@@ -44,13 +44,13 @@ def _proposed(clip: Clip) -> Proposal:
     return proposal
 
 
-def _static_mask(contents: Contents, clip: Clip) -> NDArray[np.bool_] | None:
+def _static_mask(clip: Clip) -> NDArray[np.bool_] | None:
     """The excluded pixels (H, W) if the masks are not a proposal and are equal in all frames; else None."""
-    if clip.masks is None or clip.proposed:
+    if clip.masks is None or clip.masks.proposed:
         return None
     first = clip.masks(0)
     assert first is not None
-    for i in range(1, len(contents.masks)):
+    for i in range(1, clip.count):
         if not np.array_equal(clip.masks(i), first):  # pyright: ignore[reportArgumentType]
             return None
     return ~first
@@ -70,10 +70,9 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
 
     Raises:  InputError, leaving the folder unchanged.
     """
-    contents = list_contents(folder)
-    clip = open_common(folder)
-    static = None if replace else _static_mask(contents, clip)
-    if (contents.file.masks or (folder / MASKS).exists()) and not replace and static is None:
+    clip = describe_prepared(folder)
+    static = None if replace else _static_mask(clip)
+    if (clip.masks or (folder / MASKS).exists()) and not replace and static is None:
         raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
     proposal = _proposed(clip)
     if proposal.found and static is not None:
@@ -82,8 +81,8 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
     if not proposal.found:
         return proposal
     with replacing_folder(folder / MASKS) as place:
-        _write_masks(place, [file.stem for file in contents.images], proposal)
-    found = msgspec.structs.replace(contents.file, masks=MaskEntry(proposed=True))
+        _write_masks(place, clip.names, proposal)
+    found = msgspec.structs.replace(read_sequence_file(folder), masks=MaskEntry(proposed=True))
     replace_text(folder / FILE_NAME, sequence_text(found))
     write_png(folder / OVERLAY, overlays(clip, proposal))
     return proposal

@@ -7,20 +7,22 @@ principal point is the image centre, (W/2, H/2) with pixel edges at integers.
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.camera import AXES, CameraPose, Intrinsics, pose_of
+from endotsr.clips.sequences.clip import REST, rests
 from endotsr.clips.sequences.depth_files import read_npy
-from endotsr.clips.sequences.sequence_file import checked_rotation
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, camera_centre
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 LARGEST_POSES = 1 << 26  # bytes: half a million frames
 ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
-FLIP = np.array([1.0, -1.0, -1.0])  # LLFF axes to OpenCV axes, and back
-STATIC_TOLERANCE = 1e-9  # ruling: a camera moves if a pose entry varies by more
+FLIP = np.diag(AXES["opengl"])
+SAME_FOCAL = 1e-6  # relative difference of two equal focal lengths
 
 
 def find_pose_file(folder: Path) -> Path:
@@ -49,22 +51,42 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     return rows
 
 
-def cameras_from_rows(rows: NDArray[np.float64], width: int, height: int, path: Path, frames: range) -> list[Camera]:
-    """Cameras of the chosen rows; the same object for all frames of a static camera.
+class RowCameras(NamedTuple):
+    """What the rows state: the fields of a `Clip` with these names."""
 
-    rows    (n, 17) rows of the pose file
+    intrinsics: Intrinsics | None
+    poses: list[CameraPose | None] | None  # None: a static camera
+    rest: CameraPose  # the pose of a static camera
+    pose_faults: dict[int, str]
+
+
+def cameras_of_rows(rows: NDArray[np.float64], width: int, height: int, path: Path) -> RowCameras:
+    """The cameras of the rows (n, 17).
+
     width, height  size of the image files, pixels
-    path, frames   for messages; `frames` also selects the rows
+    path           for messages
 
-    Raises:  InputError if a row has another image size, a focal length that is not positive, or an invalid rotation.
+    A frame has a fault if its row has another image size or focal length than the others, a focal length that is not
+    positive, or an invalid rotation.
     """
-    cameras = [_camera(rows[i], width, height, f"{path}: frame {i}") for i in frames]
-    chosen = rows[list(frames)][:, :15]
-    static = bool((np.ptp(chosen, axis=0) <= STATIC_TOLERANCE).all())
-    return [cameras[0]] * len(cameras) if static else cameras
+    focal = next((float(row[14]) for row in rows if row[14] > 0), 0.0)
+    poses: list[CameraPose | None] = []
+    faults = {}
+    for i, row in enumerate(rows):
+        try:
+            poses.append(_pose(row, (width, height, focal), f"{path}: frame {i}"))
+        except InputError as error:
+            poses.append(None)
+            faults[i] = str(error)
+    intrinsics = Intrinsics(focal, focal, width / 2, height / 2, width, height) if focal else None
+    known = [pose for pose in poses if pose is not None]
+    if faults or not rests(known):
+        return RowCameras(intrinsics, poses, REST, faults)
+    return RowCameras(intrinsics, None, known[0], {})
 
 
-def _camera(row: NDArray[np.float64], width: int, height: int, where: str) -> Camera:
+def _pose(row: NDArray[np.float64], camera: tuple[int, int, float], where: str) -> CameraPose:
+    width, height, usual = camera
     matrix = row[:15].reshape(3, 5)
     stated_height, stated_width, focal = matrix[:, 4]
     if (stated_width, stated_height) != (width, height):
@@ -75,11 +97,10 @@ def _camera(row: NDArray[np.float64], width: int, height: int, where: str) -> Ca
         )
     if focal <= 0:
         raise InputError(f"{where}: focal length {focal:g}, must be positive")
-    axes = matrix[:, :3] * FLIP  # camera-to-world, OpenCV axes
-    rotation = np.ascontiguousarray(checked_rotation(axes, where).T) + 0.0  # + 0 turns -0 into 0
-    return Camera(
-        rotation, -rotation @ matrix[:, 3] + 0.0, float(focal), float(focal), width / 2, height / 2, width, height
-    )
+    if abs(focal - usual) > SAME_FOCAL * usual:
+        raise InputError(f"{where}: focal length {focal:g}, of the first frame {usual:g}; use one for all frames")
+    pose = pose_of(matrix[:, :3], matrix[:, 3], "camera_to_world", "opengl", where)
+    return pose._replace(rotation=pose.rotation + 0.0)  # + 0 turns -0 into 0
 
 
 def rows_from_cameras(cameras: list[Camera], far: NDArray[np.floating]) -> NDArray[np.float64]:

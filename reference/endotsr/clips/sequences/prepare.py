@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
-from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip, Intrinsics, PicturePair
+from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
 from endotsr.clips.sequences.files import shortened
@@ -229,11 +230,13 @@ def _file_of(
     settings: PrepareSettings,
     notes: list[str],
 ) -> SequenceFile:
-    unit = "arbitrary" if clip.unit == ARBITRARY else "mm"
+    unit = ARBITRARY if clip.arbitrary else "mm"
     if (clip.depth or clip.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
-    method = clip.depth_method if clip.depth else f"points, {settings.points}"
-    clipped = list(CLIPPED) if clip.depth and (settings.scale < 1 or clip.depth_clipped) else []
+    method = clip.depth.method if clip.depth else f"points, {settings.points}"
+    clipped = list(CLIPPED) if clip.depth and (settings.scale < 1 or clip.depth.clipped) else []
+    assumed = clip.depth.assumed if clip.depth else ""
+    entry = DepthEntry(unit=unit, scale=depth_scale or 1.0, clipped=clipped, method=method, assumed=assumed)
     times, rate = written_times(clip, chosen, settings.rate, notes)
     return SequenceFile(
         format=FORMAT,
@@ -243,10 +246,8 @@ def _file_of(
         unit=unit,
         frame_rate=rate,
         times=times,
-        masks=MaskEntry(proposed=clip.proposed) if clip.masks is not None else None,
-        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method, assumed=clip.depth_assumed)
-        if depth_scale
-        else None,
+        masks=MaskEntry(proposed=clip.masks.proposed) if clip.masks is not None else None,
+        depth=entry if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )
 

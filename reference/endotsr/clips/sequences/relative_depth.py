@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.depth import light_correlation, light_finding
-from endotsr.clips.sequences.common import Contents, open_common
+from endotsr.clips.sequences.clip import Assumed, Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.clips.sequences.files import check_pairing, list_pictures, shortened
-from endotsr.clips.sequences.sequence_file import Assumed
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -86,7 +85,7 @@ def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
     return StraightLine(float(scale), float(shift))
 
 
-def relative_depth(contents: Contents, source: Path, align: Align, farthest: float, trusted: bool) -> MadeDepth:
+def relative_depth(clip: Clip, source: Path, align: Align, farthest: float, trusted: bool) -> MadeDepth:
     """Depth of every frame from the files of r.
 
     align      one line per frame or for the sequence; auto: per frame if the clip has depth, else for the sequence
@@ -97,64 +96,65 @@ def relative_depth(contents: Contents, source: Path, align: Align, farthest: flo
              stereo pair, which fix a scale that r lacks.
     """
     files = list_pictures(source, DEPTH_ENDINGS)
-    check_pairing(contents.images, files)
-    intrinsics = contents.file.camera.intrinsics(contents.folder)
+    check_pairing(clip.images, files)
+    intrinsics = clip.intrinsics
+    assert intrinsics is not None
 
     def relative(i: int) -> FloatArray:
         return nearest_pixels(read_plane(files[i]).astype(np.float64), intrinsics.width, intrinsics.height, files[i])
 
-    if contents.depth and contents.file.depth and not contents.file.depth.assumed:
-        return _aligned(contents, relative, source, align)
-    _refuse_known_scale(contents)
+    if clip.depth and not clip.depth.assumed:
+        return _aligned(clip, relative, source, align)
+    _refuse_known_scale(clip)
     every = range(len(files))
     groups = [[i] for i in every] if align == "frame" else [list(every)] * len(files)
     lines = {tuple(group): _assumed_line(relative, group, farthest, source) for group in groups}
     chosen = [lines[tuple(group)] for group in groups]
     if not trusted:
-        _refuse_against_light(contents, relative, chosen, source)
+        _refuse_against_light(clip, relative, chosen, source)
     how = "in every frame" if align == "frame" else "in the sequence"
     method = f"relative inverse depth of {source.name}; assumed: the farthest tissue {how} is {farthest:g} times as far"
     frames = (line.depth(relative(i), farthest) for i, line in enumerate(chosen))
     return MadeDepth(frames, f"{method} as the nearest", "scale and shift")
 
 
-def flat_depth(contents: Contents) -> MadeDepth:
+def flat_depth(clip: Clip) -> MadeDepth:
     """A fronto-parallel plane in every frame. Raises InputError if moving poses or a stereo pair determine depth."""
-    _refuse_known_scale(contents)
-    camera = contents.file.camera
-    plane = np.ones((camera.height, camera.width), np.float32)
-    return MadeDepth((plane for _ in contents.images), "assumed: a plane that faces the camera", "shape")
+    _refuse_known_scale(clip)
+    assert clip.intrinsics is not None
+    plane = np.ones((clip.intrinsics.height, clip.intrinsics.width), np.float32)
+    return MadeDepth((plane for _ in clip.names), "assumed: a plane that faces the camera", "shape")
 
 
-def _aligned(contents: Contents, relative: Callable[[int], FloatArray], source: Path, align: Align) -> MadeDepth:
+def _aligned(clip: Clip, relative: Callable[[int], FloatArray], source: Path, align: Align) -> MadeDepth:
     """Depth by lines fitted to the depth of the clip."""
-    known = open_common(contents.folder).depth
-    assert known is not None and contents.file.depth is not None
-    count, apart = len(contents.images), []
+    known = clip.depth
+    assert known is not None
+    count, apart = clip.count, []
     reference = [_sampled(relative(i), known(i), MOST if align != "sequence" else 50) for i in range(count)]
     once = fitted_line(*np.concatenate(reference, axis=1)) if align == "sequence" else None
     lines = [once if align == "sequence" else fitted_line(*pair) for pair in reference]
     fitted = [i for i, line in enumerate(lines) if line is not None]
     if not fitted:
-        raise InputError(f"{source}: no frame has {FEWEST} pixels with depth in {contents.folder} to compare with")
+        raise InputError(f"{source}: no frame has {FEWEST} pixels with depth in {clip.where} to compare with")
     chosen = [lines[min(fitted, key=lambda k: (abs(k - i), k))] for i in range(count)]
     for i, line in enumerate(chosen):
         assert line is not None
         if line.scale <= 0:
             raise InputError(
-                f"{source}: frame {contents.images[i].stem}: the values decrease towards the camera, according to"
-                f" the depth of {contents.folder.name}; allowed: a relative inverse depth, larger = nearer"
+                f"{source}: frame {clip.names[i]}: the values decrease towards the camera, according to"
+                f" the depth of {clip.where.name}; allowed: a relative inverse depth, larger = nearer"
             )
         found, z = line.depth(reference[i][0]), reference[i][1]
         apart.append(np.abs(found - z)[z > 0] / z[z > 0])
-    borrowed = [contents.images[i].stem for i in range(count) if i not in fitted]
+    borrowed = [clip.names[i] for i in range(count) if i not in fitted]
     how = "once for the sequence" if align == "sequence" else "in every frame"
     method = (
-        f"relative inverse depth of {source.name}, scale and shift from the depth before ({contents.file.depth.method})"
+        f"relative inverse depth of {source.name}, scale and shift from the depth before ({known.method})"
         f" {how}; median difference {np.median(np.concatenate(apart)):.1%}"
     ) + (f"; scale and shift of the nearest frame for {shortened(borrowed)}" if borrowed else "")
     frames = (line.depth(relative(i)) for i, line in enumerate(chosen) if line is not None)
-    return MadeDepth(frames, method, contents.file.depth.assumed)
+    return MadeDepth(frames, method, known.assumed)
 
 
 def _sampled(relative: FloatArray, depth: NDArray[np.float32] | None, most: int) -> FloatArray:
@@ -166,16 +166,14 @@ def _sampled(relative: FloatArray, depth: NDArray[np.float32] | None, most: int)
     return np.stack([relative.reshape(-1)[both], depth.reshape(-1)[both]])
 
 
-def _refuse_known_scale(contents: Contents) -> None:
+def _refuse_known_scale(clip: Clip) -> None:
     """Raises InputError if a stereo pair or moving poses fix the scale."""
-    poses, file = contents.poses, contents.file
-    if contents.right and file.camera.baseline:
+    poses = [pose for pose in clip.poses or [] if pose is not None]
+    if clip.right and clip.baseline:
+        raise InputError(f"{clip.where}: a stereo pair gives lengths; allowed: `endotsr depth {clip.where}` first")
+    if any((pose.translation != poses[0].translation).any() for pose in poses):
         raise InputError(
-            f"{contents.folder}: a stereo pair gives lengths; allowed: `endotsr depth {contents.folder}` first"
-        )
-    if poses and any((pose.translation != poses[0].translation).any() for pose in poses):
-        raise InputError(
-            f"{contents.folder}: the camera moves, and its poses fix the scale of the depth, which relative numbers do"
+            f"{clip.where}: the camera moves, and its poses fix the scale of the depth, which relative numbers do"
             " not have; allowed: a clip with some depth, such as that of the points of a COLMAP model (`endotsr prepare"
             " MODEL --points sparse`)"
         )
@@ -194,9 +192,9 @@ def _assumed_line(
 
 
 def _refuse_against_light(
-    contents: Contents, relative: Callable[[int], FloatArray], lines: list[StraightLine], source: Path
+    clip: Clip, relative: Callable[[int], FloatArray], lines: list[StraightLine], source: Path
 ) -> None:
-    clip, light = open_common(contents.folder), []
+    light = []
     looked = list(range(min(LOOKED_AT, clip.count)))
     for i, pair in zip(looked, clip.pictures(looked)):
         tissue = clip.masks(i) if clip.masks else None

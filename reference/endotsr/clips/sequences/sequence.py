@@ -10,8 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from endotsr.config import Section, SequenceConfig
 from endotsr.method.splatting.camera import Camera
 from endotsr.untrusted.names import file_name
+
+IN_MEMORY = "arrays in memory"  # source of a sequence that Python made
 
 
 class Frame(NamedTuple):
@@ -43,6 +46,9 @@ class Sequence:
     test_index: NDArray[np.intp]  # ascending, disjoint from train_index
     notes: list[str] = field(default_factory=list)
     duration: float = 0.0  # seconds from time 0 to time 1, n / frame rate; 0 = unknown
+    source: str = IN_MEMORY  # the folder that was read, or `simulated`
+    settings: SequenceConfig | None = None  # with which it was read; None: a training brings its own
+    simulator: Section | None = None  # settings of a simulated sequence
 
     def __post_init__(self) -> None:
         n, _, height, width = self.images.shape

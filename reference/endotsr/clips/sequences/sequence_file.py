@@ -40,19 +40,23 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Intrinsics, checked_intrinsics, scene_factor
+from endotsr.clips.sequences.camera import (
+    ARBITRARY,
+    CameraPose,
+    Intrinsics,
+    checked_intrinsics,
+    pose_of,
+    scene_factor,
+)
+from endotsr.clips.sequences.clip import Assumed
 from endotsr.config import Section, checked, refuse_unknown_keys
 from endotsr.errors import InputError
-from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.toml import read_toml, toml_text
 
 FILE_NAME = "sequence.toml"
 FORMAT = "endotsr-sequence-1"
 IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
-ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
-OPENGL = np.diag([1.0, -1.0, -1.0])  # OpenGL axes to OpenCV axes, and back
 Unit = Literal["um", "mm", "cm", "m", "arbitrary"]
-Assumed = Literal["", "scale and shift", "shape"]  # properties of the depth that are not measured
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
@@ -121,12 +125,6 @@ class SequenceFile(Section, frozen=True, kw_only=True):
     def arbitrary(self) -> bool:
         """Whether the unit of the lengths is unknown."""
         return self.unit == ARBITRARY
-
-    @property
-    def unit_in_words(self) -> str:
-        """The unit of all lengths, with their assumptions; it accompanies every reported length."""
-        assumed = f", {self.depth.assumed} of the depth assumed" if self.depth and self.depth.assumed else ""
-        return f"arbitrary unit{assumed}" if self.arbitrary else "mm"
 
     @property
     def depth_scale(self) -> float:
@@ -204,35 +202,24 @@ def _plain_name(folder: str) -> bool:
     return bool(folder) and Path(folder).name == folder and folder not in (".", "..")
 
 
-def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
-    """World-to-camera poses in OpenCV axes, translation in scene units; None for a static camera.
-
-    Raises:  InputError naming the frame of the first invalid pose, or for a wrong number of poses.
-    """
-    poses, faults = read_poses_with_gaps(found, path)
-    if faults:
-        raise InputError(faults[0])
-    return None if poses is None else [pose for pose in poses if pose is not None]
-
-
-def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
-    """As `read_poses`, with None for an invalid pose, and the reasons.
+def read_poses(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, dict[int, str]]:
+    """Poses with translation in scene units, None for a static camera; and why a frame has none.
 
     Raises:  InputError for a wrong number of poses.
     """
     if found.poses is None:
-        return None, []
+        return None, {}
     rows = found.poses.matrices
     if len(rows) != found.frames:
         raise InputError(f"{path}: poses.matrices: {len(rows)} rows for {found.frames} frames")
     poses: list[CameraPose | None] = []
-    faults = []
+    faults = {}
     for i, row in enumerate(rows):
         try:
             poses.append(_pose(row, found.poses, scene_factor(found.unit), f"{path}: poses.matrices: frame {i}"))
         except InputError as error:
             poses.append(None)
-            faults.append(str(error))
+            faults[i] = str(error)
     return poses, faults
 
 
@@ -240,32 +227,7 @@ def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> Camer
     if len(row) != 12:
         raise InputError(f"{where}: {len(row)} numbers; allowed: 12, the rows of a 3x4 matrix")
     matrix = np.array(row, np.float64).reshape(3, 4)
-    if entry.axes == "opengl":
-        matrix = OPENGL @ matrix if entry.direction == "world_to_camera" else matrix @ np.diag([1.0, -1.0, -1.0, 1.0])
-    rotation = checked_rotation(matrix[:, :3], where)
-    translation = matrix[:, 3] * scale
-    if not np.isfinite(translation).all():
-        raise InputError(f"{where}: the translation is not finite")
-    if entry.direction == "camera_to_world":
-        return inverse_pose(rotation, translation)
-    return CameraPose(rotation, translation)
-
-
-def inverse_pose(rotation: FloatArray, translation: FloatArray) -> CameraPose:
-    """World-to-camera from camera-to-world, or the reverse."""
-    turned = np.ascontiguousarray(rotation.T)
-    return CameraPose(turned, -turned @ translation + 0.0)
-
-
-def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
-    """The matrix. Raises InputError unless it is a finite rotation."""
-    if not np.isfinite(matrix).all():
-        raise InputError(f"{where}: the rotation is not finite")
-    if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROTATION_TOLERANCE:
-        raise InputError(f"{where}: the first three columns are not perpendicular unit vectors")
-    if np.linalg.det(matrix) < 0:
-        raise InputError(f"{where}: the first three columns are a mirror image, not a rotation")
-    return np.ascontiguousarray(matrix)
+    return pose_of(matrix[:, :3], matrix[:, 3] * scale, entry.direction, entry.axes, where)
 
 
 def write_sequence_file(found: SequenceFile, folder: Path) -> None:

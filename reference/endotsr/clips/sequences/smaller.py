@@ -45,14 +45,16 @@ def smaller_cameras(cameras: list[Camera], width: int, height: int) -> list[Came
     return [scaled[id(camera)] for camera in cameras]
 
 
-def halved(sequence: Sequence, memory: float) -> Sequence:
-    """The same frames, times and split with floor(W/2) x floor(H/2) pixels; `memory` as in `FrameStore`."""
-    width, height = sequence.width // 2, sequence.height // 2
-    images, masks, depth = smaller_frames(
-        sequence.images, sequence.masks, sequence.depth, width, height, memory, "half size"
-    )
+def smaller(sequence: Sequence, width: int, height: int, memory: float, where: object) -> Sequence:
+    """The same frames, times and split at a smaller size; `memory` and `where` as in `FrameStore`."""
+    images, masks, depth = smaller_frames(sequence.images, sequence.masks, sequence.depth, width, height, memory, where)
     cameras = smaller_cameras(sequence.cameras, width, height)  # (20.6)
     return replace(sequence, images=images, masks=masks, depth=depth, cameras=cameras)
+
+
+def halved(sequence: Sequence, memory: float) -> Sequence:
+    """The same frames, times and split with floor(W/2) x floor(H/2) pixels; `memory` as in `FrameStore`."""
+    return smaller(sequence, sequence.width // 2, sequence.height // 2, memory, "half size")
 
 
 def nearest_pixels(plane: NDArray, width: int, height: int, where: object) -> NDArray:

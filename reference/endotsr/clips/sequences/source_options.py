@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from endotsr.config import SequenceConfig
+
 
 @dataclass(frozen=True)
 class SourceOptions:
@@ -28,3 +30,4 @@ class SourceOptions:
     rate: float | None = None  # frames per second; the pictures then count as evenly spaced
     orientation: Literal["turned", "stored"] | None = None  # for a video that states a rotation
     points: Literal["interpolated", "sparse", "none"] = "interpolated"  # depth from points of a reconstruction
+    settings: SequenceConfig | None = None  # of a training, which choose the masks of the source and their polarity

@@ -12,19 +12,15 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
-from endotsr.clips.sequences.clip import (
+from endotsr.clips.sequences.camera import (
     ARBITRARY,
     CameraPose,
-    Clip,
     Intrinsics,
-    Picture,
-    PicturePair,
     StereoCalibration,
     checked_intrinsics,
-    colour_picture,
-    grey_plane,
     scene_factor,
 )
+from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
 from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
@@ -89,10 +85,8 @@ def pictures_from_files(
     return pictures
 
 
-def mask_reader(
-    files: list[Path | None], excluded_value: str, width: int, height: int
-) -> Callable[[int], NDArray[np.bool_] | None]:
-    """Tissue masks from files, one per frame; None where a frame has none.
+def masks_of(files: list[Path | None], excluded_value: str, width: int, height: int, proposed: bool = False) -> Masks:
+    """Masks from files, one per frame; None where a frame has none.
 
     A mask of another size but equal aspect ratio is resized by nearest-neighbour sampling. Values above half of the
     largest are white: masks of 0 and 1 are valid, and intermediate JPEG values are rounded. The polarity states which
@@ -113,7 +107,7 @@ def mask_reader(
         tissue = ~white if excluded_value == "white" else white
         return nearest_pixels(tissue, width, height, path)
 
-    return mask
+    return Masks(mask, excluded_value=excluded_value, proposed=proposed)
 
 
 def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | None]:
@@ -145,44 +139,35 @@ def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | N
     return found
 
 
-def depth_reader(files: list[Path | None], scale: float) -> Callable[[int], NDArray[np.float32] | None]:
+def depth_of(files: list[Path | None], scale: float) -> Depth:
     """Depth from files, one per frame, in millimetres or the arbitrary unit; None where a frame has none."""
 
     def depth(i: int) -> NDArray[np.float32] | None:
         path = files[i]
         return None if path is None else depth_plane(read_plane(path), scale, path)
 
-    return depth
+    return Depth(depth, scale=scale)
 
 
-def stated_masks(
-    options: SourceOptions, frames: list[Path] | int, width: int, height: int
-) -> Callable[[int], NDArray[np.bool_] | None] | None:
-    """The masks of `--masks`, paired with frame files or with the frame numbers of a video; None if not stated."""
+def stated_masks(options: SourceOptions, frames: list[Path] | int, width: int, height: int) -> Masks | None:
+    """The masks of `--masks`, paired with frame files or with the frame numbers of a video; None if not stated.
+
+    Masks next to the mark of `endotsr masks` are an unchecked proposal.
+    """
     if options.masks is None:
         return None
     files = files_of(options.masks, PICTURE_ENDINGS)
-    return mask_reader(matching_files(frames, files), options.excluded_value, width, height)
+    proposed = (options.masks.parent / PROPOSAL).is_file()
+    return masks_of(matching_files(frames, files), options.excluded_value, width, height, proposed)
 
 
-def masks_are_proposed(options: SourceOptions) -> bool:
-    """Whether the masks of `--masks` are an unchecked proposal of `endotsr masks`."""
-    return options.masks is not None and (options.masks.parent / PROPOSAL).is_file()
-
-
-def stated_depth(
-    options: SourceOptions, frames: list[Path] | int
-) -> Callable[[int], NDArray[np.float32] | None] | None:
+def stated_depth(options: SourceOptions, frames: list[Path] | int) -> Depth | None:
     """The depth of `--depth`, as `stated_masks`."""
     if options.depth is None:
         return None
-    files = files_of(options.depth, DEPTH_ENDINGS)
-    return depth_reader(matching_files(frames, files), depth_step(options))
-
-
-def depth_step(options: SourceOptions) -> float:
-    """Scene units per stored value of the files of `--depth`."""
-    return options.depth_scale * scene_factor(options.depth_unit)
+    scale = options.depth_scale * scene_factor(options.depth_unit)
+    depth = depth_of(matching_files(frames, files_of(options.depth, DEPTH_ENDINGS)), scale)
+    return replace(depth, unit=options.depth_unit, stated=options.depth, trusted=options.trust_depth)
 
 
 def with_stated(clip: Clip, options: SourceOptions) -> Clip:
@@ -190,21 +175,14 @@ def with_stated(clip: Clip, options: SourceOptions) -> Clip:
 
     Raises:  InputError for files that do not match its frames, or if only one of depth and clip is in millimetres.
     """
-    intrinsics = clip.intrinsics
-    assert intrinsics is not None
-    frames = [clip.where / f"{name}.png" for name in clip.names]
-    masks, depth = stated_masks(options, frames, intrinsics.width, intrinsics.height), stated_depth(options, frames)
-    if depth is not None and (options.depth_unit == ARBITRARY) != (clip.unit == ARBITRARY):
+    if clip.intrinsics is None or (options.masks is None and options.depth is None):
+        return clip
+    frames = clip.images or [clip.where / f"{name}.png" for name in clip.names]
+    masks = stated_masks(options, frames, clip.intrinsics.width, clip.intrinsics.height)
+    depth = stated_depth(options, frames)
+    if depth is not None and (options.depth_unit == ARBITRARY) != clip.arbitrary:
         raise InputError(f"{clip.where}: --depth-unit {options.depth_unit} with the unit {clip.unit}")
-    return replace(
-        clip,
-        masks=masks or clip.masks,
-        depth=depth or clip.depth,
-        depth_clipped=clip.depth_clipped and depth is None,
-        depth_method="given" if depth else clip.depth_method,
-        depth_assumed="" if depth else clip.depth_assumed,
-        proposed=clip.proposed and masks is None,
-    )
+    return replace(clip, masks=masks or clip.masks, depth=depth or clip.depth)
 
 
 def stated_camera(

@@ -1,6 +1,6 @@
 """The split into training and held-out frames, and the normalised time of a frame.
 
-In: the number of selected frames (a frame range is applied before the split), and the seconds of frames that are not
+In: the number of selected frames (a frame range is applied before the split), and the times of frames that are not
 evenly spaced. Out: normalised times, and the split as ascending frame numbers (train (n_train,), test (n_test,)). The
 split counts frames. It does not depend on their pictures or times.
 """
@@ -23,25 +23,25 @@ def time_stamps(count: int) -> NDArray[np.float64]:
     return np.arange(count) / count
 
 
-def frame_times(seconds: NDArray[np.float64] | None, count: int) -> NDArray[np.float64]:
+def normalised_times(times: NDArray[np.float64] | None, count: int) -> NDArray[np.float64]:
     """Normalised times of possibly uneven frames: t_i = (s_i - s_0) / (s_{n-1} - s_0) (n - 1) / n.
 
-    seconds  (n,) strictly ascending, in any unit; None: evenly spaced
+    times    (n,) strictly ascending, in any unit; None: evenly spaced
     returns  (n,) from 0 to (n - 1) / n
 
-    Edges:   evenly spaced seconds give i / n to rounding; None gives it exactly (`time_stamps`).
+    Edges:   evenly spaced times give i / n to rounding; None gives it exactly (`time_stamps`).
     """
-    if seconds is None or count < 2:
+    if times is None or count < 2:
         return time_stamps(count)
-    return (seconds - seconds[0]) / (seconds[-1] - seconds[0]) * ((count - 1) / count)
+    return (times - times[0]) / (times[-1] - times[0]) * ((count - 1) / count)
 
 
-def evenly_spaced(seconds: NDArray[np.float64]) -> bool:
+def evenly_spaced(times: NDArray[np.float64]) -> bool:
     """Whether all frames are within a tenth of a step, or the rounding of containers, of an even grid."""
-    if len(seconds) < 3:
+    if len(times) < 3:
         return True
-    step = (seconds[-1] - seconds[0]) / (len(seconds) - 1)
-    off = np.abs(seconds - seconds[0] - step * np.arange(len(seconds))).max()
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    off = np.abs(times - times[0] - step * np.arange(len(times))).max()
     return bool(off <= max(UNEVEN * step, ROUNDING))
 
 

@@ -26,7 +26,7 @@ from endotsr.clips.sequences.checks.depth import (
 )
 from endotsr.clips.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
 from endotsr.clips.sequences.checks.kinds import Finding
-from endotsr.clips.sequences.clip import ARBITRARY, Clip
+from endotsr.clips.sequences.clip import Clip
 from endotsr.errors import InputError
 
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
@@ -42,12 +42,12 @@ def refuse_no_lengths(clip: Clip, chosen: list[int]) -> None:
 
     chosen   the frames to read; the first `LOOKED_AT` are checked
     """
-    stated = clip.stated_depth
-    if stated is None or stated.trusted or clip.depth is None:
+    depth = clip.depth
+    if depth is None or depth.stated is None or depth.trusted:
         return
-    found = _of_names(stated.path) or _of_values(clip, chosen[:LOOKED_AT])
+    found = _of_names(depth.stated) or _of_values(clip, depth.stated, chosen[:LOOKED_AT])
     if found:
-        raise InputError(f"{stated.path}: {found}; {REMEDY}")
+        raise InputError(f"{depth.stated}: {found}; {REMEDY}")
 
 
 def _of_names(path: Path) -> str:
@@ -56,14 +56,13 @@ def _of_names(path: Path) -> str:
     return f"the name {named} indicates a disparity or a relative depth" if named else ""
 
 
-def _of_values(clip: Clip, frames: list[int]) -> str:
+def _of_values(clip: Clip, path: Path, frames: list[int]) -> str:
     """Evidence against lengths in the values and in comparison with the pictures; "" without any.
 
     Raises:  InputError for depth that is upside down or mirrored, or whose largest value marks missing depth.
     """
-    stated, where = clip.stated_depth, str(clip.where)
-    read, masks = clip.depth, clip.masks
-    assert read is not None and stated is not None
+    read, masks, where = clip.depth, clip.masks, str(clip.where)
+    assert read is not None
     planes: list[NDArray[np.float32]] = []
     light: list[float] = []
     shading: list[Fit] = []
@@ -80,18 +79,18 @@ def _of_values(clip: Clip, frames: list[int]) -> str:
             disparity = None if right is None else agreed_disparity(pair.left, right)
             if disparity is not None:
                 found = stereo_finding(plane, disparity, where, i)
-                _refuse_flipped(found, stated.path)
+                _refuse_flipped(found, path)
                 if found:
                     return found[0].what
-    _refuse_flipped(shading_finding(shading, where), stated.path)
+    _refuse_flipped(shading_finding(shading, where), path)
     if not planes:
         return ""
-    facts = [depth_facts("", plane, plane / stated.step, None) for plane in planes]
+    facts = [depth_facts("", plane, plane / read.scale, None) for plane in planes]
     if marked := mark_finding(facts, where):
-        raise InputError(f"{stated.path}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}, or --trust-depth")
-    if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
+        raise InputError(f"{path}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}, or --trust-depth")
+    if len(planes) > 2 and (full := _full_scale([plane / read.scale for plane in planes])):
         return full
-    unit = [] if clip.unit == ARBITRARY else unit_finding(usual_depth(facts), where)
+    unit = [] if clip.arbitrary else unit_finding(usual_depth(facts), where)
     if unit:
         return f"{unit[0].what}; state another unit with --depth-unit and --depth-scale"
     found = light_finding(light, where)

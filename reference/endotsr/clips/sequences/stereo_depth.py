@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.stereo import match_pair
-from endotsr.clips.sequences.clip import Intrinsics, Picture
+from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.sequences.clip import Picture
 from endotsr.config import Fraction, Positive, Section
 from endotsr.errors import InputError
 

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
-from endotsr.clips.sequences.clip import (
+from endotsr.clips.sequences.camera import (
     CameraPose,
-    Clip,
     Intrinsics,
-    Picture,
-    PicturePair,
     intrinsics_of_matrix,
     opencv_matrix,
 )
+from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -96,13 +94,14 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
             f"{clip.where}: the intrinsics are of {intrinsics.width}x{intrinsics.height} pixels, the pictures have"
             f" {width}x{height}"
         )
+    clipped = clip.depth is not None and bool(clip.depth.clipped)
     if not any(intrinsics.distortion):
         plain = intrinsics._replace(distortion=())
-        return Straightener(plain.scaled(*new_size), None, None, np.eye(3), clip.baseline, [], clip.depth_clipped)
+        return Straightener(plain.scaled(*new_size), None, None, np.eye(3), clip.baseline, [], clipped)
     maps = undistortion_maps(opencv_matrix(intrinsics), np.array(intrinsics.distortion), width, height)
     new = intrinsics_of_matrix(maps.matrix, width, height, where=clip.where)
     note = f"undistorted: distortion {', '.join(f'{k:g}' for k in intrinsics.distortion)}"
-    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, [note], clip.depth_clipped)
+    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, [note], clipped)
 
 
 def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:

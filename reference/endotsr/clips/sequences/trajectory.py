@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.clip import CameraPose, scene_factor
-from endotsr.clips.sequences.sequence_file import OPENGL, inverse_pose
+from endotsr.clips.sequences.camera import CameraPose, pose_of, scene_factor
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
@@ -80,12 +79,7 @@ def _rows(path: Path) -> tuple[FloatArray, list[int]]:
 def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> CameraPose:
     from scipy.spatial.transform import Rotation
 
-    rotation, translation = Rotation.from_quat(row[4:]).as_matrix(), row[1:4] * scale
-    if direction == "camera_to_world":
-        rotation, translation = inverse_pose(rotation, translation)
-    return (
-        CameraPose(OPENGL @ rotation, OPENGL @ translation) if axes == "opengl" else CameraPose(rotation, translation)
-    )
+    return pose_of(Rotation.from_quat(row[4:]).as_matrix(), row[1:4] * scale, direction, axes)
 
 
 def poses_of_frames(

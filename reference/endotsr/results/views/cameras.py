@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.sequences.between import camera_between
+from endotsr.clips.sequences.camera import checked_rotation
 from endotsr.clips.sequences.record import RecordedCamera
-from endotsr.clips.sequences.sequence_file import checked_rotation
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera

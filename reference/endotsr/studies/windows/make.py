@@ -167,10 +167,9 @@ def no_larger(config: Config, gaussians: int | None) -> Config:
 def size_of(job: Job) -> Size:
     """The size of a window; reads the first picture of the folder."""
     from endotsr.clips.sequences.layouts import describe
-    from endotsr.clips.sequences.source_options import SourceOptions
 
     first, end, step = (int(word) for word in job.config.sequence.frames.split(":"))
-    intrinsics, scale = describe(Path(job.source), SourceOptions()).intrinsics, job.config.sequence.scale
+    intrinsics, scale = describe(Path(job.source)).intrinsics, job.config.sequence.scale
     assert intrinsics is not None
     return Size(len(range(first, end, step)), round(intrinsics.width * scale), round(intrinsics.height * scale))
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.effects.frames import WIDEST
-from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip
-from endotsr.clips.sequences.endonerf import NO_MASKS
-from endotsr.clips.sequences.layouts import describe, readable_layout
-from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.camera import CameraPose
+from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.layouts import describe_for_training, without_faults
 from endotsr.clips.sequences.splits import parse_frame_range
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -57,23 +56,22 @@ def survey(source: Path, config: SequenceConfig) -> list[SurveyedFrame]:
     Raises: InputError for a folder that `train` does not accept, and for a recording of arbitrary unit, because each
             window would have its own scale. An unreadable frame raises nothing; `fault` gives the reason.
     """
-    readable_layout(source)
-    clip = describe(source, SourceOptions(excluded_value=config.excluded_value))
-    if clip.unit == ARBITRARY:
+    clip = without_faults(describe_for_training(source, config))
+    if clip.arbitrary:
         raise InputError(f"{source}: its unit is arbitrary, so each window would have its own scale; allowed: mm")
     try:
         frames = parse_frame_range(config.frames, clip.count)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
-    return list(_surveyed(clip, frames, config.masks != NO_MASKS))
+    return list(_surveyed(clip, frames))
 
 
-def _surveyed(clip: Clip, frames: range, masked: bool) -> Iterator[SurveyedFrame]:
+def _surveyed(clip: Clip, frames: range) -> Iterator[SurveyedFrame]:
     before: _Shown | None = None
     for i in frames:
         found, shown = SurveyedFrame(clip.names[i]), None
         try:
-            shown = _shown(clip, i, masked)
+            shown = _shown(clip, i)
         except InputError as error:
             found = found._replace(fault=str(error))
         if shown is not None:
@@ -84,14 +82,14 @@ def _surveyed(clip: Clip, frames: range, masked: bool) -> Iterator[SurveyedFrame
         yield found
 
 
-def _shown(clip: Clip, i: int, masked: bool) -> _Shown:
+def _shown(clip: Clip, i: int) -> _Shown:
     """Frame i. Raises InputError if one of its files cannot be read."""
     picture = next(iter(clip.pictures([i]))).left
     intrinsics = clip.intrinsics
     if intrinsics is not None and picture.shape[:2] != (intrinsics.height, intrinsics.width):
         size = f"{picture.shape[1]}x{picture.shape[0]}"
         raise InputError(f"{clip.names[i]}: {size} pixels, the recording has {intrinsics.width}x{intrinsics.height}")
-    mask = clip.masks(i) if masked and clip.masks is not None else None
+    mask = clip.masks(i) if clip.masks is not None else None
     tissue = np.ones(picture.shape[:2], bool) if mask is None else mask
     depth = None if clip.depth is None else clip.depth(i)
     known = np.empty(0) if depth is None else depth[tissue & (depth > 0)]

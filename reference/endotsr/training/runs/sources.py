@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.sequence import IN_MEMORY, Sequence
 from endotsr.clips.sequences.splits import split_frames
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.config import Config, checked
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from endotsr.method.kernels.arrays import FloatArray
 
 SIMULATED = "simulated"  # the simulated sequence; a folder of this name is written `./simulated`
-IN_MEMORY = "arrays in memory"  # source of a sequence passed from Python
 ARRAYS = ("images", "masks", "depth", "times")
 
 
@@ -32,7 +31,7 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
         return _simulated(simulated_settings(simulator, config), config)
     if source == IN_MEMORY:
         raise InputError("the run was trained on arrays in memory; allowed: a folder with the same frames")
-    from endotsr.clips.sequences.layouts import read_sequence
+    from endotsr.clips.sequences.read import read_sequence
 
     return read_sequence(Path(source), config.sequence, config.raster.near)
 
@@ -105,10 +104,9 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
     if source == SIMULATED:
         record["simulator"] = msgspec.to_builtins(simulator)
     elif source != IN_MEMORY:
-        from endotsr.clips.sequences.layouts import readable_layout
+        from endotsr.clips.sequences.read import file_hashes
 
-        hashes = readable_layout(Path(source)).hashes
-        record["files_sha256"] = hashes(Path(source), config.sequence) if hashes else {}
+        record["files_sha256"] = file_hashes(Path(source), config.sequence)
     return record
 
 

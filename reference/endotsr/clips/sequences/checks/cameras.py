@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.checks.kinds import Finding, finding
-from endotsr.clips.sequences.clip import Intrinsics
 from endotsr.clips.sequences.world import FAR_FROM_ORIGIN
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between

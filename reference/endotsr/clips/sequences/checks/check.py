@@ -32,11 +32,10 @@ from endotsr.clips.sequences.checks.frames import (
     time_findings,
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
-from endotsr.clips.sequences.checks.parts import Parts, parts_of
-from endotsr.clips.sequences.clip import colour_picture, grey_plane
+from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
-from endotsr.clips.sequences.files import check_pairing
 from endotsr.clips.sequences.frame_store import FrameStore
+from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.sources import matching_files
 from endotsr.clips.sequences.splits import parse_frame_range, split_frames
@@ -101,59 +100,81 @@ def check_sequence(path: Path, config: Config) -> Checked:
     Raises:  InputError only if there is nothing to check: no folder, or a layout that needs `endotsr prepare`.
     """
     run = _Pass()
-    parts = parts_of(Path(path), config.sequence, run.findings)
-    if not parts.images:
+    if not Path(path).exists():
+        raise InputError(f"{path}: sequence folder not found")
+    clip = describe_for_training(path, config.sequence)
+    run.findings += clip.faults + _stated(clip)
+    if not clip.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
-    _pairing(parts, run)
     run.findings += (
-        profile_findings(parts.images[0]) + gap_findings(parts.images) + time_findings(parts.seconds, str(parts.folder))
+        profile_findings(clip.images[0]) + gap_findings(clip.images) + time_findings(clip.times, str(clip.where))
     )
-    size = _read_frames(parts, run)
-    facts: dict[str, Any] = {"frames": len(parts.images)}
+    size = _read_frames(clip, run)
+    facts: dict[str, Any] = {"frames": len(clip.images)}
     if run.frames:
-        run.findings += frame_findings(run.frames, str(parts.images[0].parent))
-    if run.depth:
-        where, near = str(parts.depth[0].parent), config.raster.near
-        run.findings += depth_findings(run.depth, where, parts.arbitrary, near, parts.assumed)
+        run.findings += frame_findings(run.frames, str(clip.images[0].parent))
+    if run.depth and clip.depth:
+        where, near = str(clip.depth.files[0].parent), config.raster.near
+        run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
     if run.samples:
-        _check_masks(parts, run, config)
-    config = _of_length(parts, config, run)
+        _check_masks(clip, run, config)
+    config = _of_length(clip, config, run)
     if size:
         facts |= {"width": size[1], "height": size[0]}
-        cameras = run.tried(lambda: parts.cameras(size[1], size[0]), "cameras", parts.camera_file)
-        if cameras:
-            run.findings += camera_findings(cameras, usual_depth(run.depth), str(parts.camera_file))
-        facts["cost"] = _cost(parts, size, config, run)._asdict()
+        if not any(fault.code == "cameras" for fault in clip.faults):
+            _check_cameras(clip, run, size)
+        facts["cost"] = _cost(clip, size, config, run)._asdict()
     return Checked(str(path), worst_first(run.findings), facts, run.pictures)
 
 
-def _pairing(parts: Parts, run: _Pass) -> None:
-    for other in (parts.masks, parts.depth, parts.right):
-        if other:
-            run.tried(lambda other=other: check_pairing(parts.images, other), "pairing", other[0].parent)
+def _stated(clip: Clip) -> list[Finding]:
+    """Findings on what the files of a clip state."""
+    found, where = [], clip.stated_in
+    broken = {fault.code for fault in clip.faults}
+    if clip.depth is None and not broken & {"depth-files", "sequence-file"}:
+        found.append(finding("no-depth", where, "[depth] is missing"))
+    if clip.masks is None and not broken & {"masks-files", "sequence-file"}:
+        found.append(finding("no-masks", where, "there are no masks"))
+    elif clip.masks and clip.masks.proposed:
+        found.append(finding("proposed-masks", where, "a program proposed the masks"))
+    if clip.intrinsics and any(clip.intrinsics.distortion):
+        found.append(finding("distortion", where, "the pictures are distorted"))
+    return found
 
 
-def _read_frames(parts: Parts, run: _Pass) -> Size | None:
+def _check_cameras(clip: Clip, run: _Pass, size: Size) -> None:
+    """Findings on the intrinsics and the poses of all frames."""
+    camera, where = clip.intrinsics, clip.stated_in
+    if camera and (camera.height, camera.width) != size:
+        what = f"{where}: states {camera.width}x{camera.height}, the pictures have {size[1]}x{size[0]}"
+        run.findings.append(finding("cameras", where, what))
+        return
+    cameras = run.tried(lambda: clip.cameras(range(clip.count)), "cameras", where)
+    if cameras:
+        run.findings += camera_findings(cameras, usual_depth(run.depth), str(where))
+
+
+def _read_frames(clip: Clip, run: _Pass) -> Size | None:
     """Read every frame once. Returns the size of the first readable picture."""
-    masks, depth = (_paired(parts.images, files) for files in (parts.masks, parts.depth))
-    sampled = set(np.linspace(0, len(parts.images) - 1, min(SAMPLED, len(parts.images))).astype(int).tolist())
+    masks, depth = (_paired(clip.images, part.files if part else []) for part in (clip.masks, clip.depth))
+    sampled = set(np.linspace(0, len(clip.images) - 1, min(SAMPLED, len(clip.images))).astype(int).tolist())
     size = None
-    for i, file in enumerate(parts.images):
+    for i, file in enumerate(clip.images):
         picture = run.sized(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i, size)
         if picture is None:
             continue
         size = size or picture.shape[:2]
         run.frames.append(frame_facts(file.name, picture))
-        tissue = _mask(parts, run, masks[i], i, size)
-        found = _depth(parts, run, depth[i], i, size, tissue)
+        tissue = _mask(clip, run, masks[i], i, size)
+        found = _depth(clip, run, depth[i], i, size, tissue)
         if i in sampled:
             if found is not None:
                 run.light.append(light_correlation(picture, found, tissue))
                 run.shading += filter(None, [shading_fit(picture, found, tissue)])
             _sample(run, file, picture, tissue, found)
-            if i == 0 and parts.right and found is not None:
-                _against_stereo(parts, run, picture, found, depth[i])
+            if i == 0 and clip.right and found is not None:
+                _against_stereo(clip, run, picture, found, depth[i])
     return size
 
 
@@ -164,13 +185,14 @@ def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
         return [None] * len(images)  # reported by the check of the pairing
 
 
-def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: Size) -> NDArray[np.bool_] | None:
-    if file is None:
+def _mask(clip: Clip, run: _Pass, file: Path | None, i: int, size: Size) -> NDArray[np.bool_] | None:
+    if file is None or clip.masks is None:
         return None
+    excluded = clip.masks.excluded_value
     plane = run.sized(lambda: grey_plane(read_picture(file), file), "mask", file, i, size)
     if plane is None:
         return None
-    read = lambda: tissue_masks([plane], [str(file)], parts.excluded_value)[0]
+    read = lambda: tissue_masks([plane], [str(file)], excluded)[0]
     tissue = run.tried(read, "mask-values", file, i)
     if tissue is not None and not tissue.any():
         run.findings.append(finding("frame-without-tissue", file, "the mask excludes every pixel", i))
@@ -178,14 +200,15 @@ def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: Size) -> ND
 
 
 def _depth(
-    parts: Parts, run: _Pass, file: Path | None, i: int, size: Size, tissue: NDArray[np.bool_] | None
+    clip: Clip, run: _Pass, file: Path | None, i: int, size: Size, tissue: NDArray[np.bool_] | None
 ) -> NDArray[np.float32] | None:
-    if file is None:
+    if file is None or clip.depth is None:
         return None
+    scale = clip.depth.scale
     stored = run.sized(lambda: read_plane(file), "depth-file", file, i, size)
     if stored is None:
         return None
-    depth = run.tried(lambda: depth_plane(stored, parts.depth_scale, file), "depth-values", file, i)
+    depth = run.tried(lambda: depth_plane(stored, scale, file), "depth-values", file, i)
     if depth is None:
         return None
     run.depth.append(depth_facts(file.name, depth, stored, tissue))
@@ -200,9 +223,9 @@ def _sample(run: _Pass, file: Path, picture: NDArray, tissue: NDArray | None, de
         run.samples.append((file.name, small, tissue[::STEP, ::STEP], depth[::STEP, ::STEP]))
 
 
-def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:
+def _against_stereo(clip: Clip, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:
     """The depth of the first frame against the disparity of its stereo pair."""
-    right = run.tried(lambda: read_picture(parts.right[0]), "picture", parts.right[0], 0)
+    right = run.tried(lambda: read_picture(clip.right[0]), "picture", clip.right[0], 0)
     if right is None or right.shape != picture.shape:
         return
     disparity = agreed_disparity(picture, right)
@@ -210,28 +233,27 @@ def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, 
         run.findings += stereo_finding(depth, disparity, str(file), 0)
 
 
-def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
+def _check_masks(clip: Clip, run: _Pass, config: Config) -> None:
     """Polarity and tissue fraction on sampled frames, with the rules of training."""
     names = [name for name, *_ in run.samples]
     images = np.stack([small.transpose(2, 0, 1) for _, small, _, _ in run.samples])
     masks, depth = (np.stack([sample[k] for sample in run.samples]) for k in (2, 3))
-    where, allow = str(parts.masks[0].parent), config.sequence.allow_tissue_fraction
-    excluded = parts.excluded_value
+    assert clip.masks is not None
+    where, allow = str(clip.masks.files[0].parent), config.sequence.allow_tissue_fraction
+    excluded, stated_in = clip.masks.excluded_value, clip.masks.stated_in
     if run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where) is None:
         return
     if (
-        run.tried(
-            lambda: check_polarity(masks, depth, images, where, excluded, allow, parts.stated_in), "polarity", where
-        )
+        run.tried(lambda: check_polarity(masks, depth, images, where, excluded, allow, stated_in), "polarity", where)
         is None
     ):
         return
     run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where)
 
 
-def _cost(parts: Parts, size: Size, config: Config, run: _Pass) -> Cost:
+def _cost(clip: Clip, size: Size, config: Config, run: _Pass) -> Cost:
     """Memory, disk and time of a training, with findings if they are insufficient."""
-    height, width, count, where = *size[:2], len(parts.images), str(parts.folder)
+    height, width, count, where = *size[:2], len(clip.images), str(clip.where)
     cost = estimated_cost(count, width, height, config)
     run.tried(lambda: FrameStore(count, width, height, config.sequence.memory, where), "disk", where)
     if cost.file_bytes:
@@ -245,12 +267,12 @@ def _cost(parts: Parts, size: Size, config: Config, run: _Pass) -> Cost:
     return cost
 
 
-def _of_length(parts: Parts, config: Config, run: _Pass) -> Config:
+def _of_length(clip: Clip, config: Config, run: _Pass) -> Config:
     """The settings with the length of a training on these frames. An impossible split becomes a finding."""
 
     def training_frames() -> int:
-        frames = parse_frame_range(config.sequence.frames, len(parts.images))
+        frames = parse_frame_range(config.sequence.frames, len(clip.images))
         return len(split_frames(len(frames), config.sequence.split, config.sequence.block_length)[0])
 
-    count = run.tried(training_frames, "frames", parts.folder)
+    count = run.tried(training_frames, "frames", clip.where)
     return config if count is None else lengthened(config, count)

@@ -125,11 +125,11 @@ def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: st
     return found
 
 
-def time_findings(seconds: NDArray[np.float64] | None, where: str) -> list[Finding]:
+def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding]:
     """A note on stated, uneven frame times."""
-    if seconds is None or len(seconds) < 2:
+    if times is None or len(times) < 2:
         return []
-    steps = np.diff(seconds)
+    steps = np.diff(times)
     return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
 
 

@@ -11,25 +11,30 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
-from endotsr.clips.sequences.checks.frames import frame_findings, gap_findings, time_findings
+from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
-from endotsr.clips.sequences.read_frames import FrameFiles, Frames
+from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
-from endotsr.method.splatting.camera import Camera
 
 SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
 MOST = 5  # notes of one kind
 
 
-def guarded(files: FrameFiles, frames: Frames, cameras: list[Camera], near: float) -> list[str]:
-    """Notes on the findings of the checks of pictures, depth and cameras. Raises InputError for the first refusal."""
-    pictures, depth = frames.facts
-    depth = with_coverage(depth, frames.depth, frames.masks)
-    folder = str(files.images[0].parents[1])
-    found = gap_findings(files.images) + time_findings(files.seconds, folder)
-    found += frame_findings(pictures, str(files.images[0].parent))
-    found += depth_findings(depth, str(files.depth[0].parent), files.arbitrary, near, files.assumed)
-    found += camera_findings(cameras, usual_depth(depth), folder)
+def guarded(
+    clip: Clip, frames: range, sequence: Sequence, facts: list[tuple[FrameFacts, DepthFacts]], near: float
+) -> list[str]:
+    """Notes on the findings of the checks of pictures, depth and cameras. Raises InputError for the first refusal.
+
+    facts   of the frames, in order
+    """
+    assert clip.depth is not None
+    depth = with_coverage([prior for _, prior in facts], sequence.depth, sequence.masks)
+    images, folder = [clip.images[i] for i in frames], str(clip.where)
+    found = gap_findings(images) + time_findings(None if clip.times is None else clip.times[list(frames)], folder)
+    found += frame_findings([picture for picture, _ in facts], str(images[0].parent))
+    found += depth_findings(depth, str(clip.depth.files[0].parent), clip.arbitrary, near, clip.depth.assumed)
+    found += camera_findings(sequence.cameras, usual_depth(depth), folder)
     return notes_of([finding for finding in found if finding.code not in SAID_ALREADY])
 
 

@@ -13,10 +13,8 @@ from pkgutil import iter_modules
 from typing import NamedTuple
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.clip import Clip, StatedDepth
-from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import depth_step, masks_are_proposed
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
@@ -24,6 +22,7 @@ from endotsr.errors import InputError
 STATEMENTS = (
     "stereo", "camera", "distortion", "calibration", "baseline", "trajectory", "masks", "depth", "orientation",
 )  # fmt: skip
+NOTHING = SourceOptions()
 
 
 class Layout(NamedTuple):
@@ -33,10 +32,9 @@ class Layout(NamedTuple):
     about: str  # contents of a path in this layout, for messages
     rank: int  # layouts are tried in ascending order
     recognises: Callable[[Path], bool]
-    open: Callable[[Path, SourceOptions], Clip]
+    describe: Callable[[Path, SourceOptions], Clip]
     takes: tuple[str, ...] = ()  # the STATEMENTS that it reads; the others are refused
-    read: Callable[[Path, SequenceConfig, float], Sequence] | None = None  # None: needs `endotsr prepare`
-    hashes: Callable[[Path, SequenceConfig], dict[str, str]] | None = None  # SHA-256 of the files that `read` reads
+    direct: bool = False  # training reads it directly; other layouts need `endotsr prepare`
 
 
 @cache
@@ -66,49 +64,46 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
     raise InputError(f"{path}: no known layout; allowed: {known}")
 
 
-def describe(path: Path, options: SourceOptions) -> Clip:
-    """The clip at a path. Raises InputError."""
+def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
+    """The clip at a path, with a note for every frame whose pose is unusable. Raises InputError."""
+    path = Path(path)
     layout = layout_of(path, options.layout)
-    if options.layout != "auto" and not Path(path).exists():
+    if options.layout != "auto" and not path.exists():
         raise InputError(f"{path}: not found")
-    refuse_unused(layout, Path(path), options)
-    clip = layout.open(Path(path), options)
+    refuse_unused(layout, path, options)
+    clip = without_faults(layout.describe(path, options))
+    if clip.pose_faults and len(clip.pose_faults) == clip.count:
+        raise InputError(next(iter(clip.pose_faults.values())))
+    said = [*clip.notes, *clip.pose_faults.values()]
     if options.calibration is not None:
-        said = f"{options.calibration.name}: {HALF_A_PIXEL}"
-        clip = replace(clip, notes=[*clip.notes, said])
-    if options.depth is not None:
-        stated = StatedDepth(options.depth, depth_step(options), options.trust_depth)
-        clip = replace(clip, stated_depth=stated)
-    return replace(clip, proposed=True) if masks_are_proposed(options) else clip
+        said.append(f"{options.calibration.name}: {HALF_A_PIXEL}")
+    return replace(clip, notes=said)
+
+
+def without_faults(clip: Clip) -> Clip:
+    """The clip. Raises InputError with the first of its faults."""
+    for fault in clip.faults:
+        raise InputError(fault.what)
+    return clip
 
 
 def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
     """Raises InputError for a statement that this layout does not read."""
-    defaults = SourceOptions()
     for name in STATEMENTS:
-        if getattr(options, name) != getattr(defaults, name) and name not in layout.takes:
+        if getattr(options, name) != getattr(NOTHING, name) and name not in layout.takes:
             taken = ", ".join(f"--{word}" for word in layout.takes) or "none of these"
             raise InputError(f"{path}: the layout {layout.name} does not read --{name}; allowed: {taken}")
 
 
-def read_sequence(path: Path, config: SequenceConfig, near: float) -> Sequence:
-    """The sequence at a path, in a layout that training reads directly.
+def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
+    """The clip of a folder that training reads directly, with its faults. A path in no known layout counts as EndoNeRF.
 
-    Raises:  InputError; for another layout, with the command that converts it.
+    Raises:  InputError for a layout that needs `endotsr prepare`, and for a folder that cannot be described at all.
     """
-    layout = readable_layout(Path(path))
-    assert layout.read is not None
-    return layout.read(Path(path), config, near)
-
-
-def readable_layout(path: Path) -> Layout:
-    """The layout of a path that training reads directly. A path in no known layout is read as EndoNeRF.
-
-    Raises:  InputError for a layout that needs `endotsr prepare`.
-    """
+    path = Path(path)
     found = next((layout for layout in layouts() if path.exists() and layout.recognises(path)), None)
     if found is None or (found.name == "pictures" and (path / "depth").is_dir()):
         found = layout_of(path, "endonerf")  # its messages name the missing parts
-    if found.read is None:
+    if not found.direct:
         raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` converts it")
-    return found
+    return found.describe(path, SourceOptions(settings=config))

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.opencv.stereo import Maps, remapped
-from endotsr.clips.sequences.clip import CameraPose, Clip, PicturePair, colour_picture, intrinsics_of_matrix
+from endotsr.clips.sequences.camera import CameraPose, checked_rotation, intrinsics_of_matrix, inverse_pose
+from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.sequence_file import checked_rotation, inverse_pose
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import matching_files
 from endotsr.errors import InputError
@@ -76,7 +76,7 @@ def read_poses(path: Path) -> list[CameraPose | None]:
     return found
 
 
-def open_c3vd(path: Path, options: SourceOptions) -> Clip:
+def describe_c3vd(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip of a pinhole camera. Raises InputError for another size."""
     number = lambda file: int(digits) if (digits := file.name.split("_")[0]).isdecimal() else -1
     files, planes = (sorted(path.glob(f"*{end}"), key=number) for end in (COLOUR, DEPTH))
@@ -105,7 +105,7 @@ def open_c3vd(path: Path, options: SourceOptions) -> Clip:
         where=path,
         names=[file.stem for file in files],
         pictures=pictures,
-        depth=depth if planes else None,
+        depth=Depth(depth) if planes else None,
         intrinsics=intrinsics_of_matrix(maps.matrix, WIDTH, HEIGHT, where=path),
         poses=poses,
         rate=options.rate,
@@ -121,5 +121,5 @@ LAYOUT = Layout(
     about=f"a sequence of C3VD with {POSES} and 0{COLOUR}",
     rank=2,
     recognises=recognises,
-    open=open_c3vd,
+    describe=describe_c3vd,
 )

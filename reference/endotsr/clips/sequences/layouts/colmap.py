@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.sequences.camera import ARBITRARY
 from endotsr.clips.sequences.checks.frames import gap_findings
-from endotsr.clips.sequences.clip import ARBITRARY, Clip
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.colmap_model import find_model, read_model
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.layouts import Layout
@@ -24,7 +25,7 @@ def recognises(path: Path) -> bool:
     return path.is_dir() and find_model(path) is not None
 
 
-def open_colmap(path: Path, options: SourceOptions) -> Clip:
+def describe_colmap(path: Path, options: SourceOptions) -> Clip:
     """The model as a clip. Raises InputError for a missing picture, or for several cameras."""
     folder = find_model(path)
     if folder is None:
@@ -75,6 +76,6 @@ LAYOUT = Layout(
     about="a folder with a COLMAP model and images/",
     rank=2,
     recognises=recognises,
-    open=open_colmap,
+    describe=describe_colmap,
     takes=("masks",),
 )

@@ -1,15 +1,80 @@
-"""EndoNeRF folders: `images/`, `depth/`, `masks/` and `poses_bounds.npy`."""
+"""EndoNeRF folders.
 
-from endotsr.clips.sequences.endonerf import input_hashes, open_endonerf, read_endonerf, recognises
+    images/*.png     RGB, or jpg, tiff, webp, bmp     poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
+    depth/*.png      z in millimetres, 0 = none; .npy and .tiff too
+    masks/*.png      or gt_masks/*.png (or as above), white = excluded unless the configuration says otherwise
+
+File names are free, with one pattern per folder. The number in the name orders and pairs the frames.
+"""
+
+from pathlib import Path
+
+from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.poses import POSE_FILES, cameras_of_rows, find_pose_file, read_pose_rows
+from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, MASKS, RIGHT
+from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import size_of, with_stated
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder with pictures and an LLFF pose file."""
+    return (path / IMAGES).is_dir() and any((path / name).is_file() for name in POSE_FILES)
+
+
+def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
+    """The folder as a clip. An invalid part is among its faults; an invalid pose is a gap."""
+    settings = options.settings or SequenceConfig(
+        masks=MASKS if (path / MASKS).is_dir() else "none", excluded_value=options.excluded_value
+    )
+    if path.is_file():
+        raise InputError(f"{path}: is a file; allowed: a folder with images/, depth/, {settings.masks}/ and poses")
+    if not path.is_dir():
+        raise InputError(f"{path}: sequence folder not found")
+    folder = FolderReader(path)
+    folder.list_pictures(IMAGES, RIGHT)
+    masks = None if settings.masks == "none" else folder.masks(settings.masks, settings.excluded_value)
+    depth = folder.depth(DEPTH, 1.0)
+    where = next((path / name for name in POSE_FILES if (path / name).exists()), path)
+    rows = folder.tried(lambda: read_pose_rows(find_pose_file(path), len(folder.images)), "cameras", where)
+    size = folder.size = _size(folder) or (None if rows is None else (int(rows[0, 9]), int(rows[0, 4])))
+    found = None if rows is None or size is None else cameras_of_rows(rows, *size, where)
+    clip = Clip(
+        layout="endonerf",
+        where=path,
+        names=[file.stem for file in folder.images],
+        pictures=folder.pictures,
+        images=folder.images,
+        right=folder.right,
+        masks=masks,
+        depth=depth,
+        unit="mm",
+        baseline=options.baseline,
+        rate=options.rate,
+        stated_in=where,
+        faults=folder.faults,
+        **({} if found is None else found._asdict()),
+    )
+    return with_stated(clip, options)
+
+
+def _size(folder: FolderReader) -> tuple[int, int] | None:
+    """Width and height of the first picture; None if it cannot be read, which its reader reports."""
+    try:
+        return size_of(folder.images[:1])
+    except (InputError, IndexError):
+        return None
+
 
 LAYOUT = Layout(
     name="endonerf",
     about="a folder with images/, depth/, masks/ and poses_bounds.npy",
     rank=1,
     recognises=recognises,
-    open=open_endonerf,
-    read=read_endonerf,
-    hashes=input_hashes,
+    describe=describe_endonerf,
+    direct=True,
     takes=("baseline", "masks", "depth"),
 )

@@ -10,12 +10,13 @@ from pathlib import Path
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL, read_matrix
-from endotsr.clips.sequences.clip import Clip, intrinsics_of_matrix
+from endotsr.clips.sequences.camera import intrinsics_of_matrix
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
+from endotsr.clips.sequences.sources import depth_of, matching_files, pictures_from_files, size_of, with_stated
 from endotsr.errors import InputError
 
 CAMERA = "intrinsics.txt"
@@ -31,7 +32,7 @@ def _first(path: Path, names: tuple[str, ...]) -> Path | None:
     return next((path / name for name in names if (path / name).is_dir()), None)
 
 
-def open_hamlyn(path: Path, options: SourceOptions) -> Clip:
+def describe_hamlyn(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     left_folder, right_folder, depth_folder = (_first(path, names) for names in (LEFT, RIGHT, DEPTH))
     if left_folder is None or not (path / CAMERA).is_file():
@@ -47,7 +48,7 @@ def open_hamlyn(path: Path, options: SourceOptions) -> Clip:
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
-        depth=depth_reader(matching_files(left, depth), 1.0) if depth else None,
+        depth=depth_of(matching_files(left, depth), 1.0) if depth else None,
         intrinsics=intrinsics_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
         baseline=options.baseline,
         rate=options.rate,
@@ -61,6 +62,6 @@ LAYOUT = Layout(
     about=f"a folder of Hamlyn with {CAMERA} and color/ or image01/",
     rank=2,
     recognises=recognises,
-    open=open_hamlyn,
+    describe=describe_hamlyn,
     takes=("masks", "depth", "baseline"),
 )

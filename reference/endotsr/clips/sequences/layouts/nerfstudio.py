@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics, checked_intrinsics, pose_of
 from endotsr.clips.sequences.checks.frames import gap_findings
-from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip, Intrinsics, checked_intrinsics
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.sequence_file import OPENGL, checked_rotation, inverse_pose
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import depth_reader, mask_reader, pictures_from_files, size_of, stated_masks
+from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_bytes
@@ -68,7 +68,7 @@ def read_points(path: Path) -> FloatArray:
     return rows
 
 
-def open_nerfstudio(path: Path, options: SourceOptions) -> Clip:
+def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     """The file as a clip. Raises InputError naming the frame and the key."""
     file = path if path.is_file() else path / FILE
     data, folder = read_json(file, LARGEST_FILE), file.parent
@@ -89,10 +89,10 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         raise InputError(f"{file}: {len(lenses)} different cameras; allowed: one for all frames")
     masks = stated_masks(options, files, width, height)
     if masks is None and any(masked):
-        masks = mask_reader(masked, "black", width, height)
+        masks = masks_of(masked, "black", width, height)
     points = _named(folder, data.get("ply_file_path"), f"{file}: ply_file_path")
     cloud = read_points(points) if points is not None and points.is_file() else None
-    depth = depth_reader(planes, DEPTH_STEP) if any(planes) else None
+    depth = depth_of(planes, DEPTH_STEP) if any(planes) else None
     return Clip(
         layout="nerfstudio",
         where=path,
@@ -117,7 +117,7 @@ def _named(folder: Path, name: Any, where: str) -> Path | None:
 
 def _pose(entry: dict[str, Any], where: str) -> CameraPose:
     stored = matrix(entry.get("transform_matrix"), where, (4, 4), (3, 4))
-    return inverse_pose(checked_rotation(stored[:3, :3] @ OPENGL, where), stored[:3, 3])
+    return pose_of(stored[:3, :3], stored[:3, 3], "camera_to_world", "opengl", where)
 
 
 LAYOUT = Layout(
@@ -125,6 +125,6 @@ LAYOUT = Layout(
     about=f"a folder with {FILE} of nerfstudio",
     rank=3,
     recognises=recognises,
-    open=open_nerfstudio,
+    describe=describe_nerfstudio,
     takes=("masks",),
 )

@@ -75,7 +75,7 @@ def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
     return found["l"], found["r"]
 
 
-def open_pictures(path: Path, options: SourceOptions) -> Clip:
+def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     """The pictures as a clip. Raises InputError."""
     left, right = find_pictures(path)
     stereo = "none" if options.stereo == "auto" else options.stereo
@@ -106,6 +106,6 @@ LAYOUT = Layout(
     about="a folder of pictures, or left/ and right/",
     rank=9,
     recognises=recognises,
-    open=open_pictures,
+    describe=describe_pictures,
     takes=tuple(name for name in STATEMENTS if name != "orientation"),
 )

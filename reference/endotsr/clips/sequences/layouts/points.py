@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.clip import ARBITRARY, CameraPose, Clip, intrinsics_of_matrix
+from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, checked_rotation, intrinsics_of_matrix
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import frame_numbers, list_pictures
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.sequence_file import checked_rotation
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import mask_reader, pictures_from_files, size_of
+from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_of
 from endotsr.errors import InputError
 from endotsr.untrusted.arrays import read_npz
 
@@ -48,7 +48,7 @@ def read_cameras(path: Path, frames: list[Path]) -> dict[str, np.ndarray]:
     return found
 
 
-def open_points(path: Path, options: SourceOptions) -> Clip:
+def describe_points(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     frames = list_pictures(path / "images", PICTURE_ENDINGS)
     found = read_cameras(path / CAMERAS, frames)
@@ -67,7 +67,7 @@ def open_points(path: Path, options: SourceOptions) -> Clip:
         where=path,
         names=[file.stem for file in frames],
         pictures=pictures_from_files(frames, []),
-        masks=mask_reader([mask] * len(frames), "black", width, height) if mask.is_file() else None,
+        masks=masks_of([mask] * len(frames), "black", width, height) if mask.is_file() else None,
         points=lambda i: points[visible[:, i]],
         unit=ARBITRARY,
         intrinsics=intrinsics_of_matrix(found["K"], width, height, where=where),
@@ -82,6 +82,6 @@ LAYOUT = Layout(
     about=f"a folder with images/ and {CAMERAS}",
     rank=2,
     recognises=recognises,
-    open=open_points,
+    describe=describe_points,
     takes=("masks",),
 )

@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.clip import CameraPose, Clip
+from endotsr.clips.sequences.camera import CameraPose, checked_rotation
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.layouts.video import open_video
-from endotsr.clips.sequences.sequence_file import checked_rotation
+from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
@@ -36,13 +36,13 @@ def recognises(path: Path) -> bool:
     return (path / VIDEO).is_file() and _calibration(path) is not None
 
 
-def open_scared(path: Path, options: SourceOptions) -> Clip:
+def describe_scared(path: Path, options: SourceOptions) -> Clip:
     """The keyframe as a clip. Raises InputError."""
     calibration = options.calibration or _calibration(path)
     if calibration is None or not (path / VIDEO).is_file():
         raise InputError(f"{path}: allowed: a folder with {VIDEO} and {CALIBRATIONS[0]}")
     stated = replace(options, stereo="stacked", calibration=calibration)
-    clip = open_video(path / VIDEO, stated)
+    clip = describe_video(path / VIDEO, stated)
     notes, poses = [*clip.notes], clip.poses
     if options.calibration is None:
         notes.append(f"{calibration.name}: {HALF_A_PIXEL}; T in millimetres")
@@ -96,6 +96,6 @@ LAYOUT = Layout(
     about=f"a keyframe of SCARED with {VIDEO} and {CALIBRATIONS[0]}",
     rank=2,
     recognises=recognises,
-    open=open_scared,
+    describe=describe_scared,
     takes=("calibration", "trajectory", "masks"),
 )

@@ -11,12 +11,13 @@ import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.clip import Clip, Intrinsics, intrinsics_of_matrix
+from endotsr.clips.sequences.camera import Intrinsics, intrinsics_of_matrix
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import depth_reader, matching_files, pictures_from_files, size_of, with_stated
+from endotsr.clips.sequences.sources import depth_of, matching_files, pictures_from_files, size_of, with_stated
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.yaml import matrix
@@ -39,7 +40,7 @@ def read_camera(path: Path, width: int, height: int) -> tuple[Intrinsics, float]
     return intrinsics_of_matrix(left[:, :3], width, height, where=path), float(-right[0, 3] / right[0, 0])
 
 
-def open_servct(path: Path, options: SourceOptions) -> Clip:
+def describe_servct(path: Path, options: SourceOptions) -> Clip:
     """The experiment as a clip. Raises InputError for pairs whose cameras differ."""
     left, right = (list_pictures(path / name, PICTURE_ENDINGS) for name in (LEFT, RIGHT))
     check_pairing(left, right)
@@ -56,7 +57,7 @@ def open_servct(path: Path, options: SourceOptions) -> Clip:
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
-        depth=depth_reader(matching_files(left, depth), STEP) if depth else None,
+        depth=depth_of(matching_files(left, depth), STEP) if depth else None,
         intrinsics=cameras[0][0],
         baseline=cameras[0][1],
         notes=[
@@ -73,6 +74,6 @@ LAYOUT = Layout(
     about=f"an experiment of SERV-CT with {LEFT}/ and {CAMERAS}/",
     rank=2,
     recognises=recognises,
-    open=open_servct,
+    describe=describe_servct,
     takes=("masks", "depth"),
 )

@@ -13,9 +13,9 @@ from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.layouts.video import open_video
+from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import mask_reader, matching_files
+from endotsr.clips.sequences.sources import masks_of, matching_files
 from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
 from endotsr.errors import InputError
 
@@ -33,7 +33,7 @@ def _videos(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
 
 
-def open_stereomis(path: Path, options: SourceOptions) -> Clip:
+def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError for more than one video, and for invalid files."""
     videos = _videos(path)
     if len(videos) != 1:
@@ -46,7 +46,7 @@ def open_stereomis(path: Path, options: SourceOptions) -> Clip:
         trajectory=options.trajectory or (trajectory if trajectory.is_file() else None),
         trajectory_unit=options.trajectory_unit or "m",
     )
-    clip = open_video(videos[0], stated)
+    clip = describe_video(videos[0], stated)
     notes = list(clip.notes)
     if stated.trajectory is None:
         notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
@@ -54,7 +54,7 @@ def open_stereomis(path: Path, options: SourceOptions) -> Clip:
     if options.masks is None and (path / MASKS).is_dir():
         assert clip.calibration is not None
         files = matching_files(clip.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
-        masks = mask_reader(files, "black", clip.calibration.left.width, clip.calibration.left.height)
+        masks = masks_of(files, "black", clip.calibration.left.width, clip.calibration.left.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
     return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes)
@@ -65,6 +65,6 @@ LAYOUT = Layout(
     about="a folder with a stacked video and StereoCalibration.ini",
     rank=2,
     recognises=recognises,
-    open=open_stereomis,
+    describe=describe_stereomis,
     takes=("stereo", "calibration", "trajectory", "masks", "depth", "orientation"),
 )

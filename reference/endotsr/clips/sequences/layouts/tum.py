@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.sequences.clip import CameraPose, Clip, Intrinsics
+from endotsr.clips.sequences.camera import CameraPose, Intrinsics
+from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
-    depth_reader,
+    depth_of,
     pictures_from_files,
     size_of,
     stated_camera,
@@ -56,7 +57,7 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
     return np.array(times)[order], [files[i] for i in order]
 
 
-def open_tum(path: Path, options: SourceOptions) -> Clip:
+def describe_tum(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
     width, height = size_of(files)
@@ -70,7 +71,7 @@ def open_tum(path: Path, options: SourceOptions) -> Clip:
         stamps, planes = read_list(path / DEPTH_LIST)
         nearest = np.abs(stamps[None, :] - times[:, None]).argmin(axis=1)
         paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
-        depth = depth_reader(paired, STEP)
+        depth = depth_of(paired, STEP)
     poses: list[CameraPose | None] | None = None
     where = options.trajectory or path / TRAJECTORY
     if where.is_file():
@@ -97,6 +98,6 @@ LAYOUT = Layout(
     about="a folder with rgb.txt and rgb/",
     rank=3,
     recognises=recognises,
-    open=open_tum,
+    describe=describe_tum,
     takes=("camera", "distortion", "trajectory", "masks", "depth"),
 )

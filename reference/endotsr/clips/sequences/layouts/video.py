@@ -26,7 +26,7 @@ def recognises(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
 
 
-def open_video(path: Path, options: SourceOptions) -> Clip:
+def describe_video(path: Path, options: SourceOptions) -> Clip:
     """The video as a clip. Raises InputError."""
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
@@ -90,4 +90,6 @@ def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
     return found
 
 
-LAYOUT = Layout(name="video", about="a video file", rank=5, recognises=recognises, open=open_video, takes=STATEMENTS)
+LAYOUT = Layout(
+    name="video", about="a video file", rank=5, recognises=recognises, describe=describe_video, takes=STATEMENTS
+)
