@@ -277,7 +277,7 @@ assert all(report.passed for report in reports)
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Over 21 stamps all 16 atoms are independent. Over 32 equally spaced stamps one atom is
 # dead, so at most 15 remain; a clip on the grid of the highest frequency is special, and the
-# rank is therefore reported. All other clips of 20 frames and more have rank 16.
+# rank is therefore reported. All other clips of 20 to 80 frames have rank 16.
 assert report_atoms(stamps, omega).rank == 16
 # The condition number: how much weaker the faintest combination is than the strongest.
 singular = np.linalg.svd(bars, compute_uv=False)

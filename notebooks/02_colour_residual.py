@@ -99,10 +99,10 @@ assert contrast > 0.2 and moved > 0.2 and np.abs(frames).max() < beta
 # ## Figure: brightening explained by colour, or by motion
 #
 # A patch of tissue becomes paler and recovers, without moving. Component A represents this by a change of colour over
-# time. A model without A can make a pixel brighter at one time only by moving a brighter Gaussian there. In the figure,
-# a bright neighbour 4 px away is shifted so that the pixel has the same brightness at each time. The image at this
-# pixel is right in both cases, but the geometry of the second is wrong by up to 4 px. The paper therefore separates the
-# two.
+# time. A model without A has constant colours. It can make a pixel brighter at one time by moving, turning or scaling
+# Gaussians; in the figure, a bright neighbour 4 px away is shifted so that the pixel has the same brightness at each
+# time. The image at this pixel is right in both cases, but the geometry of the second is wrong by several pixels. The
+# paper gives colour and motion separate components.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 0.98, 197)
@@ -163,8 +163,9 @@ plt.show()
 # **(2.3) The slope.** $\mathrm d\tanh x=\mathrm dx/\cosh^2x$, so
 # $g_x=\frac{\beta}{Y_{00}}\,g_{\Delta h_0}/\cosh^2x$.
 #
-# **(2.4) A slope that keeps its digits.** $1/\cosh^2x=1-\tanh^2x$. In float32 the right side is exactly 0 from
-# $x\approx10$ on (right panel above), and a saturated residual could never change again. With $e=\exp(-2|x|)$,
+# **(2.4) A slope that keeps its digits.** $1/\cosh^2x=1-\tanh^2x$. In float32 the right side loses its digits one by
+# one (right panel above). Correctly rounded, $\tanh x$ is 1 from $x=13\ln2\approx9.01$ on, and the slope is then
+# exactly 0: a saturated residual has no gradient. NumPy's $\tanh$ reaches 1 at $x\approx10$. With $e=\exp(-2|x|)$,
 # $\cosh x=(1+e)/(2\sqrt e)$, so the slope is $4e/(1+e)^2$. Nothing cancels in it and nothing overflows.
 #
 # **(2.5) One coefficient** is multiplied by one atom: $\partial x_{ci}/\partial A_{cki}=\bar\phi_k$, so
@@ -192,6 +193,11 @@ grads = appearance_reverse(g_h, appearance_forward(A, phi_bar, beta)[1])
 g_A, g_phi_bar = definition.appearance_reverse(g_h, (A, phi_bar, beta))
 np.testing.assert_allclose(grads.d_appearance_coefficients, g_A, rtol=1e-12)
 np.testing.assert_allclose(grads.d_phi_bar, g_phi_bar, rtol=1e-11)
+
+x = np.linspace(8, 10.5, 2501)
+rounded = 1 - np.tanh(x).astype(np.float32) ** 2  # tanh correctly rounded to float32
+assert np.all((rounded == 0) == (x > 13 * np.log(2))), "(2.4): 0 from 13 ln 2 on"
+assert np.abs(rounded[x > 8.9] * np.cosh(x[x > 8.9]) ** 2 - 1).max() > 0.5, "no digit is right"
 
 saturated = appearance_reverse(
     g_h, appearance_forward(1e3 * A, phi_bar, beta)[1]

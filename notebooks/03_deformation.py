@@ -53,7 +53,7 @@ B, N = 17, 4
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-# `quartic` is the form that the released code computes: the exponent is the square of a square. `gaussian` is the
+# `quartic` is the form that the released code of Deform3DGS computes: the exponent is the square of a square. `gaussian` is the
 # textbook form. The two differ strongly: they give 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
 
 
@@ -81,8 +81,8 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
 #
 # At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
 # with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the published width of
-# 0.01 there are times at which no basis exceeds 0.001. Such frames initially barely update the weights. This is not an
-# error, but it slows training down. The preset `sharp` starts at 0.05.
+# 0.01 there are times at which no basis exceeds 0.001. Such frames hardly change the weights at first. This is not an
+# error. The preset `sharp` starts at 0.05.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
@@ -143,8 +143,8 @@ plt.show()
 # $\partial E/\partial\sigma=-\Delta^2\sigma/\Sigma^2$.
 #
 # **(3.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. This sign cancels the sign of (3.2), so
-# $g_\theta=-g_E\,\partial E/\partial\Delta$ is positive for a basis with its centre before $t$. The signs of (3.2) and (3.4)
-# cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
+# $g_\theta=-g_E\,\partial E/\partial\Delta$ has the sign of $w\,g_\psi$ for a basis with its centre before $t$, and the
+# opposite sign for one with its centre after $t$. The signs of (3.2) and (3.4) cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
 #
 # **(3.6) Time.** $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases
 # and Gaussians.
@@ -172,6 +172,9 @@ for basis in ("quartic", "gaussian"):
     texts = definition.deformation_reverse(g_psi, (w, theta, sigma, 0.4, basis))
     for found, text in zip(grads, texts):
         np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
+    reached = np.abs(grads.d_fdm_centre) > 0  # a basis that is not 0 to the last digit
+    sign = np.sign(w * (0.4 - theta) * g_psi[:, None, :])
+    assert np.array_equal(np.sign(grads.d_fdm_centre)[reached], sign[reached]), "(3.5)"
 
 # %% [markdown]
 # There are two consequences. While all weights are 0, the gradients with respect to centre and width are exactly 0, so

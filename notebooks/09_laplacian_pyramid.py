@@ -270,13 +270,15 @@ assert all(report.passed for report in reports)
 #    odd?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The footprint of one value is 5 to 7, 13 to 17 and 29 to 37 pixels per axis. Turned
-# round: an even pixel is read by more coarse samples than an odd one, so it costs more
-# values.
+# Answer. In band 1 an even pixel is read by more coarse samples than an odd one: it costs 49
+# values, an odd one 25. In bands 2 and 3 the parity does not decide: the even pixels 64 and 66
+# cost 49 and 81 values of each. There the position modulo 4 and modulo 8 counts.
 costs = {}
-for at in (64, 65):
-    hole = np.ones((129, 129), bool)
+for at in range(64, 73):
+    hole = np.ones((161, 161), bool)
     hole[at, at] = False
     costs[at] = [int(np.count_nonzero(~valid)) for valid in support_masks(hole).bands]
-print("even pixel:", costs[64], " odd pixel:", costs[65])
-assert costs[64][0] == 7**2 and costs[65][0] == 5**2
+    print(f"pixel {at}: {costs[at]}")
+assert {at % 2: cost[0] for at, cost in costs.items()} == {0: 49, 1: 25}, "band 1: the parity"
+assert costs[64] == [49, 49, 49] and costs[65] == [25, 49, 49] and costs[66] == [49, 81, 81]
+assert costs[64] == costs[72], "the period is 8"

@@ -157,8 +157,8 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # %% [markdown]
 # ## Density control
 #
-# A large gradient with respect to the screen centre of a Gaussian indicates that one Gaussian covers a region that
-# needs two. The statistic is the mean norm of this gradient over the views in which the Gaussian is visible.
+# A large gradient with respect to the screen centre of a Gaussian is taken as a sign that one Gaussian covers a region
+# that needs two. That is the heuristic of 3DGS. The statistic is the mean norm of this gradient over the views in which the Gaussian is visible.
 #
 # **(12.6) The unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
 # $\mathrm du=\frac W2\,\mathrm dx$ and $\mathrm dv=\frac H2\,\mathrm dy$. By the chain rule $g_x=\frac W2g_u$ and

@@ -187,8 +187,8 @@ plt.show()
 # neighbours overlap and leave no holes. Two points may coincide; the floor keeps the logarithm finite:
 # $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. A sphere needs no rotation.
 #
-# **(13.5) Opacity** starts at 0.1. By (8.3) a Gaussian has a gradient only as far as light reaches it. Behind opaque
-# Gaussians there would be no gradient.
+# **(13.5) Opacity** starts at 0.1. By (8.3) the gradient of a Gaussian is proportional to the light that reaches it. If all
+# Gaussians started opaque, those behind the first would have almost none.
 #
 # **(13.6) Motion.** The weights of the time bases start at 0 and their centres are evenly spaced: the scene is at rest.
 # By (3.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
@@ -248,8 +248,8 @@ assert colour.min() >= 0 and colour.max() <= 1 and not np.any(start.fdm_weight)
 # %% [markdown]
 # ## The reverse pass
 #
-# Initialisation is not differentiated. The initial points are accurate because back-projection and projection use the
-# same rule for pixel centres. The projection check exercises this rule.
+# Initialisation is not differentiated. Back-projection and projection use the same rule for pixel centres, as the cell
+# above asserts. The projection check exercises this rule.
 
 # %%
 with one_thread():

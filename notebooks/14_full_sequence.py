@@ -48,7 +48,7 @@ from endotsr.training.fitting.trainer import training_step
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 replace = msgspec.structs.replace
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
-if SMALL:  # a thumbnail, for the tests; the book shows the demonstration at full size
+if SMALL:  # a thumbnail, for the tests and, by default, for the book
     simulation, T, points = SimulatorSettings(width=48, height=38, frames=16), 240, 900
 else:
     simulation, T, points = SimulatorSettings(), 600, 6000
@@ -318,8 +318,8 @@ for k in sequence.test_index:
 #
 # Held-out frames are not used in any part of training: neither in the losses, nor for the initial points, nor in the
 # statistics of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each
-# residual on the image. The effect of S is small here, because its rate is 10 % of the rate of the deformation and a
-# short run has few steps.
+# residual on the image. The effect of S on the picture is small in this run; the next chapters say why
+# that is no question of its learning rate ({doc}`00_why`).
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
@@ -514,9 +514,10 @@ assert report.passed
 #    Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The model trained without A: its other parameters have learned to compensate (wrongly,
-# by motion). The difference between "taken out" and "never there" shows how other parameters
-# compensate.
+# Answer. In this run the two differ by little, and both are clearly worse than the whole model.
+# Which of the two is better depends on the run; no seed is repeated here. The two models are not
+# the same: where A is taken out, the other parameters were trained beside it, and where it was
+# never there, without it. An ablation asks what a method without A can do, which is the second.
 with_all = score(state, constants, sequence.train_index)
 taken_out = score(state, constants, sequence.train_index, appearance=False)
 never_there = score(*trained["without A"][:2], sequence.train_index)

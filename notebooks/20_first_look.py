@@ -13,9 +13,9 @@
 # %% [markdown]
 # # 20. A first look: fewer pixels and a known number of Gaussians
 #
-# The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in a training both
-# are wasted: the render is far from the frame, so its finest detail carries little information, and the number of
-# Gaussians above a threshold is arbitrary. The preset `quick` starts on frames of half size and grows to a given number
+# The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in training the render
+# is still far from the frame, so its finest detail says little about what to change; and how many Gaussians there are
+# follows from a threshold that nobody chose for this clip. The preset `quick` starts on frames of half size and grows to a given number
 # of Gaussians.
 #
 # The equation of the coarse start is {eq}`eq-b17` of {doc}`/specification/b17_coarse_start`; the growth to a budget is
@@ -52,8 +52,8 @@ rng = np.random.default_rng(20)
 #
 # The published rule clones or splits every Gaussian whose mean screen gradient exceeds a threshold ({eq}`eq-b11`,
 # derived in {doc}`12_optimiser_and_density`). The number of new Gaussians therefore depends on everything that scales a
-# gradient: the weights of the losses, the size of the frames, the exposure. A budget fixes the number; the gradients
-# determine only the choice.
+# gradient: the weights of the losses, the size of the frames, the exposure. With a budget you choose how many; the
+# gradients choose which.
 #
 # **(20.1) Equal steps.** $N$ Gaussians are left after pruning, $M$ is the budget, and $r$ densifications remain. The
 # current one adds $\lceil\max(0,M-N)/r\rceil$, at the largest gradients.

@@ -83,7 +83,7 @@ print([(window.first, window.end) for window in plan.windows])
 # Window $k+1$ begins with frame $b$, and window $k$ ends before frame $e$. At frame $g$ the scene shows
 #
 # $$
-# \hat I(g)=\bigl(1-w(g)\bigr)\,\hat I(g)+w(g)\,\hat I'(g),\qquad w(g)=\frac{g-b}{e-b},\quad b\le g\le e
+# \hat I_{\mathrm{scene}}(g)=\bigl(1-w(g)\bigr)\,\hat I_k(g)+w(g)\,\hat I_{k+1}(g),\qquad w(g)=\frac{g-b}{e-b},\quad b\le g\le e
 # $$
 #
 # **(21.1) The ends.** $w(b)=0$ and $w(e)=1$: at the beginning of the overlap the scene is window $k$ alone, and at its
