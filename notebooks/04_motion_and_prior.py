@@ -292,8 +292,9 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # %% [markdown]
 # ## Interactive figure: correlation length and penalty
 #
-# A trajectory is fitted to noisy frames by least squares with the penalty of {eq}`eq-4`. A small penalty fits the
-# noise; a large one removes the beat. A longer correlation length moves weight to the high frequencies.
+# A trajectory is fitted to noisy frames: the mean squared error plus $\lambda_{\mathrm{msp}}\mathcal L_{\mathrm{msp}}$ of
+# {eq}`eq-4` is minimal. A small weight fits the noise; a large one removes the beat. A longer correlation length moves
+# weight to the high frequencies.
 #
 # <div class="widget" data-widget="matern">The figure is live in the built book.</div>
 

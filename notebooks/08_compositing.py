@@ -202,9 +202,7 @@ assert np.count_nonzero(reached["exact"]) == 72 * 56
 plt.show()
 removed = (reached["paper"] > 0) & (reached["legacy"] == 0)
 largest = reached["paper"][removed].max()
-print(
-    f"legacy removes {removed.sum()} pixels of the ellipse, with an alpha of at most {largest:.4f}"
-)
+print(f"legacy removes {removed.sum()} pixels of the ellipse, alpha at most {largest:.4f}")
 assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 
 # %% [markdown]

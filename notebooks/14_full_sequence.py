@@ -514,10 +514,10 @@ assert report.passed
 #    Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. In this run the two differ by little, and both are clearly worse than the whole model.
-# Which of the two is better depends on the run; no seed is repeated here. The two models are not
-# the same: where A is taken out, the other parameters were trained beside it, and where it was
-# never there, without it. An ablation asks what a method without A can do, which is the second.
+# Answer. In this run the two differ by little, and both are worse than the whole model.
+# Which of the two is better depends on the run; no seed is repeated here. The two models are
+# not the same: where A is taken out, the other parameters were trained beside it, and where it
+# was never there, without it. An ablation asks what a method without A can do: the second.
 with_all = score(state, constants, sequence.train_index)
 taken_out = score(state, constants, sequence.train_index, appearance=False)
 never_there = score(*trained["without A"][:2], sequence.train_index)

@@ -225,8 +225,8 @@ print(
 assert error[~carried].mean() < 0.35 * moved.mean()
 of_found = error[-1, again]
 print(
-    f"{again.size} points are found again: {of_found.min():.1f} to {of_found.max():.1f} mm from their"
-    f" tissue at the end; {np.mean(of_found > 1):.0%} are off by more than 1 mm, the one shown"
+    f"{again.size} points are found again: {of_found.min():.1f} to {of_found.max():.1f} mm from"
+    f" their tissue at the end; {np.mean(of_found > 1):.0%} are more than 1 mm off, the one shown"
     f" by {error[-1, one]:.1f} mm"
 )
 assert error[-1, one] > 1, "found again, on other tissue"
@@ -377,8 +377,8 @@ assert report.passed
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. At the training times the fit comes nearer to the tracks, with their noise; at the
-# held-out times it is farther from the truth. Both changes are small: 28 smooth positions almost
-# determine the 17 unknowns by themselves.
+# held-out times it is farther from the truth. Both changes are small: 28 smooth positions
+# almost determine the 17 unknowns by themselves.
 loose = with_tracked_motion(
     fitted, times, found.position, found.followed, omega, np.zeros_like(rho)
 )

@@ -115,7 +115,7 @@
     const truth = (t) => Math.sin(2 * Math.PI * 1.5 * t) + 0.3 * Math.sin(2 * Math.PI * 4 * t);
     const random = uniform(4), times = Array.from({length: 24}, (_, i) => i / 24).filter((_, i) => i % 8 !== 1);
     const seen = times.map((t) => truth(t) + 0.25 * (random() + random() + random() - 1.5));
-    let length = 0.2, power = 0;
+    let length = 0.2, power = 1.7;
     const width = 560, height = 220, pen = canvas(box, width, height, "trajectory over time");
     const words = make(box, "p"), row = make(box, "div", {class: "widget-row"});
     const draw = () => {
@@ -123,12 +123,12 @@
       const mean = raw.reduce((a, b) => a + b) / F, rho = raw.map((v) => v / mean), weights = [...rho, ...rho];
       const rows = times.map(atoms), lambda = 10 ** power;
       const A = weights.map((_, j) => weights.map((_, k) =>
-        dot(rows.map((r) => r[j]), rows.map((r) => r[k])) / times.length + (j === k ? lambda * weights[j] + 1e-9 : 0)));
+        dot(rows.map((r) => r[j]), rows.map((r) => r[k])) / times.length + (j === k ? lambda / (6 * F) * weights[j] + 1e-9 : 0)));
       const C = solve(A, weights.map((_, j) => dot(rows.map((r) => r[j]), seen) / times.length));
       const fine = Array.from({length: 400}, (_, i) => i / 400), path = fine.map((t) => dot(C, atoms(t)));
       const rms = Math.sqrt(path.reduce((s, v, i) => s + (v - truth(fine[i])) ** 2, 0) / 400);
       const penalty = C.reduce((s, c, k) => s + weights[k] * c * c, 0) / (6 * F);
-      box.state = {rho, rms, penalty, lambda, length};
+      box.state = {rho, rms, penalty, lambda, length, C, seen, times};
       pen.clearRect(0, 0, width, height);
       const x = (t) => 10 + 540 * t, y = (v) => 110 - 60 * v;
       const line = (values, colour, thick) => {
@@ -142,11 +142,11 @@
       line(path, "#d08000", 2);
       pen.fillStyle = "#38c";
       times.forEach((t, i) => pen.fillRect(x(t) - 3, y(seen[i]) - 3, 6, 6));
-      words.textContent = `Grey: truth; blue: noisy frames; orange: fit. Error ${rms.toFixed(3)}, penalty ` +
+      words.textContent = `Grey: truth; blue: noisy frames; orange: fit. Error ${rms.toFixed(3)}, L_msp ` +
         `${penalty.toExponential(1)}, weight of the highest frequency over the lowest ${(rho[7] / rho[0]).toExponential(1)}.`;
     };
-    slider(row, "correlation length", 0.02, 1, 0.01, length, (v) => v.toFixed(2), (v) => { length = v; draw(); });
-    slider(row, "log10 of the penalty", -7, 4, 0.1, power, (v) => v.toFixed(1), (v) => { power = v; draw(); });
+    slider(row, "correlation length", 0.02, 0.3, 0.005, length, (v) => v.toFixed(3), (v) => { length = v; draw(); });
+    slider(row, "log10 of its weight λ_msp", -5, 5, 0.1, power, (v) => v.toFixed(1), (v) => { power = v; draw(); });
     draw();
   };
 
@@ -224,8 +224,8 @@
         for (const {u, v, s, o, rgb} of splats) {
           const alpha = o * Math.exp(-((x + 0.5 - u) ** 2 + (y + 0.5 - v) ** 2) / (2 * s * s));
           if (alpha < least) continue;
-          if (T * (1 - alpha) < stop) break;
           visits += 1;
+          if (T * (1 - alpha) < stop) break;
           for (let c = 0; c < 3; c++) image[c * W * H + y * W + x] += alpha * T * rgb[c];
           T *= 1 - alpha;
         }

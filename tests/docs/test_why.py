@@ -42,3 +42,11 @@ def test_false_motion_is_the_same_with_and_without_a():
     light = block("effects", "effects:truth").split("| Motion alone")[0]
     assert row(light, "`paper`")[3:5] == row(light, "`paper` without A")[3:5]
     assert "false motion is the same with and without A" in WORDS
+
+
+def test_light_alone_has_the_same_picture_with_and_without_a():
+    light = block("effects", "effects:truth").split("| Motion alone")[0]
+    with_a, without = (row(light, name)[1] for name in ("`paper`", "`paper` without A"))
+    assert f"its PSNR is {with_a} dB with A and {without} dB without" in WORDS
+    (value, spread), (other, other_spread) = (map(float, cell.split(" ± ")) for cell in (with_a, without))
+    assert abs(value - other) < min(spread, other_spread), "the same: less than the interval of either"

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from page_visits import found_browser, visits
 
+from endotsr.definition.dictionary import dictionary_forward
 from endotsr.definition.laplacian import support_masks
-from endotsr.definition.matern import matern_weights
+from endotsr.definition.matern import matern_penalty_reverse, matern_weights
 from endotsr.method.splatting.render import RenderOut
 from endotsr.studies.windows.scene import blended
 
@@ -51,8 +52,8 @@ async function visit(page) {
   }
   drag("compositing", [0.4, 0.4], [0.4, 0.0]);
   drag("masks", [0.1, 0.1], [0.4, 0.3]);
-  slide("correlation length", 0.8);
-  slide("log10 of the penalty", -6);
+  slide("correlation length", 0.05);
+  slide("log10 of its weight λ_msp", -4);
   slide("log10 of the cutoff", -1);
   slide("log10 of the stop", -1);
   slide("overlap, frames", 20);
@@ -103,10 +104,18 @@ def test_a_drag_of_an_opacity_changes_light_and_gradients(states):
 
 def test_correlation_length_and_penalty_change_the_trajectory(states):
     before, after = (states[key]["states"]["matern"] for key in ("start 1400", "moved"))
-    assert (after["length"], round(after["lambda"], 9)) == (0.8, 1e-6)
+    assert (after["length"], round(after["lambda"], 9)) == (0.05, 1e-4)
     assert after["rms"] > 1.5 * before["rms"], "hardly any penalty: the noise is fitted"
     for state in (before, after):
         np.testing.assert_allclose(state["rho"], matern_weights(np.geomspace(1, 16, 8), state["length"]), rtol=1e-12)
+        seen, times = np.array(state["seen"]), np.array(state["times"])
+        atoms = np.array([dictionary_forward(t, np.geomspace(1, 16, 8))[0] for t in times])
+        # The fit minimises mean((atoms C - seen)^2) / 2 + lambda L_msp / 2: its gradient with respect to C is 0.
+        C = np.zeros((3, 16, 1))
+        C[0, :, 0] = state["C"]
+        of_prior = matern_penalty_reverse(state["lambda"] / 2, (C, np.array(state["rho"])))[0, :, 0]
+        gradient = atoms.T @ (atoms @ C[0, :, 0] - seen) / len(times) + of_prior
+        np.testing.assert_allclose(gradient, 0, atol=1e-7)
 
 
 def test_a_painted_instrument_removes_the_values_that_the_definition_removes(states):
