@@ -16,7 +16,7 @@ copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this s
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 # Those of docs/_extensions.
 extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]
-extensions += ["unbroken_units", "demo_run"]
+extensions += ["notebook_cells", "unbroken_units", "demo_run"]
 exclude_patterns = ["_build", "_extensions", "conf.py", "pages/**", "results/**.py"]  # makers of other pages
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 

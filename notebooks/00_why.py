@@ -29,7 +29,6 @@
 # known, because the clips are simulated. The objective is {eq}`eq-6` of {doc}`/specification/06_objective`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import msgspec
@@ -37,7 +36,6 @@ import numpy as np
 
 import endotsr
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
-from endotsr.definition import view as definition
 from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.results.evaluation.trajectories import trajectory_error
 
@@ -68,7 +66,7 @@ FORWARD = (
 )
 FORWARD += ", frame losses, frame L, S prior"
 BACK = "losses Adam, L Adam, prior Adam, Adam rest"
-figure, axis = plt.subplots(figsize=(13, 3.9), layout="constrained")
+figure, axis = plt.subplots(figsize=(10.1, 3.4), layout="constrained")
 boxes = {}
 for name, (words, chapters, colour, column, row) in BOXES.items():
     boxes[name] = axis.text(
@@ -108,9 +106,35 @@ plt.show()
 # $$
 #
 # The definition of one iteration is short enough to read now. Each call in it is the subject of one chapter.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.view_gradients))
+#
+# <!-- definition: endotsr.definition.view.view_gradients -->
+# ```python
+# def view_gradients(gaussians, spectral, targets, weights, config, camera, t, edges=no_edges,
+#                    *, exposure=None, pose=None, raster=PAPER, degree=3):
+#     """Loss and gradients by name; also of exposure (log_gain, bias) and pose (rotation vector, offset) if given."""
+#     scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
+#     d_exposure = d_pose = exposure_saved = pose_saved = None
+#     if pose is not None:
+#         rotation, translation, pose_saved = pose_forward(camera.rotation, camera.translation, *pose)
+#         camera = camera._replace(rotation=rotation, translation=translation)
+#     rendered, render_saved = render_forward(scene, camera, raster, degree=degree)
+#     if exposure is not None:
+#         colour, exposure_saved = exposure_forward(rendered.colour, *exposure)
+#         rendered = rendered._replace(colour=colour)
+#     loss, terms, d_colour, d_depth = image_loss(rendered, targets, weights, config.loss, edges)
+#
+#     if exposure_saved is not None:
+#         d_colour, *d_exposure = exposure_reverse(d_colour, exposure_saved)
+#     d_scene = render_reverse(d_colour, d_depth, None, render_saved)
+#     if pose_saved is not None:
+#         d_pose = pose_reverse(*d_scene.d_camera, saved=pose_saved)[2:]
+#     gradients = scene_reverse(d_scene, scene_saved)
+#     if gaussians.motion_coefficients is not None:
+#         terms["matern_penalty"], saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
+#         loss = loss + config.loss.lambda_msp * terms["matern_penalty"]
+#         gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, saved)
+#     return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered, d_scene.visible, d_scene.d_mean2d)
+# ```
 
 # %% [markdown]
 # ## Two clips with one cause each
@@ -201,7 +225,7 @@ def show(name):
     sequence = clips[name].sequence
     shown = int(sequence.test_index[1])
     truth = sequence.frame(shown).image
-    _, axes = plt.subplots(2, 6, figsize=(14, 4.1), layout="constrained")
+    _, axes = plt.subplots(2, 6, figsize=(10.9, 3.5), layout="constrained")
     axes[0, 0].imshow(truth.transpose(1, 2, 0))
     axes[0, 0].set_title(f"{name}: truth, frame {shown}")
     first = sequence.frame(int(sequence.train_index[0])).image
@@ -267,7 +291,7 @@ dense = {
     "motion": breathing(4.0, DENSE * FRAMES, ()),
     "slow motion": breathing(1.0, DENSE * FRAMES, ()),
 }
-figure, axes = plt.subplots(1, 3, figsize=(14, 3.5), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.9, 3), layout="constrained")
 for panel, (name, film) in zip(axes, dense.items()):
     sequence = clips[name].sequence
     course = film.sequence.images.astype(float).mean(axis=1) / 255
@@ -288,7 +312,7 @@ for panel, (name, film) in zip(axes, dense.items()):
     training, held_out = gain(name, "A")
     title = f"{name}: A {training:+.1f} dB, held out {held_out:+.1f} dB"
     panel.set(title=title, xlabel="t", ylabel="brightness of one pixel")
-axes[0].legend(fontsize=8)
+axes[0].legend()
 plt.show()
 assert min(gain("motion", "A")[0], gain("slow motion", "A")[0]) > 0.3, "A paints the motion"
 assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a slow one well"

@@ -24,7 +24,6 @@
 # compared with the compiled function by an `assert`. If a sign is changed in either, the notebook stops.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -55,10 +54,33 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 # $$
 # \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
 # $$
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.frequencies))
-print(inspect.getsource(definition.dictionary_forward))
+#
+# <!-- definition: endotsr.definition.dictionary.frequencies -->
+# ```python
+# def frequencies(count, low, high):
+#     """Equation (1): omega (F,), cycles per sequence, log-spaced with exact end points."""
+#     omega = low * (high / low) ** (np.arange(count) / max(count - 1, 1))
+#     omega[1:][-1:] = high
+#     return omega
+# ```
+#
+# <!-- definition: endotsr.definition.dictionary.dictionary_forward -->
+# ```python
+# def dictionary_forward(t, omega):
+#     """Equation (1): phi (2F,), all sines, then all cosines, at normalised time t.
+#
+#     Quarter turns are removed first: for a sine of 1e-16 instead of 0, Adam would move A and C by a full step.
+#     """
+#     turns = omega * t
+#     quarters = np.rint(4 * turns.real)
+#     angle = 2 * np.pi * (turns - quarters / 4)  # (1.2)
+#     which = quarters.astype(np.intp) % 4  # an index has the width of a pointer
+#     s, c = np.sin(angle), np.cos(angle)
+#     sine = np.choose(which, [s, c, -s, -c])
+#     cosine = np.choose(which, [c, -s, -c, s])
+#     phi = np.concatenate([sine, cosine])
+#     return phi, DictionarySaved(t, omega)
+# ```
 
 # %% [markdown]
 # The compiled functions have the same names. They agree with the definition to rounding.
@@ -115,10 +137,24 @@ for t in rng.uniform(0, 1, 20):
 # \bar\phi_k(t) &= \begin{cases} \dfrac{\phi_k(t)-m_k}{\rho^{\mathrm{rms}}_k} & \rho^{\mathrm{rms}}_k \ge 10^{-6}\\[2ex] 0 & \text{otherwise (dead)} \end{cases}
 # \end{aligned}
 # $$
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.atom_statistics))
-print(inspect.getsource(definition.normalise_forward))
+#
+# <!-- definition: endotsr.definition.dictionary.atom_statistics -->
+# ```python
+# def atom_statistics(times, omega):
+#     """Equation (1b): population statistics (divisor n) over the distinct training stamps `times` (n,)."""
+#     atoms = np.array([dictionary_forward(t, omega)[0] for t in np.unique(times)])
+#     mean = atoms.mean(axis=0)
+#     rms = np.sqrt(((atoms - mean) ** 2).mean(axis=0))
+#     return AtomStatistics(mean, rms, rms < 1e-6)  # ruling "atom statistics": an atom that is constant up to rounding
+# ```
+#
+# <!-- definition: endotsr.definition.dictionary.normalise_forward -->
+# ```python
+# def normalise_forward(phi, statistics):
+#     """Equation (1b): phi_bar (2F,); a dead atom is 0."""
+#     live_rms = np.where(statistics.dead, np.inf, statistics.rms)
+#     return (phi - statistics.mean) / live_rms, statistics
+# ```
 
 # %%
 stamps = np.delete(np.arange(24), [1, 9, 17]) / 24  # 24 frames, every eighth is held out
@@ -162,7 +198,7 @@ assert np.abs(resurrected).max() > 1 and not np.any(right)
 fine = np.linspace(0, 1, 801)
 raw = np.array([dictionary_forward(t, omega)[0] for t in fine])
 bar = np.array([normalise_forward(p, statistics)[0] for p in raw])
-figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.1, 3.1), layout="constrained")
 shown = (
     (F, "cos, 1 cycle", "tab:blue"),
     (1, "sin, 1.5 cycles", "tab:red"),
@@ -179,20 +215,20 @@ for panel, values, title in (
         panel.axhline(on_frames, color=colour, ls=":", lw=1)
     panel.set(title=title, xlabel="t")
     panel.set_ylim(-1.7, 1.7)
-axes[0].legend(loc="lower left", fontsize=8, ncols=3, columnspacing=0.8)
+axes[0].legend(loc="lower left", fontsize=9, ncols=3, columnspacing=0.8)
 axes[1].text(
     0.02,
     0.03,
     "dots: training stamps; dotted: their mean",
     transform=axes[1].transAxes,
-    fontsize=8,
+    fontsize=9,
 )
 axes[2].plot(fine, np.sin(2 * np.pi * 16 * fine), color="0.75", lw=0.8, label="sin, 16 cycles")
 axes[2].plot(stamps_32, resurrected, "x", color="tab:red", label="divided by its noise")
 axes[2].plot(stamps_32, right, "o", color="tab:green", ms=4, label="endotsr: dead, exactly 0")
 axes[2].set(title="the dead atom, 32 frames", xlabel="t")
 axes[2].set_ylim(-3.2, 3.2)
-axes[2].legend(fontsize=8, loc="lower left")
+axes[2].legend(loc="lower left")
 plt.show()
 
 # %% [markdown]
@@ -227,10 +263,23 @@ plt.show()
 # $$
 # g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}
 # $$
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.dictionary_reverse))
-print(inspect.getsource(definition.normalise_reverse))
+#
+# <!-- definition: endotsr.definition.dictionary.dictionary_reverse -->
+# ```python
+# def dictionary_reverse(d_phi, saved):
+#     """Reverse of (1): from d_phi (2F,)."""
+#     sine, cosine = np.split(dictionary_forward(*saved)[0], 2)
+#     d_sine, d_cosine = np.split(d_phi, 2)
+#     d_turns = 2 * np.pi * (d_sine * cosine - d_cosine * sine)  # (1.2), (1.3)
+#     return DictionaryGrads((d_turns * saved.omega).sum(), d_turns * saved.t)  # (1.1), (1.4)
+# ```
+#
+# <!-- definition: endotsr.definition.dictionary.normalise_reverse -->
+# ```python
+# def normalise_reverse(d_phi_bar, saved):
+#     """Reverse of (1b): the statistics are held fixed."""
+#     return d_phi_bar / np.where(saved.dead, np.inf, saved.rms)  # (1.5), (1.6)
+# ```
 
 # %%
 g_phi = rng.normal(size=2 * F)

@@ -20,7 +20,6 @@
 # The equation is {eq}`eq-2` of {doc}`/specification/02_appearance`; {doc}`01_dictionary` introduces the atoms.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -52,10 +51,14 @@ statistics = atom_statistics(stamps, omega)
 # $\Delta h_0=\frac{\beta}{Y_{00}}\tanh x$.
 #
 # **(2.2) The bound.** $|\tanh x|\le1$, so no coefficients change a displayed colour by more than $\beta$.
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.appearance_forward))
+#
+# <!-- definition: endotsr.definition.appearance.appearance_forward -->
+# ```python
+# def appearance_forward(appearance_coefficients, phi_bar, beta):
+#     """Equation (2): residual (3, N) = beta / Y00 tanh(A phi_bar), to be added to the degree-0 coefficient."""
+#     x = np.einsum("ckn,k->cn", appearance_coefficients, phi_bar)
+#     return beta / Y00 * np.tanh(x), AppearanceSaved(appearance_coefficients, phi_bar, beta)  # (2.1)
+# ```
 
 # %%
 A = rng.normal(0, 0.4, (3, 2 * F, N))
@@ -125,20 +128,20 @@ mixed = 0.45 + 0.25 * np.exp(-(distance**2) / 3)
 by_motion = distance[np.searchsorted(mixed, target.clip(mixed[0], mixed[-1])).clip(max=399)]
 assert 4 - by_motion.min() > 2, "the motion that explains the light is pixels, not noise"
 
-figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.1, 3.1), layout="constrained")
 axes[0].plot(fine, target, color="0.6", lw=4, label="brightness of the patch")
 axes[0].plot(fine, by_colour, color="tab:blue", lw=1.5, label="base + $\\beta\\tanh x(t)$")
 axes[0].axhspan(
     base - beta, base + beta, color="tab:blue", alpha=0.08, label="all that A can reach"
 )
 axes[0].set(title="explained by colour", xlabel="t", ylabel="display colour", ylim=(0.1, 0.9))
-axes[0].legend(fontsize=8, loc="lower left")
+axes[0].legend(loc="lower left")
 axes[1].plot(fine, 4 - by_motion, color="tab:red", label="shift of a bright neighbour, no A")
 axes[1].axhline(0, color="tab:blue", label="true motion, and that with A")
 axes[1].set(
     title="explained by motion", xlabel="t", ylabel="displacement [px]", ylim=(-0.2, 4.6)
 )
-axes[1].legend(fontsize=8, loc="upper left")
+axes[1].legend(loc="upper left")
 x = np.linspace(0, 14, 300)
 e = np.exp(-2 * x.astype(np.float32))
 axes[2].semilogy(
@@ -151,7 +154,7 @@ axes[2].semilogy(
     x, 4 * e / (1 + e) ** 2, color="tab:green", label="$4e/(1+e)^2,\\ e=\\exp(-2|x|)$"
 )
 axes[2].set(title="slope of tanh in float32", xlabel="x", ylim=(1e-13, 2))
-axes[2].legend(fontsize=8)
+axes[2].legend()
 plt.show()
 
 # %% [markdown]
@@ -182,10 +185,17 @@ plt.show()
 # g_{A_{cki}} = g_{x_{ci}}\,\bar\phi_k,\qquad
 # g_{\bar\phi_k} = \sum_{i=1}^{N}\sum_{c=1}^{3} g_{x_{ci}}\,A_{cki} .
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.appearance_reverse))
+#
+# <!-- definition: endotsr.definition.appearance.appearance_reverse -->
+# ```python
+# def appearance_reverse(d_residual, saved):
+#     """Reverse of (2). The kernel writes 1 / cosh^2 as 4 e / (1 + e)^2, e = exp(-2 |x|), in which nothing overflows."""
+#     a, phi_bar, beta = saved
+#     with np.errstate(over="ignore"):
+#         slope = beta / Y00 * (1 / np.cosh(np.einsum("ckn,k->cn", a, phi_bar))) ** 2  # (2.3)
+#     d_x = slope * d_residual
+#     return AppearanceGrads(np.einsum("cn,k->ckn", d_x, phi_bar), np.einsum("cn,ckn->k", d_x, a))  # (2.5), (2.6)
+# ```
 
 # %%
 g_h = rng.normal(size=(3, N))

@@ -20,7 +20,6 @@
 # The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -55,11 +54,29 @@ B, N = 17, 4
 #
 # `quartic` is the form that the released code of Deform3DGS computes: the exponent is the square of a square. `gaussian` is the
 # textbook form. The two differ strongly: they give 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.bell))
-print(inspect.getsource(definition.deformation_forward))
+#
+# <!-- definition: endotsr.definition.deformation.bell -->
+# ```python
+# def bell(centre, width, t, basis):
+#     """Delta, Sigma and the basis value, (10, B, N) each; a value below 2^-60 is 0.
+#
+#     Ruling "FDM basis": the released program squares Delta^2 / Sigma where a Gaussian would halve it. The quartic bell
+#     is flatter at its centre and ends sooner, so that a basis acts on a shorter stretch of time.
+#     """
+#     delta = t - centre
+#     sigma = width**2 + 1e-4
+#     exponent = (delta**2 / sigma) ** 2 if basis == "quartic" else delta**2 / (2 * sigma)
+#     live = exponent.real <= 60 * np.log(2)
+#     return delta, sigma, np.where(live, np.exp(-np.where(live, exponent, 0)), 0)
+# ```
+#
+# <!-- definition: endotsr.definition.deformation.deformation_forward -->
+# ```python
+# def deformation_forward(fdm_weight, fdm_centre, fdm_width, t, basis="quartic"):
+#     """Equation (B1): offsets psi (10, N) at normalised time t."""
+#     _, _, e = bell(fdm_centre, fdm_width, t, basis)
+#     return (fdm_weight * e).sum(axis=1), DeformationSaved(fdm_weight, fdm_centre, fdm_width, t, basis)
+# ```
 
 # %%
 w = rng.normal(size=(10, B, N))
@@ -87,7 +104,7 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
 # %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
 centres = np.linspace(0, 1, B)
-figure, axes = plt.subplots(1, 3, figsize=(13, 3.4), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.1, 2.9), layout="constrained")
 unit = np.zeros((10, B, B))
 unit[0] = np.eye(B)  # Gaussian j has basis j alone: the offsets are the values of the bases
 spread = np.broadcast_to(centres[None, :, None], unit.shape).copy()
@@ -105,7 +122,7 @@ for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
     if width == 0.01:
         frames = np.arange(63) / 63
         assert int((np.interp(frames, fine, highest) < 1e-3).sum()) == 16
-        panel.text(0.01, 1.06, "red: no basis above 0.001 (16 of 63 frames)", fontsize=8)
+        panel.text(0.01, 1.06, "red: no basis above 0.001 (16 of 63 frames)", fontsize=9)
 learned = rng.normal(0, 1, (10, B, 1))
 curve = [
     deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1), 0.06), t)[0][
@@ -159,10 +176,24 @@ plt.show()
 # g_t &= -\sum_{c,j,i} g_{\theta,cji} .
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.deformation_reverse))
+#
+# <!-- definition: endotsr.definition.deformation.deformation_reverse -->
+# ```python
+# def deformation_reverse(d_offsets, saved):
+#     """Reverse of (B1): from d_offsets (10, N). The kernel computes one exponential for value and derivatives."""
+#     w, centre, width, t, basis = saved
+#     delta, sigma, e = bell(centre, width, t, basis)
+#     d_e = w * d_offsets[:, None]  # (3.1)
+#     d_exponent = np.where(e == 0, 0, -d_e * e)  # (3.2)
+#     if basis == "quartic":
+#         by_delta = 4 * delta**3 / sigma**2  # (3.3)
+#         by_width = -4 * delta**4 * width / sigma**3  # (3.4)
+#     else:
+#         by_delta = delta / sigma  # (3.3)
+#         by_width = -(delta**2) * width / sigma**2  # (3.4)
+#     d_centre = -d_exponent * by_delta  # (3.5)
+#     return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())  # (3.6)
+# ```
 
 # %%
 g_psi = rng.normal(size=(10, N))

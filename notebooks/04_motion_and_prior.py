@@ -20,7 +20,6 @@
 # The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -59,10 +58,13 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # $\psi$ is the offset of the deformation model of {doc}`03_deformation`. The atoms are **raw**, not normalised: for
 # raw pairs the penalty below is invariant to the phase of a sine and cosine pair. The sine and the cosine of a normalised
 # pair have different scales, and for them it is not.
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.motion_forward))
+#
+# <!-- definition: endotsr.definition.motion.motion_forward -->
+# ```python
+# def motion_forward(motion_coefficients, phi):
+#     """Equation (3): translation (3, N) = C phi, scene units; phi (2F,) are the raw atoms."""
+#     return np.einsum("dkn,k->dn", motion_coefficients, phi), MotionSaved(motion_coefficients, phi)
+# ```
 
 # %%
 for t in (0.0, 0.37, 0.9):
@@ -113,11 +115,26 @@ assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 # \mathcal L_{\mathrm{msp}} &= \frac{1}{6NF}\sum_{i=1}^{N}\sum_{f=1}^{F}\rho_f\sum_{d=1}^{3}\left(C_{d,f,i}^2 + C_{d,F+f,i}^2\right).
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition_of_prior.matern_weights))
-print(inspect.getsource(definition_of_prior.matern_penalty_forward))
+#
+# <!-- definition: endotsr.definition.matern.matern_weights -->
+# ```python
+# def matern_weights(omega, length):
+#     """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) and the correlation length, as printed.
+#
+#     The kernel first divides by the largest frequency, which avoids overflow. Below a length of 1e-40, rho rounds to 1.
+#     """
+#     rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3  # (4.2)
+#     return rho / rho.mean()  # (4.3)
+# ```
+#
+# <!-- definition: endotsr.definition.matern.matern_penalty_forward -->
+# ```python
+# def matern_penalty_forward(motion_coefficients, rho):
+#     """Equation (4), lower line: scene units squared; both atoms of a frequency share its weight."""
+#     n = motion_coefficients.shape[2]
+#     squares = np.einsum("dkn,dkn->k", motion_coefficients, motion_coefficients)
+#     return np.tile(rho, 2) @ squares / (6 * max(n, 1) * rho.size), MaternSaved(motion_coefficients, rho)  # (4.4)
+# ```
 
 # %%
 rho = matern_weights(omega, length)
@@ -226,7 +243,7 @@ misses = lambda c: np.sqrt(np.mean((Phi @ c - seen) ** 2))
 print(f"error at the stamps: {misses(free):.3f} without the prior, {misses(held):.3f} with it")
 assert misses(held) < 1.2 * misses(free), "equal at the stamps, different between them"
 
-figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.1, 3.1), layout="constrained")
 axes[0].plot(fine, path(fine), color="0.5", lw=4, label="true path")
 axes[0].plot(fine, Phi_fine @ free, color="tab:red", lw=1.2, label="no prior")
 axes[0].plot(
@@ -234,7 +251,7 @@ axes[0].plot(
 )
 axes[0].plot(stamps, seen, "k.", ms=4)
 axes[0].set(title="a trajectory", xlabel="t", ylabel="x [scene units]", ylim=(-2.6, 3.4))
-axes[0].legend(fontsize=8, loc="upper right", ncols=2)
+axes[0].legend(loc="upper right", ncols=2)
 energy = lambda c: c[:F] ** 2 + c[F:] ** 2
 axes[1].loglog(omega, energy(free), "o-", color="tab:red", label="no prior")
 axes[1].loglog(omega, energy(held), "o-", color="tab:blue", label="with prior")
@@ -244,13 +261,13 @@ axes[1].set(
     xlabel="$\\omega$ [cycles per sequence]",
     ylim=(1e-7, 30),
 )
-axes[1].legend(fontsize=8)
+axes[1].legend()
 for ell in (0.0, 0.05, 0.1, 0.2, np.inf):
     axes[2].loglog(omega, matern_weights(omega, ell), "o-", ms=4, label=f"$\\ell=${ell:g}")
 axes[2].set(
     title="weights $\\rho_f$", xlabel="$\\omega$ [cycles per sequence]", ylim=(1e-7, 20)
 )
-axes[2].legend(fontsize=8)
+axes[2].legend()
 plt.show()
 
 # %% [markdown]
@@ -276,11 +293,22 @@ plt.show()
 # g_{C_{d,f,i}} = \frac{\rho_f}{3NF}\,C_{d,f,i}\;g_{\mathcal L_{\mathrm{msp}}},\qquad
 # g_{C_{d,F+f,i}} = \frac{\rho_f}{3NF}\,C_{d,F+f,i}\;g_{\mathcal L_{\mathrm{msp}}} .
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.motion_reverse))
-print(inspect.getsource(definition_of_prior.matern_penalty_reverse))
+#
+# <!-- definition: endotsr.definition.motion.motion_reverse -->
+# ```python
+# def motion_reverse(d_translation, saved):
+#     """Reverse of (3)."""
+#     c, phi = saved
+#     return MotionGrads(d_translation[:, None] * phi[:, None], np.einsum("dn,dkn->k", d_translation, c))  # (4.5), (4.6)
+# ```
+#
+# <!-- definition: endotsr.definition.matern.matern_penalty_reverse -->
+# ```python
+# def matern_penalty_reverse(d_penalty, saved):
+#     """Reverse of (4): d_motion_coefficients (3, 2F, N); rho is held fixed."""
+#     c, rho = saved
+#     return d_penalty * np.tile(rho, 2)[:, None] * c / (3 * max(c.shape[2], 1) * rho.size)  # (4.7)
+# ```
 
 # %%
 g = rng.normal(size=(3, N))

@@ -20,7 +20,6 @@
 # The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -59,13 +58,43 @@ N = 6
 # \Sigma &= R\,\mathrm{diag}(S)^2R^\top .
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.unit))
-print(inspect.getsource(definition.rotation_of))
-print(inspect.getsource(definition.covariance_forward))
-print(inspect.getsource(definition.covariance_matrix))
+#
+# <!-- definition: endotsr.definition.covariance.unit -->
+# ```python
+# def unit(quaternion):
+#     """q / |q| (4, N) and 1 / |q| (N,); (1, 0, 0, 0) and 0 for q = 0. The largest entry is divided out first."""
+#     largest = np.abs(quaternion.real).max(axis=0, initial=0)
+#     zero = largest == 0
+#     q = np.where(zero, np.eye(4)[:, :1], quaternion / np.where(zero, 1, largest))
+#     norm = np.sqrt((q * q).sum(axis=0))
+#     return q / norm, np.where(zero, 0, 1 / norm / np.maximum(largest, 1e-20))
+# ```
+#
+# <!-- definition: endotsr.definition.covariance.rotation_of -->
+# ```python
+# def rotation_of(q):
+#     """R (3, 3, N) of unit quaternions w + v: (w^2 - v.v) I + 2 v v^T + 2 w [v]_x; the kernel writes nine entries."""
+#     w, v = q[0], q[1:]
+#     outer = np.einsum("in,jn->ijn", v, v)
+#     cross = np.einsum("ijk,kn->ijn", CROSS, v)
+#     return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (5.4)
+# ```
+#
+# <!-- definition: endotsr.definition.covariance.covariance_forward -->
+# ```python
+# def covariance_forward(quaternion, log_scale):
+#     """Equation (B2): Shape from raw quaternions (4, N) w, x, y, z and log-scales (3, N), clipped to +-40."""
+#     # The square of a scale beyond exp(44) overflows in float32; of exp(-44) it is 0.
+#     scale = np.exp(np.where(np.abs(log_scale.real) <= 40, log_scale, np.copysign(40, log_scale.real)))
+#     return Shape(rotation_of(unit(quaternion)[0]), scale), CovarianceSaved(quaternion, log_scale)
+# ```
+#
+# <!-- definition: endotsr.definition.covariance.covariance_matrix -->
+# ```python
+# def covariance_matrix(shape):
+#     """Sigma (3, 3, N), scene units squared. The kernels never form it: Sigma of a needle loses digits."""
+#     return np.einsum("ikn,kn,jkn->ijn", shape.rotation, shape.scale**2, shape.rotation)
+# ```
 
 # %%
 q, s = 3 * rng.normal(size=(4, N)), rng.normal(0, 0.7, (3, N))
@@ -153,11 +182,31 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 # g_{\tilde q}&=\frac{g_q-(q\cdot g_q)\,q}{\|\tilde q\|}
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.rotation_reverse))
-print(inspect.getsource(definition.covariance_reverse))
+#
+# <!-- definition: endotsr.definition.covariance.rotation_reverse -->
+# ```python
+# def rotation_reverse(q, g):
+#     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N)."""
+#     w, v = q[0], q[1:]
+#     trace = np.einsum("iin->n", g)
+#     spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (5.5)
+#     along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (5.6)
+#     g_w = 2 * w * trace + 2 * (spin * v).sum(axis=0)
+#     g_v = -2 * v * trace + 2 * along + 2 * w * spin
+#     return np.concatenate([[g_w], g_v])
+# ```
+#
+# <!-- definition: endotsr.definition.covariance.covariance_reverse -->
+# ```python
+# def covariance_reverse(d_shape, saved):
+#     """Reverse of (B2): the component along q is removed; a clipped log-scale has gradient 0."""
+#     q, inverse_norm = unit(saved.quaternion)
+#     g = rotation_reverse(q, d_shape.rotation)
+#     d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (5.8)
+#     free = np.abs(saved.log_scale) <= 40  # (5.3)
+#     scale = np.exp(np.clip(saved.log_scale, -40, 40))
+#     return CovarianceGrads(d_quaternion, np.where(free, d_shape.scale * scale, 0))
+# ```
 
 
 # %%
@@ -229,7 +278,7 @@ assert losses[-1] < 1e-3 * losses[0]
 circle = np.stack(
     [np.cos(np.linspace(0, 2 * np.pi, 100)), np.sin(np.linspace(0, 2 * np.pi, 100))]
 )
-figure = plt.figure(figsize=(13, 3.8), layout="constrained")
+figure = plt.figure(figsize=(10.1, 3.3), layout="constrained")
 for column, (a, b) in enumerate(((0, 1), (0, 2))):
     panel = figure.add_subplot(1, 3, column + 1)
     for k in (0, 4, 8, 16, 32, 64, 128, 799):

@@ -21,7 +21,6 @@
 # {eq}`eq-b16` of {doc}`/specification/b16_pose`, comes before it.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -71,11 +70,43 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 # slope that enters $J$ is clamped, with $\kappa=1.3$ in the presets `paper` and `legacy`. In `exact` there is no clamp.
 # The centre is never clamped. $\varepsilon$ is the low-pass of 0.3 px². No splat then has a standard
 # deviation below 0.55 px in any direction.
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.jacobian))
-print(inspect.getsource(definition.projection_forward))
+#
+# <!-- definition: endotsr.definition.projection.jacobian -->
+# ```python
+# def jacobian(point, camera, settings):
+#     """J (2, 3, N) at points (3, N) in camera axes, its slopes x'/z, y'/z (2, N), and which slopes are unclamped."""
+#     x, y, z = point
+#     fx, fy = camera.fx, camera.fy
+#     # Ruling "off-axis clamp of J": slopes up to kappa tan(fov / 2), symmetric; kappa = 0 means no clamp.
+#     kappa = settings.jacobian_clamp
+#     sizes = np.array([[camera.width / fx], [camera.height / fy]])
+#     limit = kappa * sizes / 2 if kappa > 0 else np.inf * sizes
+#     slope = np.array([x / z, y / z])
+#     free = np.abs(np.real(slope)) <= limit
+#     slope = np.where(free, slope, np.copysign(limit, np.real(slope)))
+#     j = np.array([[fx / z, 0 * z, -fx * slope[0] / z], [0 * z, fy / z, -fy * slope[1] / z]])
+#     return j, slope, free
+# ```
+#
+# <!-- definition: endotsr.definition.projection.projection_forward -->
+# ```python
+# def projection_forward(position, shape, camera, settings):
+#     """Equation (B3): Projected of centres (3, N); cov = J W Sigma W^T J^T + low-pass, det = a c - b^2.
+#
+#     The kernel sums the determinant from nonnegative terms, and clips axes above 1e60 px.
+#     """
+#     point = camera.rotation @ position + camera.translation[:, None]
+#     visible = point[2].real > settings.near  # ruling "near plane"
+#     x, y, z = point = np.where(visible, point, 1)
+#     t = np.einsum("ijn,jk->ikn", jacobian(point, camera, settings)[0], camera.rotation)
+#     cov = np.einsum("ikn,kln,jln->ijn", t, covariance_matrix(shape), t)
+#     a, b, c = cov[0, 0] + settings.low_pass, cov[0, 1], cov[1, 1] + settings.low_pass
+#     values = np.array([camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy, a, b, c, a * c - b * b, z])
+#     visible = visible & np.isfinite(values).all(axis=0)
+#     values = np.where(visible, values, 0)
+#     saved = ProjectionSaved(position, shape, camera, settings, visible)
+#     return Projected(values[:2], values[2:5], values[5], values[6], visible), saved
+# ```
 
 # %%
 presets = (PAPER, definition_settings.PAPER), (EXACT, definition_settings.EXACT)
@@ -127,7 +158,7 @@ np.testing.assert_allclose(projected.determinant, sums, rtol=1e-11)
 
 # %% tags=["hide-input"]
 front = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 32.0, 24.0, 64, 48)
-figure, axes = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.1, 3.4), layout="constrained")
 circle = 2 * np.stack(
     [np.cos(np.linspace(0, 2 * np.pi, 200)), np.sin(np.linspace(0, 2 * np.pi, 200))]
 )
@@ -157,7 +188,7 @@ for panel, (title, centre, axes_length) in zip(axes, scenes):
     panel.plot(*outline, color="tab:blue", label="EWA, two standard deviations")
     panel.plot(*flat.mean2d, "r+", ms=10)
     panel.set(title=title, xlim=(0, 64), ylim=(48, 0), aspect="equal")
-axes[0].legend(fontsize=8, loc="lower left")
+axes[0].legend(loc="lower left")
 
 lengths = np.geomspace(1, 3e4, 60)
 errors = {"$ac-b^2$": [], "sum of terms": []}
@@ -264,11 +295,39 @@ plt.show()
 # g_W&=\sum_i\bigl[(g_x,g_y,g_z)_i^\top\mu_i^\top+J_i^\top g_{T,i}R_i^\top\bigr]-\mathbf d\,g_{\mathbf o}^\top,
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.projection_reverse))
-print(inspect.getsource(definition.point_reverse))
+#
+# <!-- definition: endotsr.definition.projection.projection_reverse -->
+# ```python
+# def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
+#     """Reverse of (B3): b represents two entries. For needles, the kernel of the render starts from A, m, r."""
+#     position, shape, camera, settings, visible = saved
+#     d_mean2d, d_covariance2d, d_depth = (np.where(visible, g, 0) for g in (d_mean2d, d_covariance2d, d_depth))
+#     w = camera.rotation
+#     point = np.where(visible, w @ position + camera.translation[:, None], 1)
+#     j, slope, free = jacobian(point, camera, settings)
+#     g_sigma, g_t = covariance_reverse_parts(d_covariance2d, saved, point)
+#     g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (5.1)
+#     d_scale = (shape.rotation * g_m).sum(axis=0)  # (5.2), (6.3)
+#     g_j = np.einsum("ikn,jk->ijn", g_t, w)
+#     g_point = point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera)
+#     d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (6.4), (6.11)
+#     return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (6.10)
+# ```
+#
+# <!-- definition: endotsr.definition.projection.point_reverse -->
+# ```python
+# def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera):
+#     """dL/d(point in camera axes) (3, N), from the derivatives with respect to J, (u, v) and depth."""
+#     z = point[2]
+#     focal = np.array([[camera.fx], [camera.fy]])
+#     by_slope = np.array([g_j[0, 2], g_j[1, 2]])
+#     g_slope = -focal / z * by_slope  # J_02 = -f (x'/z) / z; (6.6)
+#     g_clipped = np.where(free, g_slope, 0)  # ruling: exact derivative of the clamp; (6.7)
+#     g_xy = (focal * d_mean2d + g_clipped) / z  # (6.8)
+#     by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * by_slope)  # (6.9)
+#     g_z = d_depth + (by_scale - g_xy * point[:2] / z).sum(axis=0)
+#     return np.concatenate([g_xy, [g_z]])
+# ```
 
 # %%
 g_uv, g_abc, g_z = rng.normal(size=(2, N)), rng.normal(size=(3, N)), rng.normal(size=N)
@@ -364,12 +423,38 @@ for name in ("position", "rotation", "scale"):
 # **(6.14) The definition** needs no derivative of a series. The exponential of the block matrix
 # $\begin{bmatrix}K^\top&G\\0&K^\top\end{bmatrix}$ has $E^\top$ in its diagonal blocks and $g_K$ in the upper right one.
 # The spin of (5.5) turns $g_K$ into $g_{\boldsymbol\omega}$.
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(pose_definition.exponential))
-print(inspect.getsource(pose_definition.pose_forward))
-print(inspect.getsource(pose_definition.pose_reverse))
+#
+# <!-- definition: endotsr.definition.pose.exponential -->
+# ```python
+# def exponential(matrix):
+#     """Taylor series of exp(matrix / 2^s), squared s times. The kernel uses the closed form for 3 x 3."""
+#     halvings = max(0, int(np.ceil(np.log2(np.abs(matrix).sum() + 1))))
+#     term = total = np.eye(len(matrix))
+#     for k in range(1, 20):
+#         term = term @ matrix / 2**halvings / k
+#         total = total + term
+#     return np.linalg.matrix_power(total, 2**halvings)
+# ```
+#
+# <!-- definition: endotsr.definition.pose.pose_forward -->
+# ```python
+# def pose_forward(rotation, translation, rotation_vector, offset):
+#     """Equation (B16): W' = E W (3, 3) and d' = E d + tau (3,), E = exp([omega]_x), omega in rad, tau in scene units."""
+#     e = exponential(CROSS @ rotation_vector)
+#     return e @ rotation, e @ translation + offset, PoseSaved(rotation, translation, rotation_vector)
+# ```
+#
+# <!-- definition: endotsr.definition.pose.pose_reverse -->
+# ```python
+# def pose_reverse(d_rotation, d_translation, saved):
+#     """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]^T."""
+#     rotation, translation, vector = saved
+#     k = (CROSS @ vector).T
+#     g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (6.12)
+#     both = exponential(np.block([[k, g], [np.zeros((3, 3)), k]]))  # (6.14)
+#     e, d_cross = both[:3, :3].T, both[:3, 3:]
+#     return PoseGrads(e.T @ d_rotation, e.T @ d_translation, np.einsum("ij,ijk->k", d_cross, CROSS), d_translation)
+# ```
 
 # %%
 W, d, omega, tau = (

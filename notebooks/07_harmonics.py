@@ -20,7 +20,6 @@
 # The equation is {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -47,13 +46,40 @@ N = 9
 # The specification has the table of the $Y_k$. Each is a polynomial in $x,y,z$ of degree at most 3. The definition stores
 # the polynomials as lists: a factor, then coefficient and exponents of each monomial.
 
-# %% tags=["transcription"]
+# %%
 for k, (factor, polynomial) in enumerate(definition.POLYNOMIALS):
     terms = [f"{c:+d} x^{i} y^{j} z^{m}" for c, i, j, m in polynomial]
     print(f"Y_{k:<2d} = {factor:+.6f} (" + " ".join(terms) + ")")
-print(inspect.getsource(definition.basis))
-print(inspect.getsource(definition.directions))
-print(inspect.getsource(definition.harmonics_forward))
+
+# %% [markdown]
+# <!-- definition: endotsr.definition.harmonics.basis -->
+# ```python
+# def basis(direction, terms):
+#     """Y_k (terms, N) of directions (3, N)."""
+#     x, y, z = direction
+#     return np.array([f * sum(c * x**i * y**j * z**k for c, i, j, k in p) for f, p in POLYNOMIALS[:terms]])
+# ```
+#
+# <!-- definition: endotsr.definition.harmonics.directions -->
+# ```python
+# def directions(position, centre):
+#     """Unit vectors (3, N) from the optical centre, and 1 / distance (N,); both 0 at the centre itself."""
+#     v = position - centre[:, None]
+#     length = np.sqrt((v * v).sum(axis=0))
+#     inverse = np.where(length == 0, 0, 1 / np.where(length == 0, 1, length))
+#     return v * inverse, inverse
+# ```
+#
+# <!-- definition: endotsr.definition.harmonics.harmonics_forward -->
+# ```python
+# def harmonics_forward(harmonics, residual, position, centre, degree):
+#     """Equation (B4): display colour (3, N), clamped to at least 0."""
+#     terms = (degree + 1) ** 2
+#     y = basis(directions(position, centre)[0], terms)
+#     colour = 0.5 + np.einsum("kn,kcn->cn", y, harmonics[:terms]) + (0 if residual is None else Y00 * residual)
+#     saved = HarmonicsSaved(harmonics, residual, position, centre, degree, colour.real < 0)
+#     return np.where(colour.real < 0, 0, colour), saved
+# ```
 
 # %%
 h, residual = rng.normal(0, 0.6, (16, 3, N)), rng.normal(0, 0.3, (3, N))
@@ -98,7 +124,7 @@ lon, lat = np.meshgrid(np.linspace(-np.pi, np.pi, 73), np.linspace(-np.pi / 2, n
 around = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]).reshape(
     3, -1
 )
-figure = plt.figure(figsize=(13, 6), layout="constrained")
+figure = plt.figure(figsize=(10.1, 5.2), layout="constrained")
 grid = figure.add_gridspec(4, 7)
 for band in range(4):
     for m in range(-band, band + 1):
@@ -163,11 +189,34 @@ plt.show()
 # g_{\mu_i}&\mathrel{+}=g_{\mathbf v_i},\qquad g_{\mathbf o}=-\sum_i g_{\mathbf v_i} .
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.basis_slopes))
-print(inspect.getsource(definition.harmonics_reverse))
+#
+# <!-- definition: endotsr.definition.harmonics.basis_slopes -->
+# ```python
+# def basis_slopes(direction, terms):
+#     """dY_k / d(x, y, z), (terms, 3, N), for independent x, y, z."""
+#     out = np.zeros((terms, *direction.shape), direction.dtype)
+#     for row, (factor, polynomial) in enumerate(POLYNOMIALS[:terms]):
+#         for c, *powers in polynomial:
+#             for axis in np.flatnonzero(powers):
+#                 x, y, z = (d ** (p - (axis == i)) for i, (d, p) in enumerate(zip(direction, powers)))
+#                 out[row, axis] += factor * c * powers[axis] * x * y * z  # (7.4)
+#     return out
+# ```
+#
+# <!-- definition: endotsr.definition.harmonics.harmonics_reverse -->
+# ```python
+# def harmonics_reverse(d_colour, saved):
+#     """Reverse of (B4): through the coefficients and through the viewing direction."""
+#     harmonics, residual, position, centre, degree, clamped = saved
+#     terms = (degree + 1) ** 2
+#     g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (7.1)
+#     n, inverse = directions(position, centre)
+#     d_harmonics = np.zeros_like(harmonics)
+#     d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (7.2)
+#     d_n = np.einsum("cn,kcn,kan->an", g, harmonics[:terms], basis_slopes(n, terms))  # (7.3)
+#     d_v = (d_n - (n * d_n).sum(axis=0) * n) * inverse  # (7.5)
+#     return HarmonicsGrads(d_harmonics, None if residual is None else Y00 * g, d_v, -d_v.sum(axis=1))  # (7.6)
+# ```
 
 # %%
 g_rgb = rng.normal(size=(3, N))

@@ -19,7 +19,6 @@
 # The equations are {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -98,11 +97,59 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 #
 # A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ does not contribute. If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel
 # ends before Gaussian $k$ is blended.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.opacity_of))
-print(inspect.getsource(definition.layers_of))
-print(inspect.getsource(definition.composite_forward))
+#
+# <!-- definition: endotsr.definition.compositing.opacity_of -->
+# ```python
+# def opacity_of(logit):
+#     """1 / (1 + exp(-logit)), complex allowed, without overflow."""
+#     e = np.exp(np.where(logit.real < 0, logit, -logit))
+#     return np.where(logit.real < 0, e, 1) / (1 + e)
+# ```
+#
+# <!-- definition: endotsr.definition.compositing.layers_of -->
+# ```python
+# def layers_of(projected, opacity_logit, settings, width, height):
+#     """The layers, front to back (equal depths by index), and the transmittance (H, W) behind all of them."""
+#     u, v = projected.mean2d
+#     a, b, c = projected.covariance2d
+#     opacity = opacity_of(opacity_logit)
+#     columns, rows = (reach(projected, opacity_logit, settings, n, axis) for axis, n in enumerate((width, height)))
+#     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+#     t, live = np.ones((height, width)), np.ones((height, width), bool)
+#     layers = []
+#     for i in np.argsort(projected.depth.real, kind="stable"):  # ruling "order"
+#         box = np.outer(rows[:, i], columns[:, i])
+#         if not box.any():
+#             continue
+#         dx, dy = x - u[i], y - v[i]
+#         q = (c[i] * dx * dx - 2 * b[i] * dx * dy + a[i] * dy * dy) / projected.determinant[i]
+#         value = opacity[i] * np.exp(-q / 2)
+#         alpha = np.where(value.real <= settings.alpha_max, value, settings.alpha_max)  # ruling "alpha clamp"
+#         wanted = live & box & (alpha.real >= settings.alpha_cutoff)
+#         live = live & ~(wanted & ((t * (1 - alpha)).real < settings.transmittance_stop))
+#         layers.append(Layer(i, dx, dy, value, alpha, t, wanted & live))
+#         t = np.where(wanted & live, t * (1 - alpha), t)
+#     return layers, t
+# ```
+#
+# <!-- definition: endotsr.definition.compositing.composite_forward -->
+# ```python
+# def composite_forward(projected, opacity_logit, colour, settings, background, width, height):
+#     """Equation (B5): Composite of Gaussians on the screen; colour (3, N), background (3,), logits (N,).
+#
+#     The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles.
+#     """
+#     layers, t = layers_of(projected, opacity_logit, settings, width, height)
+#     image = t * background[:, None, None]
+#     depth = opacity = 0 * t
+#     for layer in layers:
+#         weight = np.where(layer.taken, layer.alpha * layer.front, 0)
+#         image = image + weight * colour[:, layer.index, None, None]
+#         depth = depth + weight * projected.depth[layer.index]
+#         opacity = opacity + weight
+#     saved = CompositeSaved(projected, opacity_logit, colour, settings, background, layers, t)
+#     return Composite(image, depth, opacity, t), saved
+# ```
 
 
 # %%
@@ -155,13 +202,13 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(
-    1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1]
+    1, 4, figsize=(10.9, 3.1), layout="constrained", width_ratios=[1.3, 1, 1, 1]
 )
 contributors, T_n = contributors_of(9, 7, scene, PAPER)
 for k, (i, alpha, T) in enumerate(contributors):
     axes[0].bar(k, T, color="0.9", edgecolor="0.6")
     axes[0].bar(k, alpha * T, color=scene["colour"][:, i], edgecolor="k", lw=0.5)
-    axes[0].text(k, alpha * T + 0.02, f"$\\alpha$={alpha:.2f}", ha="center", fontsize=8)
+    axes[0].text(k, alpha * T + 0.02, f"$\\alpha$={alpha:.2f}", ha="center", fontsize=9)
 axes[0].bar(len(contributors), T_n, color=background, edgecolor="k", lw=0.5)
 axes[0].set(
     title="pixel (9, 7): $T_k$, and the fraction $\\alpha_kT_k$",
@@ -268,9 +315,28 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 #
 # The definition goes from $q$ to the covariance in one step, $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$
 # with $Q=\Sigma^{-1}$, instead of (8.8). The sums are the same.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.composite_reverse))
+#
+# <!-- definition: endotsr.definition.compositing.composite_reverse -->
+# ```python
+# def composite_reverse(d_colour, d_depth, d_opacity, saved):
+#     """Reverse of (B5) from images: the recursion R_k, back to front, then d(-q/2)/dSigma = Q d d^T Q / 2."""
+#     projected, logit, colour, settings, background, layers, t = saved
+#     out = CompositeGrads._make(np.zeros((*n, logit.size), t.dtype) for n in ((2,), (3,), (), (3,), (), ()))
+#     rest = (background[:, None, None] * d_colour).sum(axis=0)  # <g, R>: colour, depth and opacity behind the layer
+#     for i, dx, dy, value, alpha, front, taken in reversed(layers):
+#         own = np.einsum("c,chw->hw", colour[:, i], d_colour) + projected.depth[i] * d_depth + d_opacity
+#         passes = taken & (value <= settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
+#         power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (8.3), (8.6)
+#         (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
+#         px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (8.7)
+#         out.d_mean2d[:, i] = (power * px).sum(), (power * py).sum()
+#         out.d_covariance2d[:, i] = np.array([power * px**2 / 2, power * px * py, power * py**2 / 2]).sum((1, 2))
+#         out.d_opacity_logit[i] = power.sum() * opacity_of(-logit[i])
+#         weight = np.where(taken, alpha * front, 0)
+#         out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()  # (8.5)
+#         rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)  # (8.1)
+#     return out._replace(d_background=(d_colour * t).sum((1, 2)))
+# ```
 
 # %%
 g_I, g_D, g_O = (

@@ -20,7 +20,6 @@
 # The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -61,11 +60,40 @@ rng = np.random.default_rng(9)
 #
 # Both are linear and act on each axis separately, so each is a small matrix per axis. The definition forms these
 # matrices; the compiled functions do not.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.reduce_matrix))
-print(inspect.getsource(definition.expand_matrix))
-print(inspect.getsource(definition.laplacian_levels))
+#
+# <!-- definition: endotsr.definition.laplacian.reduce_matrix -->
+# ```python
+# def reduce_matrix(n):
+#     """D along one axis, (ceil(n/2), n): five binomial taps at the even samples, mirrored at the border."""
+#     matrix = np.zeros(((n + 1) // 2, n))
+#     for row in range(len(matrix)):
+#         for tap, weight in zip(range(2 * row - 2, 2 * row + 3), (1, 4, 6, 4, 1)):
+#             k = tap % max(2 * (n - 1), 1)
+#             matrix[row, k if k < n else 2 * (n - 1) - k] += weight / 16
+#     return matrix
+# ```
+#
+# <!-- definition: endotsr.definition.laplacian.expand_matrix -->
+# ```python
+# def expand_matrix(n, upsampling):
+#     """U along one axis, (n, ceil(n/2)): linear interpolation, constant beyond the end samples."""
+#     coarse = np.arange((n + 1) // 2)
+#     at = np.arange(n) / 2 if upsampling == "co_sited" else (np.arange(n) + 0.5) / 2 - 0.5
+#     return np.stack([np.interp(at, coarse, unit) for unit in np.eye(coarse.size)], axis=1)
+# ```
+#
+# <!-- definition: endotsr.definition.laplacian.laplacian_levels -->
+# ```python
+# def laplacian_levels(image, levels=3, upsampling="co_sited"):
+#     """G_j = D G_{j-1}, P_j = G_{j-1} - U G_j of an image (C, H, W)."""
+#     bands = []
+#     for _ in range(levels):
+#         d_rows, u_rows, d_columns, u_columns = matrices(image.shape[1:], upsampling)
+#         coarse = d_rows @ image @ d_columns.T
+#         bands.append(image - u_rows @ coarse @ u_columns.T)
+#         image = coarse
+#     return LaplacianLevels(tuple(bands), image)
+# ```
 
 # %%
 for matrix in (
@@ -128,10 +156,34 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 # \mathcal L_j &= \begin{cases}\dfrac{1}{3\,n_j}\displaystyle\sum_{c=1}^{3}\ \sum_{p:\,V_j(p)}\bigl|\,P_j(\hat I)_{c,p} - P_j(I)_{c,p}\bigr| & n_j>0\\[1ex] 0 & n_j=0 .\end{cases}
 # \end{aligned}
 # $$
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.support_masks))
-print(inspect.getsource(definition.laplacian_loss_forward))
+#
+# <!-- definition: endotsr.definition.laplacian.support_masks -->
+# ```python
+# def support_masks(mask, levels=3, upsampling="co_sited"):
+#     """V_j: values to which no excluded pixel of `mask` (H, W) contributes. S_0 = mask is propagated through D and U."""
+#     bands = []
+#     valid = mask
+#     for _ in range(levels):
+#         d_rows, u_rows, d_columns, u_columns = (matrix != 0 for matrix in matrices(valid.shape, upsampling))
+#         coarse = ~(d_rows @ ~valid @ d_columns.T)
+#         bands.append(valid & ~(u_rows @ ~coarse @ u_columns.T))
+#         valid = coarse
+#     return SupportMasks(mask, tuple(bands), upsampling)
+# ```
+#
+# <!-- definition: endotsr.definition.laplacian.laplacian_loss_forward -->
+# ```python
+# def laplacian_loss_forward(rendered, observed, masks, upsampling="co_sited"):
+#     """Equation (5): display units, from two pyramids. The kernel builds one pyramid of the difference."""
+#     images = [np.where(masks.image, image, 0) for image in (rendered, observed)]
+#     one, other = (laplacian_levels(image, len(masks.bands), upsampling).bands for image in images)
+#     loss, slopes = 0.0, []
+#     for p, q, valid in zip(one, other, masks.bands):
+#         weight = valid / max(len(p) * valid.sum(), 1) / len(masks.bands)
+#         loss += (weight * np.abs(p - q)).sum()
+#         slopes.append(weight * np.sign(p - q))  # (9.1)
+#     return loss, LaplacianSaved(tuple(slopes), masks)
+# ```
 
 # %%
 sequence = simulate(SimulatorSettings(width=96, height=72, frames=8)).sequence
@@ -167,7 +219,7 @@ assert np.array_equal(
 # of the instrument is then the strongest detail of the image, and the loss would make the render reproduce it.
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(2, 4, figsize=(13, 5.4), layout="constrained")
+figure, axes = plt.subplots(2, 4, figsize=(10.1, 4.6), layout="constrained")
 axes[0, 0].imshow(observed.transpose(1, 2, 0))
 axes[0, 0].set_title("observed frame")
 axes[1, 0].imshow(np.where(mask, observed, 0).transpose(1, 2, 0))
@@ -221,9 +273,18 @@ plt.show()
 # g_{\hat I} &= g_{P_1} + \mathsf D^\top g_{G_1}.
 # \end{aligned}
 # $$
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.laplacian_loss_reverse))
+#
+# <!-- definition: endotsr.definition.laplacian.laplacian_loss_reverse -->
+# ```python
+# def laplacian_loss_reverse(d_loss, saved):
+#     """Reverse of (5): d_rendered (3, H, W); g_{G_{j-1}} = g_{P_j} + D^T (g_{G_j} - U^T g_{P_j}), coarse to fine."""
+#     d_coarse = 0.0
+#     for slope in reversed(saved.slopes):  # (9.5)
+#         d_rows, u_rows, d_columns, u_columns = matrices(slope.shape[1:], saved.masks.upsampling)
+#         d_coarse = d_coarse - u_rows.T @ slope @ u_columns  # (9.2), (9.3)
+#         d_coarse = slope + d_rows.T @ d_coarse @ d_columns  # (9.3), (9.4)
+#     return d_loss * np.where(saved.masks.image, d_coarse, 0)  # (9.6)
+# ```
 
 # %%
 for rule in ("co_sited", "half_pixel"):

@@ -25,7 +25,6 @@
 # losses do.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -93,12 +92,47 @@ H, W = M.shape
 # s&=PQ,\qquad 1-s=(1-P)+P(1-Q),
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(l1_definition.masked_l1_forward))
-print(inspect.getsource(definition.blurred))
-print(inspect.getsource(definition.masked_ssim_forward))
+#
+# <!-- definition: endotsr.definition.masked_l1.masked_l1_forward -->
+# ```python
+# def masked_l1_forward(rendered, observed, mask):
+#     """Equation (B6): mean absolute difference (C, H, W) over tissue, mask (H, W) True; 0 without tissue."""
+#     difference = np.where(mask, rendered, 0) - np.where(mask, observed, 0)
+#     count = len(rendered) * mask.sum()
+#     return np.abs(difference).sum() / max(count, 1), MaskedL1Saved(difference, count)
+# ```
+#
+# <!-- definition: endotsr.definition.masked_ssim.blurred -->
+# ```python
+# def blurred(image):
+#     """k * image (C, H, W): the window kappa kappa^T of 11 x 11 pixels, zeros outside the image."""
+#     for axis in (1, 2):
+#         n = image.shape[axis]
+#         offset = np.arange(n)[:, None] - np.arange(n)
+#         kappa = np.where(np.abs(offset) <= 5, np.exp(-(offset**2) / (2 * 1.5**2)), 0)
+#         kappa = kappa / np.exp(-(np.arange(-5, 6) ** 2) / (2 * 1.5**2)).sum()
+#         image = np.moveaxis(np.moveaxis(image, axis, -1) @ kappa, -1, axis)
+#     return image
+# ```
+#
+# <!-- definition: endotsr.definition.masked_ssim.masked_ssim_forward -->
+# ```python
+# def masked_ssim_forward(rendered, target):
+#     """Equation (B7): mean of the map over tissue, in [-1, 1]; 1 without tissue.
+#
+#     The kernel computes 1 - s from the difference and the sum of the images, with variances about the window's centre.
+#     """
+#     x, y = np.where(target.mask, rendered, 0), target.image
+#     mu_x, mu_y = blurred(x), blurred(y)
+#     a1 = 2 * mu_x * mu_y + C1
+#     a2 = 2 * (blurred(x * y) - mu_x * mu_y) + C2
+#     b1 = mu_x**2 + mu_y**2 + C1
+#     b2 = blurred(x**2) - mu_x**2 + blurred(y**2) - mu_y**2 + C2
+#     s = a1 * a2 / (b1 * b2)
+#     by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)  # (10.4)
+#     mean = np.where(target.mask, s, 0).sum() / target.count if target.count else 1.0
+#     return mean, SsimSaved(x, s, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)  # (10.5), (10.6)
+# ```
 
 
 # %%
@@ -147,13 +181,58 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 # \mathrm{TV}(x)&=\frac{1}{K\,H\,W}\sum_{c=1}^{K}\sum_{(p,p')\in\mathcal P}|x_{cp}-x_{cp'}|,
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(depth_definition.normalised_depth_forward))
-print(inspect.getsource(smoothness_definition.squared_steps))
-print(inspect.getsource(smoothness_definition.total_variation))
-print(inspect.getsource(smoothness_definition.smoothness_forward))
+#
+# <!-- definition: endotsr.definition.depth.normalised_depth_forward -->
+# ```python
+# def normalised_depth_forward(rendered_depth, target):
+#     """Equation (B8): each depth is divided by its maximum; 0 below 10 valid pixels or for an empty render."""
+#     largest = np.where(np.isfinite(rendered_depth), rendered_depth, 0).max()
+#     if target.count < 10 or largest <= 0:
+#         return 0.0, DepthSaved(rendered_depth, 0.0, 0 * target.normalised, 1)
+#     residual = np.where(target.valid, rendered_depth / largest - target.normalised, 0)
+#     saved = DepthSaved(rendered_depth, largest, np.sign(residual), target.count)
+#     return np.abs(residual).sum() / target.count, saved
+# ```
+#
+# <!-- definition: endotsr.definition.smoothness.squared_steps -->
+# ```python
+# def squared_steps(depth, smooth):
+#     """Q and its derivative (H, W): squared differences of neighbours that are both smooth, over their number."""
+#     total = 0.0
+#     gradient = np.zeros_like(depth)
+#     number = smooth.sum() + 1e-6
+#     for axis in (0, 1):
+#         both = np.minimum(np.roll(smooth, -1, axis), smooth).take(range(smooth.shape[axis] - 1), axis)
+#         step = np.where(both, np.diff(depth, axis=axis), 0)
+#         total = total + (step**2).sum() / number
+#         gradient = gradient + steps_reverse(2 * step / number, axis)
+#     return total, gradient
+# ```
+#
+# <!-- definition: endotsr.definition.smoothness.total_variation -->
+# ```python
+# def total_variation(image, mask):
+#     """TV of an image (C, H, W) that is 0 on tissue, and its derivative, 0 on tissue; sign(0) = 0."""
+#     outside = np.where(mask, 0, image)
+#     total = 0.0
+#     gradient = np.zeros_like(outside)
+#     for axis in (1, 2):
+#         step = np.diff(outside, axis=axis)
+#         total = total + np.abs(step).sum()
+#         gradient = gradient + steps_reverse(np.sign(step), axis)
+#     return total / image.size, np.where(mask, 0, gradient) / image.size  # (10.11)
+# ```
+#
+# <!-- definition: endotsr.definition.smoothness.smoothness_forward -->
+# ```python
+# def smoothness_forward(rendered_depth, rendered, mask, edges, total_variation_factor):
+#     """Equation (B9): scene units squared; the depth (H, W) is not smoothed across `edges` (H, W)."""
+#     loss = squared_steps(rendered_depth, mask & ~edges)[0]
+#     if total_variation_factor:
+#         variation = total_variation(rendered_depth[None], mask)[0] + total_variation(rendered, mask)[0]
+#         loss = loss + total_variation_factor * variation
+#     return loss, SmoothnessSaved(rendered_depth, rendered, mask, edges, total_variation_factor)
+# ```
 
 # %%
 prior, text_prior = depth_target(D_prior, M), depth_definition.depth_target(D_prior, M)
@@ -198,7 +277,7 @@ from scipy.ndimage import gaussian_filter
 
 blurred = gaussian_filter(I, (0, 1.2, 1.2)) - I
 changes = {"brighter": np.ones_like(I), "noisy": rng.normal(size=I.shape), "blurred": blurred}
-figure, axes = plt.subplots(2, 4, figsize=(13, 5), layout="constrained")
+figure, axes = plt.subplots(2, 4, figsize=(10.1, 4.3), layout="constrained")
 axes[0, 0].imshow(I.transpose(1, 2, 0))
 axes[0, 0].set_title("observed")
 axes[1, 0].imshow(M, cmap="gray")
@@ -284,14 +363,52 @@ plt.show()
 # g_{\hat I_{cp}}&=g\,[\neg M_p]\,\frac{f}{3HW}\sum_{p'\sim p}\operatorname{sign}(\bar I_{cp}-\bar I_{cp'}),
 # \end{aligned}
 # $$
-
-
-# %% tags=["transcription"]
-print(inspect.getsource(l1_definition.masked_l1_reverse))
-print(inspect.getsource(definition.masked_ssim_reverse))
-print(inspect.getsource(depth_definition.normalised_depth_reverse))
-print(inspect.getsource(smoothness_definition.steps_reverse))
-print(inspect.getsource(smoothness_definition.smoothness_reverse))
+#
+# <!-- definition: endotsr.definition.masked_l1.masked_l1_reverse -->
+# ```python
+# def masked_l1_reverse(d_loss, saved):
+#     """Reverse of (B6): d_rendered (C, H, W); sign(0) = 0."""
+#     return d_loss * np.sign(saved.difference) / max(saved.count, 1)  # (10.1)
+# ```
+#
+# <!-- definition: endotsr.definition.masked_ssim.masked_ssim_reverse -->
+# ```python
+# def masked_ssim_reverse(d_ssim, saved):
+#     """Reverse of (B7): d_rendered (C, H, W). The window is symmetric, so it is its own adjoint."""
+#     x, _, slopes, (y, mask, count) = saved
+#     p, p_xx, p_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
+#     return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)  # (10.7)
+# ```
+#
+# <!-- definition: endotsr.definition.depth.normalised_depth_reverse -->
+# ```python
+# def normalised_depth_reverse(d_loss, saved):
+#     """Reverse of (B8): d_rendered_depth (H, W). Pixels that tie for the maximum share its gradient equally."""
+#     depth, largest, sign, count = saved
+#     if largest == 0:
+#         return np.zeros_like(depth)
+#     holders = depth == largest
+#     d_largest = -(sign * np.where(sign == 0, 0, depth)).sum() / largest**2  # (10.9)
+#     return d_loss / count * (sign / largest + holders * d_largest / holders.sum())  # (10.8)
+# ```
+#
+# <!-- definition: endotsr.definition.smoothness.steps_reverse -->
+# ```python
+# def steps_reverse(d_steps, axis):
+#     """Adjoint of the differences of neighbours along an axis."""
+#     border = [(0, 0)] * d_steps.ndim
+#     border[axis] = (1, 1)
+#     return -np.diff(np.pad(d_steps, border), axis=axis)  # (10.10)
+# ```
+#
+# <!-- definition: endotsr.definition.smoothness.smoothness_reverse -->
+# ```python
+# def smoothness_reverse(d_loss, saved):
+#     """Reverse of (B9)."""
+#     depth, rendered, mask, edges, factor = saved
+#     d_depth = squared_steps(depth, mask & ~edges)[1] + factor * total_variation(depth[None], mask)[1][0]
+#     return SmoothnessGrads(d_loss * factor * total_variation(rendered, mask)[1], d_loss * d_depth)
+# ```
 
 # %%
 np.testing.assert_allclose(
@@ -327,10 +444,23 @@ for found, text in zip(
 # **(10.12) Exposure.** All pixels of a channel share two numbers, so their gradients are sums over the pixels:
 # $g_{b_c}=\sum_pg_{\tilde I_{cp}}$ and $g_{\gamma_c}=e^{\gamma_c}\sum_pg_{\tilde I_{cp}}\hat I_{cp}$. The colour has
 # $g_{\hat I_{cp}}=e^{\gamma_c}g_{\tilde I_{cp}}$.
-
-# %% tags=["transcription"]
-print(inspect.getsource(exposure_definition.exposure_forward))
-print(inspect.getsource(exposure_definition.exposure_reverse))
+#
+# <!-- definition: endotsr.definition.exposure.exposure_forward -->
+# ```python
+# def exposure_forward(colour, log_gain, bias):
+#     """Equation (B13): exposed colours (C, H, W) from `colour` (C, H, W), log_gain (C,) and bias (C,)."""
+#     exposed = np.exp(log_gain)[:, None, None] * colour + bias[:, None, None]
+#     return exposed, ExposureSaved(colour, log_gain)
+# ```
+#
+# <!-- definition: endotsr.definition.exposure.exposure_reverse -->
+# ```python
+# def exposure_reverse(d_exposed, saved):
+#     """Reverse of (B13)."""
+#     colour, gain = saved.colour, np.exp(saved.log_gain)
+#     d_log_gain = gain * (d_exposed * colour).sum(axis=(1, 2))  # (10.12)
+#     return ExposureGrads(gain[:, None, None] * d_exposed, d_log_gain, d_exposed.sum(axis=(1, 2)))
+# ```
 
 # %%
 gamma, b = rng.normal(0, 0.3, 3), rng.normal(0, 0.1, 3)

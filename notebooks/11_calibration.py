@@ -21,7 +21,6 @@
 # The equation is {eq}`eq-7` of {doc}`/specification/07_calibration`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import msgspec
@@ -80,11 +79,33 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 #
 # **(11.6) Views without a ratio.** A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and
 # named.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.rms))
-print(inspect.getsource(definition.calibration_views))
-print(inspect.getsource(definition.calibrate))
+#
+# <!-- definition: endotsr.definition.calibration.rms -->
+# ```python
+# def rms(gradient):
+#     """Equation (7): root mean square of a gradient image over all pixels, masked ones included."""
+#     return np.sqrt((gradient**2).mean())  # (11.2)
+# ```
+#
+# <!-- definition: endotsr.definition.calibration.calibration_views -->
+# ```python
+# def calibration_views(n_train, count):
+#     """Distinct ascending positions within the training frames, rounded half to even."""
+#     return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(int))
+# ```
+#
+# <!-- definition: endotsr.definition.calibration.calibrate -->
+# ```python
+# def calibrate(views, gradient_ratio):
+#     """Equation (7): from (name, g_rgb, g_lap) of every view; a view without a finite ratio is dropped.
+#
+#     Raises: ValueError if no view remains or the median is 0.
+#     """
+#     ratios = np.array([fine / rgb for _, rgb, fine in views if rgb > 0 and np.isfinite(fine / rgb)])  # (11.6)
+#     if ratios.size == 0 or np.median(ratios) == 0:
+#         raise ValueError("calibration: no view has a ratio, or their median is 0")
+#     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (11.3), (11.4)
+# ```
 
 # %%
 w, r = PAPER.loss.ssim_weight, PAPER.loss.gradient_ratio
@@ -148,7 +169,7 @@ for blur in (1.0, 1.5, 2.5):
     for weight in weights:
         some = [gradients(index, blur, weight) for index in chosen[::4]]
         found[blur].append(calibrate([("", rms(a), rms(b)) for a, b in some], r).lambda_lap)
-figure, axes = plt.subplots(1, 4, figsize=(14, 3.2), layout="constrained")
+figure, axes = plt.subplots(1, 4, figsize=(10.9, 2.8), layout="constrained")
 frame = sequence.frame(int(chosen[8]), np.float64)
 axes[0].imshow(gaussian_filter(frame.image, (0, 1.5, 1.5)).transpose(1, 2, 0))
 axes[0].set_title("stand-in for the base render")
@@ -171,7 +192,7 @@ for blur, values in found.items():
     axes[3].plot(weights, values, "o-", label=f"blur {blur} px")
 axes[3].axhline(0.83, color="k", ls=":", label="published 0.83")
 axes[3].set(xlabel="$w$", ylabel="$\\lambda_{\\rm lap}$", title="the calibrated weight")
-axes[3].legend(fontsize=8)
+axes[3].legend()
 plt.show()
 
 # %% [markdown]

@@ -22,7 +22,6 @@
 # {doc}`/specification/b11_density`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -75,9 +74,17 @@ rng = np.random.default_rng(12)
 # **(12.4) A common factor cancels.** If all gradients of an array are multiplied by $c>0$, both $m$ and $\sqrt v$ have
 # the factor $c$. The steps stay the same as long as $\epsilon$ is negligible, so a factor on the whole objective
 # changes no step of Adam. It does change the statistic of density control below.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.adam_step))
+#
+# <!-- definition: endotsr.definition.adam.adam_step -->
+# ```python
+# def adam_step(parameter, gradient, first, second, step, learning_rate, beta1, beta2, epsilon):
+#     """Equation (B10): parameter, m and v after step k = 1, 2, ...; a rate may have the shape of the parameter."""
+#     m = beta1 * first + (1 - beta1) * gradient  # (12.1)
+#     v = beta2 * second + (1 - beta2) * gradient**2
+#     m = np.where(np.abs(m) < SMALLEST, 0, m)
+#     change = m / (1 - beta1**step) / (np.sqrt(v / (1 - beta2**step)) + epsilon)  # (12.2)
+#     return parameter - learning_rate * change, m, v
+# ```
 
 # %%
 constants = (PAPER.optimiser.beta1, PAPER.optimiser.beta2, PAPER.optimiser.epsilon)
@@ -131,10 +138,38 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
 # \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure, poses}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
 # $$
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition_of_schedules.decay))
-print(inspect.getsource(definition_of_schedules.learning_rates))
+#
+# <!-- definition: endotsr.definition.schedules.decay -->
+# ```python
+# def decay(step, steps, final):
+#     """final^tau, tau = clip(step / steps, 0, 1); without steps, tau = [step > 0]."""
+#     return final ** (min(max(step / steps, 0), 1) if steps > 0 else step > 0)  # (12.5)
+# ```
+#
+# <!-- definition: endotsr.definition.schedules.learning_rates -->
+# ```python
+# def learning_rates(iteration, config):
+#     """Equation (B10): rates by array; parts of the leading axis as ((slice, rate), ...)."""
+#     o, total, activated = config.optimiser, config.training.iterations, config.training.residual_activation
+#     falling = decay(iteration, total, o.final_factor)
+#     constant = decay(iteration - o.annealing_from, total - o.annealing_from, o.annealed_factor)
+#     fdm = o.deformation * falling
+#     rates = {
+#         "position": o.position * falling,
+#         "quaternion": o.rotation * constant,
+#         "log_scale": o.scale * constant,
+#         "opacity_logit": o.opacity * constant,
+#         "harmonics": ((slice(0, 1), o.harmonics_base * constant), (slice(1, None), o.harmonics_rest * constant)),
+#         "fdm_weight": ((slice(0, 3), fdm * o.deformation_position_factor), (slice(3, 10), fdm)),
+#         **dict.fromkeys(("fdm_centre", "fdm_width"), fdm),
+#     }
+#     if residuals_active(iteration, config):
+#         start = activated if o.restart_residual_schedule else 0
+#         residual = o.deformation * decay(iteration - start, total - start, o.final_factor)
+#         rates["appearance_coefficients"] = residual * o.appearance_factor
+#         rates["motion_coefficients"] = residual * o.spectral_motion_factor
+#     return rates
+# ```
 
 # %%
 T, K_s = PAPER.training.iterations, PAPER.training.residual_activation
@@ -171,11 +206,52 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # The rule has three steps, in this order. **Prune** Gaussians with an opacity below 0.005. **Clone** a candidate whose
 # largest semi-axis is at most $p\,e=0.1$ scene units. **Split** a larger candidate into two children of $1/1.6$ of its
 # size, whose positions are drawn from it. Children inherit all other parameters; their moments start at 0.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition_of_density.gather_statistics))
-print(inspect.getsource(definition_of_density.densify))
-print(inspect.getsource(definition_of_density.with_children))
+#
+# <!-- definition: endotsr.definition.density_control.gather_statistics -->
+# ```python
+# def gather_statistics(statistics, d_mean, visible, width, height):
+#     """Equation (B11): add one view to the statistics; d_mean (2, N) per px, visible (N,)."""
+#     norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)  # (12.6)
+#     return DensityStatistics(statistics.gradient_sum + np.where(visible, norm, 0), statistics.visits + visible)
+# ```
+#
+# <!-- definition: endotsr.definition.density_control.densify -->
+# ```python
+# def densify(gaussians, statistics, config, rng, extent, remaining=1):
+#     """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
+#     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
+#     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
+#     by_threshold = config.growth == "threshold"
+#     least = config.gradient_threshold if by_threshold else 0
+#     runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
+#     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
+#     room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
+#     steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
+#     candidates = np.sort(steepest_first[:room])
+#     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
+#     clone = candidates[~large]
+#     split = candidates[large]
+#     survivors = np.setdiff1d(np.flatnonzero(alive), split)
+#     source = np.concatenate([survivors, clone, split, split])
+#     made = type(gaussians)(*(None if array is None else array[..., source] for array in gaussians))
+#     if split.size:
+#         made = with_children(made, rng.standard_normal((2, 3, split.size)))
+#     plan = GatherPlan(source, survivors.size)
+#     return Densified(made, plan, empty_statistics(source.size), clone.size, split.size, (~alive).sum())
+# ```
+#
+# <!-- definition: endotsr.definition.density_control.with_children -->
+# ```python
+# def with_children(gaussians, noise):
+#     """Move the last Gaussians, copies of their parents, to samples of the parents and shrink them by 1.6."""
+#     noise = np.concatenate(noise, axis=1)
+#     children = slice(gaussians.opacity_logit.size - noise.shape[1], None)
+#     rotation = rotation_of(unit(gaussians.quaternion[:, children])[0])
+#     position, log_scale = gaussians.position.copy(), gaussians.log_scale.copy()
+#     position[:, children] += np.einsum("ijn,jn->in", rotation, np.exp(log_scale[:, children]) * noise)
+#     log_scale[:, children] -= np.log(1.6)
+#     return gaussians._replace(position=position, log_scale=log_scale)
+# ```
 
 # %%
 N = 60
@@ -255,7 +331,7 @@ np.testing.assert_allclose(children, parents - np.log(1.6), rtol=1e-12)
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(
-    1, 3, figsize=(13.5, 3.9), layout="constrained", width_ratios=[1.1, 1, 1]
+    1, 3, figsize=(10.5, 3.4), layout="constrained", width_ratios=[1.1, 1, 1]
 )
 steps = np.arange(1, T + 1, 10)
 for name, label in (
@@ -271,7 +347,7 @@ for name, label in (
     )
 axes[0].axvspan(500, 4000, color="0.93", label="density control")
 axes[0].set(title="learning rates, preset paper", xlabel="iteration", ylim=(3e-8, 0.2))
-axes[0].legend(fontsize=7, loc="lower left", ncols=2)
+axes[0].legend(loc="lower left", ncols=2)
 circle = np.stack(
     [np.cos(np.linspace(0, 2 * np.pi, 40)), np.sin(np.linspace(0, 2 * np.pi, 40))]
 )

@@ -95,7 +95,7 @@ tiny = SimulatorSettings(width=64, height=51, frames=8)
 frozen = simulate(with_effects(tiny)).sequence
 assert (frozen.images == frozen.images[0]).all() and frozen.masks.all()
 
-figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
+figure, axes = plt.subplots(2, 5, figsize=(10.9, 4.1), layout="constrained")
 for panel, effect in zip(axes.flat, EFFECTS):
     single = simulate(with_effects(tiny, effect)).sequence
     if effect in ("noise", "instrument", "highlights"):
@@ -120,7 +120,7 @@ plt.show()
 # single points over the clip. Breathing moves all of them; the beat and the pull move only some.
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(2, 4, figsize=(14, 5.6), layout="constrained")
+figure, axes = plt.subplots(2, 4, figsize=(10.9, 4.8), layout="constrained")
 middle = sequence.count // 2
 for panel, index in zip(axes[0], np.linspace(0, sequence.count - 1, 4).astype(int)):
     panel.imshow(sequence.images[index].transpose(1, 2, 0))
@@ -160,7 +160,7 @@ for (a, b), label in (
     heights = [-simulated.surface_point(np.array([a, b]), t)[2] for t in times]
     axes[1, 3].plot(times, np.array(heights) - heights[0], label=label)
 axes[1, 3].set(title="lift towards the camera [mm]", xlabel="t")
-axes[1, 3].legend(fontsize=8)
+axes[1, 3].legend()
 for panel in axes.flat[:-1]:
     panel.set(xticks=[], yticks=[])
 plt.show()

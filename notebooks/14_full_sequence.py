@@ -203,7 +203,7 @@ assert (
 assert np.mean([e["l1"] for e in log[-20:]]) < 0.4 * np.mean([e["l1"] for e in log[:20]])
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(1, 2, figsize=(13, 3.8), layout="constrained")
+figure, axes = plt.subplots(1, 2, figsize=(10.1, 3.3), layout="constrained")
 iterations = np.array([e["iteration"] for e in log])
 smooth = lambda values: np.convolve(values, np.ones(9) / 9, mode="same")
 for name, label in (
@@ -225,9 +225,9 @@ for milestone, label in (
     (activation, "A and S activated"),
 ):
     axes[0].axvline(milestone, color="0.7", lw=1)
-    axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
+    axes[0].text(milestone, 2e-4, label, fontsize=9, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))
-axes[0].legend(fontsize=8, ncols=3, loc="lower left")
+axes[0].legend(ncols=3, loc="lower left")
 per_frame = [score(state, constants, [k]) for k in range(sequence.count)]
 held = np.isin(np.arange(sequence.count), sequence.test_index)
 axes[1].plot(
@@ -246,7 +246,7 @@ axes[1].plot(
     label="the fit of one frame",
 )
 axes[1].set(title="PSNR over tissue", xlabel="frame", ylabel="dB")
-axes[1].legend(fontsize=8)
+axes[1].legend()
 plt.show()
 
 # %% [markdown]
@@ -323,7 +323,7 @@ for k in sequence.test_index:
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
-figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
+figure, axes = plt.subplots(2, 5, figsize=(10.9, 4.1), layout="constrained")
 for row, k in zip(axes, shown):
     truth, full = sequence.frame(int(k)).image, render(state, constants, int(k))
     without_A, without_S = (

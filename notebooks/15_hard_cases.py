@@ -309,7 +309,7 @@ for factor in (1e-3, 1e3):
 # ## Figure: three of these cases
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.7), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.5, 3.2), layout="constrained")
 axes[0].plot(along, truth, color="0.7", lw=5, label="float64")
 axes[0].plot(along, lost, color="tab:red", lw=0.8, label="textbook form, float32")
 axes[0].plot(
@@ -318,7 +318,7 @@ axes[0].plot(
 axes[0].set(
     title="$\\alpha$ along a needle of 1000 px", xlabel="pixel on the diagonal", ylim=(0, 1)
 )
-axes[0].legend(fontsize=8, loc="upper right")
+axes[0].legend(loc="upper right")
 gaps = np.linspace(-0.4, 0.4, 81)
 seen = np.array([crossing(gap)[0].colour[:, 6, 8] for gap in gaps])
 for channel, colour in ((0, "tab:red"), (2, "tab:blue")):
@@ -348,7 +348,7 @@ axes[2].set(
     title="equal sheets: dots render, lines $c\\,(1-(1-\\alpha)^n)$",
     xlabel="number of sheets $n$",
 )
-axes[2].legend(fontsize=8)
+axes[2].legend()
 plt.show()
 
 # %% [markdown]

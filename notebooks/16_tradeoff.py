@@ -152,7 +152,7 @@ assert (np.diff(visits) <= np.diff(predicted)).all() and np.diff(visits)[-1] < n
 ]
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
+figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.1), layout="constrained")
 axes[0].loglog(cutoffs, largest, "o-", color="#0072B2")
 axes[0].loglog(cutoffs, 5 * cutoffs, "--", color="0.5")
 label = {"textcoords": "offset points", "color": "0.4"}
@@ -165,7 +165,7 @@ words, place = (
     "area of the ellipses, parts outside\nthe picture included",
     (cutoffs[6], predicted[6]),
 )
-axes[1].annotate(words, place, xytext=(8, 0), va="bottom", fontsize=8, **label)
+axes[1].annotate(words, place, xytext=(8, 0), va="bottom", fontsize=9, **label)
 axes[1].set(xlabel="cutoff", ylabel="visits", title="The work grows at most with its logarithm")
 plt.show()
 

@@ -92,7 +92,7 @@ assert abs(found["still"].noise.level / sigma - 1) < 0.15
 # 0.05 px.
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(2, 3, figsize=(12, 6), layout="constrained")
+figure, axes = plt.subplots(2, 3, figsize=(9.4, 5.2), layout="constrained")
 for column, (name, inspection) in zip(axes.T, found.items()):
     motion, light = inspection.verdicts["motion"], inspection.verdicts["photometric"]
     picture = column[0].imshow(motion.map.values, vmin=0, vmax=0.5, cmap="viridis")
@@ -107,7 +107,7 @@ for column, (name, inspection) in zip(axes.T, found.items()):
         )
     column[1].set(ylim=(-12, 12), xlabel="time", title=f"light: {light.kind}")
 axes[1, 0].set_ylabel("percent")
-axes[1, 0].legend(fontsize=8)
+axes[1, 0].legend()
 figure.colorbar(picture, ax=axes[0], label="flow, px")
 plt.show()
 

@@ -21,7 +21,6 @@
 # The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is optional and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import msgspec
@@ -80,7 +79,7 @@ course = {
     ]
     for name, run in runs.items()
 }
-figure, axis = plt.subplots(figsize=(13, 3.4), layout="constrained")
+figure, axis = plt.subplots(figsize=(10.1, 2.9), layout="constrained")
 for (name, values), colour in zip(course.items(), ("tab:red", "tab:blue")):
     axis.plot(times, values, color=colour, lw=1.2, label=name)
     at_frames = np.array(values)[MOMENTS * clip.sequence.train_index]
@@ -88,7 +87,7 @@ for (name, values), colour in zip(course.items(), ("tab:red", "tab:blue")):
 for k, t in enumerate(clip.sequence.times[clip.sequence.test_index]):
     axis.axvline(t, color="0.85", lw=6, zorder=0, label="held out" if k == 0 else None)
 axis.set(xlabel="t", ylabel="PSNR against the true picture, dB", title="dots: training frames")
-axis.legend(fontsize=8, ncols=3)
+axis.legend(ncols=3)
 plt.show()
 places = {
     "at training frames": MOMENTS * clip.sequence.train_index,
@@ -168,12 +167,86 @@ assert swing[both] < swing[alone] - 2
 #
 # **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue, it is
 # the target. Where one of the four pictures is excluded, the static pair is not evidence, and $q=0$.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.motion_between))
-print(inspect.getsource(definition.frame_between))
-print(inspect.getsource(definition._mixed))
-print(inspect.getsource(definition._difference))
+#
+# <!-- definition: endotsr.clips.sequences.between.motion_between -->
+# ```python
+# def motion_between(flows: Flows, fraction: float) -> FloatArray:
+#     """The motion field v at the time fraction `fraction` (B14).
+#
+#     fraction  a in [0, 1]: 0 is the earlier frame, 1 the later
+#     returns   (2, H, W) px from the earlier frame to the later, at the position of a point at that time
+#
+#     Edges:   constant opposite flows give that flow at every time. Swapping the frames and a -> 1 - a only changes the
+#              sign of the field.
+#     """
+#     from endotsr.clips.opencv import warp_bilinear
+#
+#     a, b = np.float32(fraction), np.float32(1.0 - fraction)
+#     from_earlier, from_later = flows.forward, -flows.backward
+#     for _ in range(STEPS):
+#         from_earlier = warp_bilinear(flows.forward, -a * from_earlier)  # (18.2), (18.4)
+#         from_later = -warp_bilinear(flows.backward, b * from_later)  # (18.3)
+#     return b * from_earlier + a * from_later  # (18.5)
+# ```
+#
+# <!-- definition: endotsr.clips.sequences.between.frame_between -->
+# ```python
+# def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
+#     """The picture, tissue mask and prior depth at a time between two frames, as a `Frame` (B14).
+#
+#     earlier, later  frame indices, any distance apart
+#     fraction        a in [0, 1]
+#     flows           from `flows_between` for these frames
+#     returns         Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior;
+#                     time and camera interpolated
+#
+#     Reverse: none; the result is held fixed during training.
+#     """
+#     from endotsr.clips.opencv import warp_bilinear, warp_cubic
+#
+#     pair, a = [earlier, later], np.float32(fraction)
+#     weights = np.array([1.0 - fraction, fraction], np.float32)
+#     field = motion_between(flows, fraction)
+#     places = (-a * field, (1 - a) * field)  # (18.1)
+#
+#     def moved(planes: NDArray, warp) -> FloatArray:
+#         return np.stack([warp(plane.astype(np.float32), place) for plane, place in zip(planes, places, strict=True)])
+#
+#     images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
+#     seen = moved(tissue, warp_bilinear) > WHOLE
+#     both = seen[0] & seen[1] & tissue[0] & tissue[1]
+#     image = _mixed(moved(images, warp_cubic), images, seen, both, weights)
+#     known = moved(tissue & (sequence.depth[pair] > 0), warp_bilinear) > WHOLE
+#     depth = _blended(moved(sequence.depth[pair], warp_bilinear), known, weights)
+#     mask = np.tensordot(weights, seen, 1) > 0
+#     time = (1.0 - fraction) * float(sequence.times[earlier]) + fraction * float(sequence.times[later])
+#     camera = camera_between(sequence.cameras[earlier], sequence.cameras[later], fraction)
+#     return Frame(np.ascontiguousarray(np.clip(image, 0, 1)), mask, depth, time, camera)
+# ```
+#
+# <!-- definition: endotsr.clips.sequences.between._mixed -->
+# ```python
+# def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArray, weights: FloatArray) -> FloatArray:
+#     """(3, H, W) the warped and the unwarped pair, mixed with weights inverse to the local difference within each.
+#
+#     moved, still  (2, 3, H, W) warped, unwarped
+#     seen          (2, H, W) the warped pictures are tissue
+#     both          (H, W) both pairs are tissue in both frames; elsewhere only the warped pictures are used
+#     weights       (2,) of the two frames
+#     """
+#     of_moved, of_still = _difference(moved), _difference(still)
+#     fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the unwarped pair: (18.7), (18.9)
+#     return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)  # (18.6)
+# ```
+#
+# <!-- definition: endotsr.clips.sequences.between._difference -->
+# ```python
+# def _difference(pair: FloatArray) -> FloatArray:
+#     """(H, W) local mean squared difference of two pictures (2, 3, H, W), at least `ONE_STEP`."""
+#     from endotsr.clips.opencv import gaussian_blur
+#
+#     return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)  # (18.8)
+# ```
 
 # %% [markdown]
 # ## The steps in numbers
@@ -281,7 +354,7 @@ panels = {
     "the target": target.image,
 }
 tissue = hard.masks[shown] & hard.masks[before] & hard.masks[after]
-figure, axes = plt.subplots(2, 4, figsize=(14, 5.4), layout="constrained")
+figure, axes = plt.subplots(2, 4, figsize=(10.9, 4.6), layout="constrained")
 found = {}
 for column, (name, made) in enumerate(panels.items()):
     found[name] = psnr_tissue(made, picture, tissue)

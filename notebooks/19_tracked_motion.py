@@ -21,14 +21,12 @@
 # The equation is {eq}`eq-b15` of {doc}`/specification/b15_tracked_motion`. It is optional and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import msgspec
 import numpy as np
 
 import endotsr
-from endotsr.clips.sequences import tracks as definition_of_tracks
 from endotsr.clips.sequences.tracks import follow
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.scenes import named_scene
@@ -40,7 +38,6 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.results.evaluation.trajectories import displacement, trajectory_error
 from endotsr.training.fitting.model import scene_at
-from endotsr.training.scene import tracked_motion as definition
 from endotsr.training.scene.gaussians import Gaussians
 from endotsr.training.scene.tracked_motion import with_tracked_motion
 
@@ -127,11 +124,49 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # **(19.5) Found again.** A lost point is followed again from the first frame in which its pixel is tissue with a depth
 # within 2.5 % of its own. This limit is narrower than in (19.3), because the depth is the only evidence for the same
 # piece of tissue.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition_of_tracks._step))
-print(inspect.getsource(definition_of_tracks._motion_around))
-print(inspect.getsource(definition_of_tracks._refind))
+#
+# <!-- definition: endotsr.clips.sequences.tracks._step -->
+# ```python
+# def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flows) -> _Points:
+#     """The points at the second frame."""
+#     source, target = (sequence.cameras[i] for i in frames)
+#     pixel, _ = _project(source, here.position)
+#     moved = pixel + _sampled(flows.forward, pixel)
+#     apart = moved + _sampled(flows.backward, moved) - pixel
+#     lengths = np.square(moved - pixel).sum(axis=0)
+#     agree = np.square(apart).sum(axis=0) <= 2 * CONSISTENT * lengths + TOLERANCE  # (19.2)
+#     found, at = _lifted(sequence, frames[1], moved)  # (19.1)
+#     followed = here.followed & agree & _near(at, _project(target, here.position)[1], 2 * DEPTH_JUMP)  # (19.3)
+#     position = np.where(followed, found, here.position)
+#     lost = ~followed
+#     if lost.any() and np.count_nonzero(followed) >= FEWEST:
+#         position[:, lost] += _motion_around(here.position, position, followed, lost)  # (19.4)
+#     _refind(sequence, frames[1], position, followed, lost)
+#     return _Points(position, followed)
+# ```
+#
+# <!-- definition: endotsr.clips.sequences.tracks._motion_around -->
+# ```python
+# def _motion_around(before: FloatArray, after: FloatArray, followed: BoolArray, lost: BoolArray) -> FloatArray:
+#     """(3, lost) mean displacement of the nearest followed points, weighted by inverse distance."""
+#     from scipy.spatial import KDTree
+#
+#     distance, nearest = KDTree(before[:, followed].T).query(before[:, lost].T, k=NEIGHBOURS)
+#     weight = 1.0 / (distance + 1e-3 * distance.max(initial=1e-12))
+#     motion = (after - before)[:, followed][:, nearest]
+#     return (motion * weight).sum(axis=2) / weight.sum(axis=1)
+# ```
+#
+# <!-- definition: endotsr.clips.sequences.tracks._refind -->
+# ```python
+# def _refind(sequence: Sequence, frame: int, position: FloatArray, followed: BoolArray, lost: BoolArray) -> None:
+#     """Follow lost points again, in place, where the frame shows tissue at their depth."""
+#     pixel, depth = _project(sequence.cameras[frame], position[:, lost])
+#     found, at = _lifted(sequence, frame, pixel)
+#     again = _near(at, depth, DEPTH_JUMP / 4)  # (19.5)
+#     places = np.flatnonzero(lost)[again]
+#     position[:, places], followed[places] = found[:, again], True
+# ```
 
 # %% [markdown]
 # ## Figure: tracks through an instrument
@@ -165,7 +200,7 @@ moved = np.linalg.norm(true_position - true_position[0], axis=1)
 carried = ~found.followed
 
 figure, axes = plt.subplots(
-    1, 3, figsize=(14, 3.9), layout="constrained", width_ratios=[1.25, 1, 1]
+    1, 3, figsize=(10.9, 3.4), layout="constrained", width_ratios=[1.25, 1, 1]
 )
 last = int(sequence.train_index[-1])
 axes[0].imshow(sequence.images[last].transpose(1, 2, 0))
@@ -187,7 +222,7 @@ for name, part, colour in (
     axes[1].hist(error[part], bins, histtype="step", color=colour, label=name)
 axes[1].hist(moved.ravel(), bins, histtype="step", color="0.6", label="a point at rest")
 axes[1].set(xscale="log", xlabel="error of the position, mm", title="all points, all frames")
-axes[1].legend(fontsize=8)
+axes[1].legend()
 again = np.flatnonzero((carried.sum(axis=0) >= 3) & found.followed[-1])
 one = int(again[np.argsort(error[:, again].mean(axis=0))[len(again) // 2]])  # the median one
 times = sequence.times[sequence.train_index]
@@ -216,7 +251,7 @@ fine_atoms = np.array([dictionary_forward(t, omega)[0] for t in fine])
 path = fitted.position[0, one] + fine_atoms @ fitted.motion_coefficients[0, :, one]
 axes[2].plot(fine, path, "tab:blue", lw=1.2, label="fit")
 axes[2].set(title="one point", xlabel="t", ylabel="x, mm")
-axes[2].legend(fontsize=8)
+axes[2].legend()
 plt.show()
 print(
     f"mean: followed {error[~carried].mean():.2f} mm, carried {error[carried].mean():.2f} mm;"
@@ -226,7 +261,7 @@ assert error[~carried].mean() < 0.35 * moved.mean()
 of_found = error[-1, again]
 print(
     f"{again.size} points are found again: {of_found.min():.1f} to {of_found.max():.1f} mm from"
-    f" their tissue at the end; {np.mean(of_found > 1):.0%} are more than 1 mm off, the one shown"
+    f" their tissue at the end; {np.mean(of_found > 1):.0%} are more than 1 mm off, this one"
     f" by {error[-1, one]:.1f} mm"
 )
 assert error[-1, one] > 1, "found again, on other tissue"
@@ -250,9 +285,40 @@ assert error[-1, one] > 1, "found again, on other tissue"
 # **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
 # is one atom of amplitude $A$ is fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. The weight $0.1$ costs 1 % at 20
 # times; $30\rho$ removes the fastest atoms. In this way the penalty {eq}`eq-4` acts before the training.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.with_tracked_motion))
+#
+# <!-- definition: endotsr.training.scene.tracked_motion.with_tracked_motion -->
+# ```python
+# def with_tracked_motion(
+#     gaussians: Gaussians,
+#     times: FloatArray,
+#     position: FloatArray,
+#     followed: NDArray[np.bool_],
+#     omega: FloatArray,
+#     rho: FloatArray,
+# ) -> Gaussians:
+#     """The Gaussians with the canonical positions and motion coefficients of their tracks.
+#
+#     times      (n,) normalised times of the training frames
+#     position   (n, 3, N) scene units; followed (n, N)
+#     omega      (F,) frequencies, cycles per sequence; rho (F,) their Matern weights
+#
+#     Edges:  a static point has coefficients 0, to rounding, and keeps its position.
+#     """
+#     atoms = np.stack([dictionary_forward(float(t), omega)[0] for t in times])
+#     design = np.concatenate([np.ones((len(times), 1)), atoms], axis=1)  # (n, 1 + 2F)
+#     ridge = np.diag([0.0, *np.tile(RIDGE * rho + LEAST_RIDGE, 2)])  # (19.8), (19.9)
+#     centre = gaussians.position.copy()
+#     coefficients = np.zeros((3, atoms.shape[1], gaussians.count), centre.dtype)
+#     for first in range(0, gaussians.count, POINTS_AT_ONCE):
+#         chosen = slice(first, first + POINTS_AT_ONCE)
+#         trust = np.where(followed[:, chosen], 1.0, UNFOLLOWED)
+#         normal = np.einsum("na,nb,np->pab", design, design, trust, optimize=True) + ridge
+#         right = np.einsum("na,np,ndp->pad", design, trust, position[:, :, chosen], optimize=True)
+#         solved = np.linalg.solve(normal, right)  # (19.7); (P, 1 + 2F, 3)
+#         centre[:, chosen] = solved[:, 0].T
+#         coefficients[:, :, chosen] = solved[:, 1:].transpose(2, 1, 0)
+#     return gaussians._replace(position=centre, motion_coefficients=coefficients)
+# ```
 
 # %% [markdown]
 # Step (19.6) holds for the result: both gradients of the sum are 0, for followed and for carried points.
@@ -327,7 +393,7 @@ lengths = [
 ]
 far = int(np.argmax([length.mean() for length in lengths]))
 largest = lengths[far].max()
-figure, axes = plt.subplots(2, 4, figsize=(14, 5.4), layout="constrained")
+figure, axes = plt.subplots(2, 4, figsize=(10.9, 4.6), layout="constrained")
 axes[0, 0].imshow(lengths[far], vmin=0, vmax=largest, cmap="viridis")
 axes[0, 0].set_title(f"true motion, up to {largest:.1f} mm", fontsize=10)
 held_out = int(films.test_index[1])

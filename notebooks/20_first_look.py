@@ -22,7 +22,6 @@
 # a rule of {doc}`/specification/b11_density`. Both are optional and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 
 import matplotlib.pyplot as plt
 import msgspec
@@ -32,11 +31,9 @@ import endotsr
 from endotsr.clips.sequences.smaller import halved
 from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.config import PAPER, DensityConfig, with_iterations
-from endotsr.definition import density_control as definition_of_density
 from endotsr.method.losses.smoothness import smoothness_forward
 from endotsr.method.splatting.camera import project, scale_camera
 from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.training.fitting import coarse_start as definition
 from endotsr.training.fitting.coarse_start import coarse_start, fit_error
 from endotsr.training.fitting.state import new_training
 from endotsr.training.fitting.trainer import training_step
@@ -65,9 +62,31 @@ rng = np.random.default_rng(20)
 # **(20.3) A pruned Gaussian is replaced**, because $N$ is counted after pruning. With $p$ pruned before every
 # densification, the one with $r$ left adds $p/r$ more than the one before: the steps are no longer equal and grow
 # towards the end.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition_of_density.densify))
+#
+# <!-- definition: endotsr.definition.density_control.densify -->
+# ```python
+# def densify(gaussians, statistics, config, rng, extent, remaining=1):
+#     """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
+#     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
+#     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
+#     by_threshold = config.growth == "threshold"
+#     least = config.gradient_threshold if by_threshold else 0
+#     runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
+#     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
+#     room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
+#     steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
+#     candidates = np.sort(steepest_first[:room])
+#     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
+#     clone = candidates[~large]
+#     split = candidates[large]
+#     survivors = np.setdiff1d(np.flatnonzero(alive), split)
+#     source = np.concatenate([survivors, clone, split, split])
+#     made = type(gaussians)(*(None if array is None else array[..., source] for array in gaussians))
+#     if split.size:
+#         made = with_children(made, rng.standard_normal((2, 3, split.size)))
+#     plan = GatherPlan(source, survivors.size)
+#     return Densified(made, plan, empty_statistics(source.size), clone.size, split.size, (~alive).sum())
+# ```
 
 # %% [markdown]
 # The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. All
@@ -141,11 +160,47 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # under the instrument ({eq}`eq-b9`), each as a mean over pixels. At half size neighbouring pixels are twice as far
 # apart. On a slope an absolute step is twice as large and a squared one four times. The weight is halved, which
 # preserves only the total variation of a slope.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.coarse_ends))
-print(inspect.getsource(definition.fit_error))
-print(inspect.getsource(definition.lacking))
+#
+# <!-- definition: endotsr.training.fitting.coarse_start.coarse_ends -->
+# ```python
+# def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
+#     """Whether the coarse start ends before the next iteration; checked every CHECK_EVERY iterations."""
+#     if state.iteration >= coarse.constants.config.density.until:
+#         return True
+#     if state.iteration == 0 or state.iteration % CHECK_EVERY:
+#         return False
+#     return fit_error(state, coarse.constants, coarse.frames) < coarse.lacking  # (20.5)
+# ```
+#
+# <!-- definition: endotsr.training.fitting.coarse_start.fit_error -->
+# ```python
+# def fit_error(state: TrainingState, constants: TrainingConstants, frames: NDArray[np.intp]) -> float:
+#     """e: the mean masked L1 (B6) of the renders of some frames, display units."""
+#     errors = []
+#     for index in map(int, frames):
+#         frame = constants.sequence.frame(index, constants.config.training.precision)
+#         at = (camera_at(state.frames, frame.camera, frame.time), frame.time)
+#         rendered = render_at(state.gaussians, constants.spectral, constants.config, *at, frames=state.frames)
+#         errors.append(masked_l1_forward(rendered.colour, frame.image, frame.mask)[0])
+#     return float(np.mean(errors))
+# ```
+#
+# <!-- definition: endotsr.training.fitting.coarse_start.lacking -->
+# ```python
+# def lacking(sequence: Sequence, frames: NDArray[np.intp]) -> float:
+#     """d: the mean magnitude of the finest Laplacian band of some frames over its valid pixels, display units.
+#
+#     Edges: a frame without a valid pixel is excluded; 0 if none has one, and the coarse start then ends at the latest
+#            iteration.
+#     """
+#     found = []
+#     for index in map(int, frames):
+#         frame = sequence.frame(index)
+#         valid = support_masks(frame.mask, 1).bands[0]
+#         if valid.any():
+#             found.append(np.abs(laplacian_levels(frame.image, 1).bands[0][:, valid]).mean(dtype=np.float64))  # (20.4)
+#     return float(np.mean(found)) if found else 0.0
+# ```
 
 # %% [markdown]
 # Step (20.6): a point in the image of the camera and of the half-size camera. Step (20.7): half the weight preserves the
@@ -228,7 +283,7 @@ while state.iteration < T:  # at half size to the end, to see the whole course o
         errors[state.iteration] = fit_error(state, coarse.constants, coarse.frames)
     training_step(state, coarse.constants)
 
-figure, axes = plt.subplots(1, 3, figsize=(14, 3.7), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(10.9, 3.2), layout="constrained")
 axes[0].semilogy(
     list(errors), list(errors.values()), "o-", ms=3, label="$e$, trained at half size"
 )
@@ -237,7 +292,7 @@ axes[0].axvline(ends["coarse start"], color="tab:red", lw=1, label="end of the c
 axes[0].set(
     xlabel="iteration", ylabel="display units", title="error of the fit, missing detail"
 )
-axes[0].legend(fontsize=8)
+axes[0].legend()
 band = sequence.images[0].mean(axis=0) / 255
 low = np.kron(small.images[0].mean(axis=0) / 255, np.ones((2, 2)))
 axes[1].imshow(np.abs(band - low), vmin=0, vmax=0.1, cmap="magma")
@@ -248,7 +303,7 @@ for (name, scale), numbers in courses.items():
     label = f"{name}, gradients x {scale}"
     axes[2].plot(numbers, style, color=colour, label=label)
 axes[2].set(xlabel="densification", ylabel="Gaussians", title="growth", yscale="log")
-axes[2].legend(fontsize=8)
+axes[2].legend()
 plt.show()
 checks = range(50, T, 50)
 assert ends["coarse start"] == next(i for i in checks if errors[i] < coarse.lacking)

@@ -19,7 +19,6 @@
 # {doc}`/specification/b18_windows` and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
 import json
 import tempfile
 from itertools import pairwise
@@ -36,7 +35,6 @@ from endotsr.config import config_from_dict
 from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.studies.sweeps.execute import execute
-from endotsr.studies.windows import scene as definition
 from endotsr.studies.windows.carry import CarriedStart
 from endotsr.studies.windows.make import make_windows, plan_recording, window_folder
 from endotsr.studies.windows.plan import Wanted
@@ -95,9 +93,22 @@ print([(window.first, window.end) for window in plan.windows])
 # **(21.3) The error.** Let the windows have errors $\epsilon,\epsilon'$ of equal variance $\sigma^2$ with the
 # correlation $c$. The blend has $\bigl[(1-w)^2+w^2+2w(1-w)c\bigr]\sigma^2$, which is never above $\sigma^2$, and
 # $\frac{1+c}{2}\sigma^2$ in the middle.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.blended))
+#
+# <!-- definition: endotsr.studies.windows.scene.blended -->
+# ```python
+# def blended(renders: list[RenderOut], weights: list[float]) -> RenderOut:
+#     """The weighted sum of colour, depth and opacity of renders of one view. A single render is returned unchanged."""
+#     if len(renders) == 1:
+#         return renders[0]
+#
+#     def summed(name: str) -> FloatArray:
+#         total: FloatArray = np.zeros_like(getattr(renders[0], name))
+#         for render, weight in zip(renders, weights):
+#             total += total.dtype.type(weight) * getattr(render, name)
+#         return total
+#
+#     return renders[0]._replace(**{name: summed(name) for name in ("colour", "depth", "opacity")})
+# ```
 
 # %%
 scene = scenes["cold"]
@@ -198,7 +209,7 @@ losses = {
 smooth = {
     name: np.convolve(loss, np.full(20, 1 / 20), "valid") for name, loss in losses.items()
 }
-figure, axes = plt.subplots(1, 2, figsize=(13, 3.4), layout="constrained")
+figure, axes = plt.subplots(1, 2, figsize=(10.1, 2.9), layout="constrained")
 for (name, course), colours in zip(steps.items(), ("tab:blue", "tab:red")):
     axes[0].plot(np.array(frames)[1:], 255 * course, color=colours, label=name)
 axes[0].axvspan(begin, end, color="0.92", zorder=0)
@@ -207,7 +218,7 @@ for (name, course), colours in zip(smooth.items(), ("tab:blue", "tab:orange")):
     axes[1].plot(np.arange(course.size) + 20, course, color=colours, label=f"{name} start")
 axes[1].set(xlabel="iteration", ylabel="loss", yscale="log")
 for axis in axes:
-    axis.legend(fontsize=8)
+    axis.legend()
 plt.show()
 print(f"iterations: cold {losses['cold'].size}, warm {losses['warm'].size}")
 print("mean loss of the first 20: cold {cold[0]:.4f}, warm {warm[0]:.4f}".format(**smooth))

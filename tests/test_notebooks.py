@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from pages.book import definitions
 
 import notebook_signs
 
@@ -71,7 +72,8 @@ def test_notebook_is_one_for_jupyter(file):
     answers = [cell for cell in book.cells if "hide-cell" in cell.metadata.get("tags", [])]
     assert len(answers) == 1, "one exercise with a hidden answer"
     assert all(cell.metadata["jupyter"]["source_hidden"] for cell in answers)
-    assert any("transcription" in cell.metadata.get("tags", []) for cell in book.cells)
+    tagged = any("transcription" in cell.metadata.get("tags", []) for cell in book.cells)
+    assert tagged or definitions.named(file.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
@@ -105,11 +107,25 @@ def test_notebook_has_all_its_parts(file):
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
 def test_an_equation_is_shown_as_its_definition_and_not_written_again(file):
-    cells = [body for formula, body in notebook_signs.code_cells(file) if formula]
     if file.stem in TRANSCRIBED:
         return
-    assert any("print(inspect.getsource(definition." in body for body in cells)
+    cells = [body for formula, body in notebook_signs.code_cells(file) if formula]
+    assert definitions.named(file.read_text(encoding="utf-8"))
     assert not [body for body in cells if "def " in body], "a second text of an equation"
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_the_definition_in_a_chapter_is_that_of_the_package(file):
+    text = file.read_text(encoding="utf-8")
+    assert text.count("<!-- definition: ") == len(definitions.named(text)), "a marker without its block"
+    assert definitions.written(text) == text, "run: python docs/make.py book.definitions"
+    assert "getsource" not in text
+
+
+def test_a_changed_definition_in_a_chapter_is_noticed():
+    text = next(file for file in NOTEBOOKS if file.stem == "03_deformation").read_text(encoding="utf-8")
+    changed = text.replace("#     delta = t - centre\n", "#     delta = t + centre\n")
+    assert changed != text == definitions.written(changed)
 
 
 @pytest.mark.parametrize("name", [name for name in TRANSCRIBED if name != "14_full_sequence"])

@@ -30,7 +30,9 @@ def copy_notebooks(app: Sphinx) -> None:
     if copies.is_symlink():  # of an older checkout
         copies.unlink()
     copies.mkdir(exist_ok=True)
-    sources = {file.name: file for file in NOTEBOOKS.iterdir() if file.suffix in (".py", ".md")}
+    sources = {
+        file.name: file for file in NOTEBOOKS.iterdir() if file.suffix in (".py", ".md") or file.name == "matplotlibrc"
+    }
     for name, file in sources.items():
         write(copies / name, file.read_text(encoding="utf-8"))
     for stale in (file for file in copies.iterdir() if file.is_file() and file.name not in sources):

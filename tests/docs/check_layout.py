@@ -1,10 +1,10 @@
 """Lay pages out in a headless browser at three widths: no page is wider than its window, and no table than its box.
 
 Run after the build: python tests/docs/check_layout.py docs/_build/html [PAGE ...]
-At 1400 and 1000 px every column of every table is visible. On a telephone (390 px) a table of many columns may scroll
-inside its box. At every width a page shows at most one search box, and no word is broken over two lines. In the pages
-that commands write no text is cut at the edge of its box. Without a browser the check says so and ends with exit
-code 0.
+At 1400 and 1000 px every column of every table and every picture of a chapter is visible. On a telephone (390 px) a
+table of many columns and a picture may scroll inside their boxes. At every width no line of code and no output of a
+chapter is cut, a page shows at most one search box, and no word is broken over two lines. In the pages that commands
+write no text is cut at the edge of its box. Without a browser the check says so and ends with exit code 0.
 """
 
 import json
@@ -14,6 +14,7 @@ from typing import Any
 
 from page_visits import found_browser, pages_of, visits
 
+STATIC_STYLE = Path(__file__).parents[2] / "docs" / "_static" / "endotsr.css"
 WIDTHS = (1400, 1000, 390)  # px
 ALL_COLUMNS_FROM = 800  # px: from this width on, a table shows all of its columns
 SCRIPT = """
@@ -34,6 +35,16 @@ function measure(page, width) {
   }
   for (const word of brokenWords(root.querySelector("article.bd-article") || root)) say("word", word, 0);
   if (!root.querySelector("article.bd-article")) cutText(root, say, shown);  // the theme cuts within formulas
+  for (const block of root.querySelectorAll("article:has(div.cell) pre")) {  // code and outputs of the chapters
+    for (const e of [block, box(block)].filter(shown)) {
+      const by = e.scrollWidth - e.clientWidth;
+      if (by > 1 && e !== root) { say("output", block.textContent.trim().slice(0, 40), by); break; }
+    }
+  }
+  for (const picture of root.querySelectorAll("article.bd-article div.cell_output img")) {
+    const by = picture.getBoundingClientRect().right - box(picture).getBoundingClientRect().right;
+    if (width >= ALL_COLUMNS_FROM && shown(picture) && by > 1) say("picture", picture.alt || "a figure", by);
+  }
   const boxes = [...frame.contentDocument.querySelectorAll("input[type=search], .search-button-field")].filter(shown);
   if (boxes.length > 1) say("search", boxes.length + " search boxes", 0);
 }

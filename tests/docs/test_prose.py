@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from pages.book.definitions import BLOCK
 
 ROOT = Path(__file__).parents[2]
 PAGES = [
@@ -12,7 +13,7 @@ PAGES = [
     *(ROOT / "notebooks").glob("*.md"),
 ]
 TEXT = {
-    file: " ".join(file.read_text("utf-8").replace("\n# ", "\n").split()).lower()
+    file: " ".join(BLOCK.sub("", file.read_text("utf-8")).replace("\n# ", "\n").split()).lower()
     for file in PAGES
     if "_build" not in file.parts and file.parent.name != "_static"
 }

@@ -35,6 +35,7 @@ def inside_docs(page: Path) -> Path:
     copy = DOCS / "notebooks" / page.name
     copy.parent.mkdir(exist_ok=True)
     shutil.copyfile(page, copy)
+    shutil.copyfile(page.parent / "matplotlibrc", copy.parent / "matplotlibrc")
     return copy
 
 
