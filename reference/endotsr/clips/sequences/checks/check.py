@@ -32,6 +32,7 @@ from endotsr.clips.sequences.checks.frames import (
     time_findings,
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
+from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.frame_store import FrameStore
@@ -70,6 +71,7 @@ class _Pass:
     def __init__(self) -> None:
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
+        self.masks = MaskSteps()
         self.depth: list[DepthFacts] = []
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
@@ -113,6 +115,8 @@ def check_sequence(path: Path, config: Config) -> Checked:
     facts: dict[str, Any] = {"frames": len(clip.images)}
     if run.frames:
         run.findings += frame_findings(run.frames, str(clip.images[0].parent))
+    if clip.masks and clip.masks.files:
+        run.findings += run.masks.findings(str(clip.masks.files[0].parent))
     if run.depth and clip.depth:
         where, near = str(clip.depth.files[0].parent), config.raster.near
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
@@ -163,10 +167,12 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
     for i, file in enumerate(clip.images):
         picture = run.sized(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i, size)
         if picture is None:
+            run.masks.add(i, None)
             continue
         size = size or picture.shape[:2]
         run.frames.append(frame_facts(file.name, picture))
         tissue = _mask(clip, run, masks[i], i, size)
+        run.masks.add(i, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         if i in sampled:
             if found is not None:

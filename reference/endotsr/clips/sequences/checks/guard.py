@@ -13,6 +13,7 @@ from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
+from endotsr.clips.sequences.checks.masks import mask_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
@@ -24,7 +25,7 @@ MOST = 5  # notes of one kind
 def guarded(
     clip: Clip, frames: range, sequence: Sequence, facts: list[tuple[FrameFacts, DepthFacts]], near: float
 ) -> list[str]:
-    """Notes on the findings of the checks of pictures, depth and cameras. Raises InputError for the first refusal.
+    """Notes on the findings on pictures, masks, depth and cameras. Raises InputError for the first refusal.
 
     facts   of the frames, in order
     """
@@ -33,6 +34,8 @@ def guarded(
     images, folder = [clip.images[i] for i in frames], str(clip.where)
     found = gap_findings(images) + time_findings(None if clip.times is None else clip.times[list(frames)], folder)
     found += frame_findings([picture for picture, _ in facts], str(images[0].parent))
+    if clip.masks and clip.masks.files:
+        found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
     found += depth_findings(depth, str(clip.depth.files[0].parent), clip.arbitrary, near, clip.depth.assumed)
     found += camera_findings(sequence.cameras, usual_depth(depth), folder)
     return notes_of([finding for finding in found if finding.code not in SAID_ALREADY])

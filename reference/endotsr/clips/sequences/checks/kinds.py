@@ -76,6 +76,9 @@ KINDS: dict[str, Kind] = {
                                  " undefined",
                                  "inspect its mask; leave the frame out if the mask is right"),
     "single-mask": Kind("refusal", REFUSED, "correct this mask"),
+    "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
+                        " held-out frame there is measured on pixels that training hardly sees",
+                        f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
     # depth
     "no-depth": Kind("refusal", "nothing can be placed in space",
                      f"a stereo pair: endotsr depth; {ONE_CAMERA}; empty files: check their scale"),
