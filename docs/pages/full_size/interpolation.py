@@ -30,7 +30,7 @@ SPLITS: dict[str, dict[str, Any]] = {
     "blocks of 8 frames": {"split": "blocks", "block_length": 8},
     "blocks of 16 frames": {"split": "blocks", "block_length": 16},
 }
-LEFT_OUT = {"endonerf_cutting": (73,)}  # its mask shows a region that no training frame shows
+LEFT_OUT = {"endonerf_cutting": (73,)}  # stereo matching fails in it and in frame 74, and the masks follow the depth
 NAMES = [name for name in EVERY_BASELINE if name != "temporal_mean"]
 KEYS = ("psnr_full", "psnr_tissue", "ssim_full", "lpips")
 

@@ -13,6 +13,7 @@ class MadeUpSequence:
     train_index: np.ndarray
     test_index: np.ndarray
     names: list[str]
+    static_camera: bool = True
 
 
 def made_up(images: np.ndarray, test: list[int], masks: np.ndarray | None = None) -> MadeUpSequence:

@@ -107,6 +107,8 @@ def test_training_frames_stand_beside_the_held_out_ones(sequence):
         "held_out": [1, 9],
         "training_sample": [0, 4],
         "tissue_fraction": pytest.approx(27 / 32),
+        "extrapolated": [],
+        "coverage": [{"frame": i, "tissue": 24 * 27, "never_seen": 0, "seen_once": 0} for i in (1, 9)],
     }
 
 

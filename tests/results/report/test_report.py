@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from endotsr.results.report import figures
 from endotsr.results.report.data import FramePictures, Preview, ReportData
 from endotsr.results.report.sections import report_html
 
@@ -236,6 +237,48 @@ def test_columns_of_8_bits_are_folded():
     assert "8‑bit" not in table and "31.71" not in table and "30.25" in table
     opened = folded[: folded.index("</details>")]
     assert "31.71" in opened and "30.19" in opened and "30.25" not in opened
+
+
+def test_extrapolated_frames_stand_in_a_table_of_their_own():
+    data = made_up_data()
+    assert "extrapolated" not in report_html(data)
+    data.evaluation["frames"] = {"extrapolated": [25]}
+    page = report_html(data)
+    shown, _, apart = page.partition("1 further held-out frame is extrapolated")
+    within = np.mean([30 + k / 10 for k in (1, 9, 17)])
+    assert f"{within:.2f}" in shown and "32.50" not in shown[shown.index("<table") :] and "30.25" not in shown
+    assert "(25)" in apart and "32.50" in apart[: apart.index("</table>")]
+    assert "1 of them extrapolated and not in these means" in shown
+    data.evaluation["frames"] = {"extrapolated": [1, 9, 17, 25]}
+    assert "Every held-out frame is extrapolated" in report_html(data) and "30.25" in report_html(data)
+
+
+def test_pixels_that_training_hardly_shows_are_marked_and_left_out_in_a_table():
+    data = made_up_data()
+    assert "Never seen in training" not in report_html(data) and "hardly shows" not in report_html(data)
+    seen = np.full((24, 32), 5, np.int32)
+    seen[2, 10], seen[3, 11:13] = 0, 1
+    rows = [{"frame": 1, "tissue": 672, "never_seen": 1, "seen_once": 2}]
+    data.evaluation["frames"] = {"coverage": rows}
+    data.evaluation["held_out"]["mean"] |= {"psnr_seen": 30.31, "psnr_seen_twice": 30.47}
+    page = report_html(replace(data, frames=(replace(data.frames[0], seen=seen), *data.frames[1:])))
+    folded = page[page.index("Without pixels that training hardly shows") :]
+    folded = folded[: folded.index("</details>")]
+    assert "1 (0.15%) are excluded in every" in folded and "2 (0.30%) are tissue in one" in folded
+    assert "30.25" in folded and "30.31" in folded and "30.47" in folded
+    assert "Never seen in training" in page and "Seen once" in page and page.count("<span>Seen</span>") == 1
+    assert "3 px never seen in training or once" in page
+
+
+def test_the_picture_marks_exactly_the_seldom_seen_tissue():
+    seen = np.full((24, 32), 5, np.int32)
+    seen[2, 10], seen[3, 11:13], seen[4, 1] = 0, 1, 0  # the last one is excluded
+    mask = np.ones((24, 32), bool)
+    mask[:, :4] = False
+    picture = figures.seen_picture(np.full((3, 24, 32), 0.5), mask, seen)
+    for times, colour in figures.SELDOM_SEEN.items():
+        np.testing.assert_array_equal((picture == colour).all(axis=2), mask & (seen == times))
+    assert (picture[~mask] == figures.EXCLUDED).all()
 
 
 def test_the_report_says_that_it_shows_the_worst_of_more_frames():

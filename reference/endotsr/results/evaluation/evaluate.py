@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.results.evaluation.baselines import BASELINES, unit_image
+from endotsr.results.evaluation.coverage import TimesSeen, coverage, extrapolated, seen_metrics, times_seen
 from endotsr.results.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
 from endotsr.results.evaluation.metrics import image_metrics, mean_metrics
 from endotsr.results.evaluation.records import (
@@ -38,12 +39,17 @@ EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
 
 
 def evaluate_frames(
-    sequence: Sequence, indices: Iterable[int], render_frame: RenderFrame, lpips_weights: LpipsWeights | None = None
+    sequence: Sequence,
+    indices: Iterable[int],
+    render_frame: RenderFrame,
+    lpips_weights: LpipsWeights | None = None,
+    seen: TimesSeen | None = None,
 ) -> FramesMeasured:
     """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
 
     render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
     lpips_weights   None: LPIPS is None
+    seen            from `times_seen`; adds `psnr_seen` and `psnr_seen_twice`
 
     Raises   ValueError naming the frame if the shapes of render and frame differ
     """
@@ -54,6 +60,8 @@ def evaluate_frames(
         if render.shape != truth.shape:
             raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
         found = image_metrics(render, truth, mask) | _lpips(render, truth, mask, lpips_weights)
+        if seen is not None:
+            found |= seen_metrics(render, truth, mask, seen)
         values = {key: _finite(value) for key, value in found.items()}
         bad += sum(values[key] is None and found[key] is not None for key in found)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
@@ -71,16 +79,33 @@ def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
     }  # fmt: skip
 
 
+def held_out_means(evaluation: EvaluationRecord, measured: FramesMeasured) -> tuple[Means, Means]:
+    """Means over the held-out frames between training frames, and over the extrapolated frames.
+
+    measured   of the model, the cross-fade or a baseline
+    returns    two dictionaries metric -> mean; the second is empty if no frame is extrapolated, or if all are, which
+               the first then describes
+    """
+    outside = set((evaluation.get("frames") or {}).get("extrapolated") or ())
+    rows = measured.get("per_frame") or []
+    within, beyond = ([row for row in rows if (row["frame"] in outside) is which] for which in (False, True))
+    if not within or not beyond:
+        return measured.get("mean") or {}, {}
+    return measured_rows(within, 0)["mean"], measured_rows(beyond, 0)["mean"]
+
+
 def left_out(evaluation: EvaluationRecord) -> list[str]:
     """Names of the held-out frames without a tissue PSNR, which the means exclude."""
     rows = (evaluation.get("held_out") or {}).get("per_frame") or []
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
 
 
-def baseline_table(sequence: Sequence, lpips_weights: LpipsWeights | None = None) -> dict[str, LabelledFrames]:
-    """Held-out metrics of the baselines, in the order of `EVERY_BASELINE`."""
+def baseline_table(
+    sequence: Sequence, lpips_weights: LpipsWeights | None = None, seen: TimesSeen | None = None
+) -> dict[str, LabelledFrames]:
+    """Held-out metrics of the baselines, in the order of `EVERY_BASELINE`; `seen` as in `evaluate_frames`."""
     return {
-        name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights)}
+        name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights, seen)}
         for name, (label, make) in EVERY_BASELINE.items()
     }
 
@@ -104,7 +129,8 @@ def evaluate_model(
                `lpips_reason` is None if LPIPS was computed
     """
     chosen = training_sample(sequence) if training is None else [int(i) for i in training]
-    held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights)
+    seen = times_seen(sequence)
+    held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights, seen)
     inside = evaluate_frames(sequence, chosen, render_frame)
     frames: FramesPart = {
         "total": len(sequence.images),
@@ -112,9 +138,11 @@ def evaluate_model(
         "held_out": [int(i) for i in sequence.test_index],
         "training_sample": chosen,
         "tissue_fraction": float(np.mean(sequence.masks)),
+        "extrapolated": extrapolated(sequence, sequence.test_index),
+        "coverage": None if seen is None else coverage(sequence, sequence.test_index, seen),
     }
     obstacle = lpips_obstacle(lpips_weights, *sequence.images.shape[2:])
-    return evaluation_record(frames, held_out, inside, baseline_table(sequence, lpips_weights), obstacle)
+    return evaluation_record(frames, held_out, inside, baseline_table(sequence, lpips_weights, seen), obstacle)
 
 
 def evaluation_record(

@@ -2,6 +2,7 @@
 
 from typing import Any, NotRequired, Required, TypedDict
 
+from endotsr.results.evaluation.coverage import FrameCoverage
 from endotsr.training.runs.machine import MachinePart
 from endotsr.training.runs.records import InputPart
 
@@ -13,6 +14,8 @@ class MetricValues(TypedDict, total=False):
 
     psnr_full: float | None
     psnr_tissue: float | None
+    psnr_seen: float | None  # over tissue pixels that a training frame shows
+    psnr_seen_twice: float | None  # over tissue pixels that two or more training frames show
     psnr_full_8bit: float | None
     psnr_tissue_8bit: float | None
     ssim_full_8bit: float | None
@@ -60,6 +63,8 @@ class FramesPart(TypedDict):
     held_out: list[int]
     training_sample: list[int]
     tissue_fraction: float
+    extrapolated: NotRequired[list[int]]  # of `held_out`: before the first or after the last training frame
+    coverage: NotRequired[list[FrameCoverage] | None]  # of `held_out`; None if the camera moves
 
 
 class MotionPart(TypedDict):

@@ -16,6 +16,7 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, backproject, camera_centre, degrees_between, project
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.baselines import neighbours
+from endotsr.results.evaluation.coverage import times_seen
 from endotsr.results.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.results.evaluation.lpips import LpipsWeights
 from endotsr.results.evaluation.measures import measured
@@ -115,7 +116,8 @@ def _cross_fade(
         before, after = render(near.before), render(near.after)
         return before + before.dtype.type(near.fraction) * (after - before)
 
-    return {"label": CROSS_FADE, **evaluate_frames(sequence, sequence.test_index, blend, weights)}
+    measured = evaluate_frames(sequence, sequence.test_index, blend, weights, times_seen(sequence))
+    return {"label": CROSS_FADE, **measured}
 
 
 def _components(

@@ -21,6 +21,11 @@ COLUMNS = (
     ("lpips", "LPIPS [0,1]", 4, -1),
     ("lpips_symmetric", "LPIPS [−1,1]", 4, -1),
 )
+SEEN = (  # of `evaluation.coverage`, in a folded table
+    ("psnr_tissue", "PSNR tissue, dB", 2, 1),
+    ("psnr_seen", "Seen in training, dB", 2, 1),
+    ("psnr_seen_twice", "Seen twice or more, dB", 2, 1),
+)
 DECIDING = tuple(column for column in COLUMNS if not column[0].endswith("_8bit"))  # the others are folded
 
 
@@ -46,6 +51,7 @@ class FramePictures:
     mask: NDArray[np.bool_]  # (H, W) True = tissue
     depth: FloatArray | None = None  # (H, W) rendered depth, scene units; <= 0 = none
     metrics: FrameMetrics | None = None  # the frame's entry of metrics.json
+    seen: NDArray[np.int32] | None = None  # (H, W) training frames in which the pixel is tissue; None: camera moves
 
 
 @dataclass(frozen=True)

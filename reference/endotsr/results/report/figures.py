@@ -19,6 +19,7 @@ ERROR_MAP = "magma"
 DEPTH_MAP = "viridis"
 EXCLUDED = (96, 96, 102)
 NOT_FINITE = (255, 0, 255)
+SELDOM_SEEN = {0: (0, 220, 255), 1: (255, 196, 0)}  # number of training frames that show a pixel -> colour
 INSET_FACTOR = 4
 GAP = 6  # pixels between the pictures of one frame
 ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few values: similar runs get the same scale
@@ -133,6 +134,18 @@ def depth_picture(depth: FloatArray, low: float, high: float, mask: NDArray[np.b
     colours = colour_mapped(depth, low, high, DEPTH_MAP)
     absent = depth <= 0
     colours[absent if mask is None else absent | ~mask] = EXCLUDED
+    return colours
+
+
+def seen_picture(truth: FloatArray, mask: NDArray[np.bool_], seen: NDArray[np.int32] | None) -> ByteImage:
+    """The truth, darkened, with the tissue pixels of `SELDOM_SEEN` in their colours; grey where excluded.
+
+    seen   (H, W) number of training frames in which a pixel is tissue; None: no pixel is marked
+    """
+    colours = bytes_image(truth) // 3
+    for times, colour in SELDOM_SEEN.items() if seen is not None else ():
+        colours[mask & (seen == times)] = colour
+    colours[~mask] = EXCLUDED
     return colours
 
 

@@ -100,6 +100,12 @@ def colour_bar(name: str, low: str, high: str) -> str:
     return f'<span class="bar">{text(low)}{strip}{text(high)}</span>'
 
 
+def colour_box(colour: tuple[int, int, int]) -> str:
+    """A small box of one colour, for a legend."""
+    red, green, blue = colour
+    return f'<span class="bar"><i class="box" style="background:#{red:02x}{green:02x}{blue:02x}"></i></span>'
+
+
 def card(value: str, unit: str, label: str) -> str:
     """A number in a box with a label below; `value` is HTML."""
     suffix = f"<small>{unit}</small>" if unit and "absent" not in value else ""
@@ -177,7 +183,7 @@ summary small{color:var(--soft);font-weight:400;margin-left:.5rem}
 details[open]>summary{margin-bottom:.6rem}
 .legend{display:flex;flex-wrap:wrap;gap:.3rem 1.5rem;color:var(--soft);font-size:.85rem;margin:.2rem 0 .8rem}
 .bar{display:inline-flex;align-items:center;gap:.45rem;white-space:nowrap}
-.bar i{display:inline-block;width:7.5rem;height:.65rem;border-radius:3px}
+.bar i{display:inline-block;width:7.5rem;height:.65rem;border-radius:3px}.bar i.box{width:.65rem}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.25rem 1.4rem;margin:0;font-size:.92rem}
 dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
 pre{overflow-x:auto;font:.82rem/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;margin:0}

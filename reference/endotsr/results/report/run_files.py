@@ -14,6 +14,7 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import config_to_toml
 from endotsr.errors import InputError
 from endotsr.method.splatting.render import RenderOut
+from endotsr.results.evaluation.coverage import times_seen
 from endotsr.results.evaluation.records import FrameMetrics, RunEvaluation
 from endotsr.results.report.curves import curves_png
 from endotsr.results.report.data import FramePictures, Preview, ReportData
@@ -96,7 +97,7 @@ def _link(source: Path, target: Path) -> None:
 def _worst_frames(
     sequence: Sequence, per_frame: list[FrameMetrics], held_out: Callable[[int], RenderOut]
 ) -> tuple[FramePictures, ...]:
-    rows = {row["frame"]: row for row in per_frame}
+    rows, seen = {row["frame"]: row for row in per_frame}, times_seen(sequence)
     return tuple(
         FramePictures(
             index=i,
@@ -107,6 +108,7 @@ def _worst_frames(
             mask=sequence.masks[i],
             depth=held_out(i).depth,
             metrics=rows[i],
+            seen=seen,
         )
         for i in sorted(worst_first(rows)[:MOST_SHOWN])
     )

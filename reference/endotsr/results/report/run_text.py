@@ -3,8 +3,8 @@
 In: the dictionary of metrics.json. Out: plain text.
 """
 
-from endotsr.results.evaluation.evaluate import left_out
-from endotsr.results.evaluation.records import EvaluationRecord, MotionPart, PosePart, RunPart
+from endotsr.results.evaluation.evaluate import held_out_means, left_out
+from endotsr.results.evaluation.records import EvaluationRecord, FramesMeasured, Means, MotionPart, PosePart, RunPart
 from endotsr.results.report.tables import duration, fixed, plain
 
 SHOWN = (("psnr_full", "PSNR full", 2), ("psnr_tissue", "PSNR tissue", 2), ("ssim_full", "SSIM full", 4))
@@ -44,13 +44,17 @@ def held_out_table(metrics: EvaluationRecord) -> str:
 
     metrics   of a run, or from `evaluation.pictures.measure_pictures` (with `label`)
     """
-    rows = [(metrics.get("label", "this model"), metrics["held_out"]["mean"])]
-    rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
-    rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
-    columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
-    head = [f"{len(metrics['held_out']['per_frame'])} held-out frames", *(label for _, label, _ in columns)]
-    cells = [[label, *(fixed(mean.get(key), digits) for key, _, digits in columns)] for label, mean in rows]
-    lines = [plain(head, cells)]
+    measured: list[tuple[str, FramesMeasured]] = [(metrics.get("label", "this model"), metrics["held_out"])]
+    measured += [(entry["label"], entry) for entry in [metrics.get("cross_fade")] if entry]
+    measured += [(entry["label"], entry) for entry in metrics["baselines"].values()]
+    means = [(label, *held_out_means(metrics, entry)) for label, entry in measured]
+    total, outside = len(metrics["held_out"]["per_frame"]), metrics["frames"].get("extrapolated") or []
+    split = bool(means[0][2])  # frames between training frames, and extrapolated ones
+    lines = [_means_table(f"{total - len(outside) if split else total} held-out frames", [row[:2] for row in means])]
+    if split:
+        lines.append(_means_table(f"{len(outside)} extrapolated", [(label, beyond) for label, _, beyond in means]))
+    elif outside:
+        lines.append("every held-out frame is extrapolated: no training frame is on its other side")
     inside = metrics["training"]["mean"].get("psnr_tissue")
     run: RunPart | None = metrics.get("run")
     if run is not None or inside is not None:
@@ -66,6 +70,13 @@ def held_out_table(metrics: EvaluationRecord) -> str:
     if metrics["lpips_reason"]:
         lines.append(f"LPIPS: {metrics['lpips_reason']} (--lpips FILE)")
     return "\n".join(lines)
+
+
+def _means_table(head: str, rows: list[tuple[str, Means]]) -> str:
+    """A table of means with the columns that have a value."""
+    columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
+    cells = [[label, *(fixed(mean.get(key), digits) for key, _, digits in columns)] for label, mean in rows]
+    return plain([head, *(label for _, label, _ in columns)], cells)
 
 
 def trajectory_sentence(motion: MotionPart) -> str:

@@ -5,36 +5,22 @@ needs no script and no other file. It follows the reader's light or dark colour 
 links to the viewer page, if there is one.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
-from endotsr.results.evaluation.evaluate import left_out
-from endotsr.results.evaluation.records import Means
 from endotsr.results.report import curves, figures, parts
-from endotsr.results.report.data import COLUMNS, DECIDING, FramePictures, ReportData
+from endotsr.results.report.data import DECIDING, FramePictures, ReportData
+from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
 from endotsr.results.report.run_text import SHOWN, facts, pose_sentence, trajectory_sentence
 from endotsr.results.report.tables import duration, html_table
 
-Column = tuple[str, str, int, int]  # of COLUMNS
-MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
 OPENED_FRAMES = 3  # the worst frames are unfolded
-
-
-def _mean(data: ReportData, key: str) -> Means:
-    return (data.evaluation.get(key) or {}).get("mean") or {}
-
-
-def _baseline_rows(data: ReportData) -> list[tuple[str, Means]]:
-    baselines = data.evaluation.get("baselines") or {}
-    return [(row.get("label", name), row.get("mean") or {}) for name, row in baselines.items()]
 
 
 def headline(data: ReportData) -> str:
     """Title, a sentence comparing the model with the baselines, the headline numbers."""
-    mean = _mean(data, "held_out")
+    mean = mean_of(data, "held_out")
     count = len((data.evaluation.get("held_out") or {}).get("per_frame") or [])
+    outside = len(extrapolated_frames(data)) if mean_of(data, "held_out", extrapolated=True) else 0
     cards = [
         (mean.get("psnr_full"), 2, "dB", "held-out PSNR, full image"),
         (mean.get("psnr_tissue"), 2, "dB", "held-out PSNR, tissue"),
@@ -51,6 +37,7 @@ def headline(data: ReportData) -> str:
     elif seconds.size:
         boxes.append(parts.card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
     frames = f"{count} held-out frame{'s' if count != 1 else ''}" if count else "report"
+    frames += f", {outside} of them extrapolated and not in these means" if outside else ""
     return (
         f'<header><p class="eyebrow">Endo-TSR · {frames}</p><h1>{parts.text(data.title)}</h1>{_verdict(data)}'
         f'<div class="cards">{"".join(boxes)}</div></header>'
@@ -65,8 +52,8 @@ ABOUT_BASELINES = (
 
 def _verdict(data: ReportData) -> str:
     """The tissue PSNR of the model compared with the best baseline, as a paragraph."""
-    ours = _mean(data, "held_out").get("psnr_tissue")
-    means = _baseline_rows(data)
+    ours = mean_of(data, "held_out").get("psnr_tissue")
+    means = baseline_rows(data)
     rows = [(label, value) for label, mean in means if (value := mean.get("psnr_tissue")) is not None]
     if ours is None or not rows or len(rows) < len(means):
         return ""  # a baseline without a finite PSNR may be exact
@@ -93,69 +80,9 @@ def moving(data: ReportData) -> str:
     return parts.section("The scene", *blocks)
 
 
-def held_out(data: ReportData) -> str:
-    """The table of held-out metrics of model and baselines; 8-bit values are folded."""
-    rows: list[MetricsRow] = []
-    if mean := _mean(data, "held_out"):
-        rows.append(("This model", mean, "model"))
-    if faded := data.evaluation.get("cross_fade"):
-        rows.append((faded["label"], faded["mean"], ""))
-    rows += [(label, mean, "") for label, mean in _baseline_rows(data)]
-    columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
-    if not columns:
-        return ""
-    note = "Means over the held-out frames. Baselines use training frames only. The best value per column is coloured."
-    table = _held_out_table(rows, [c for c in columns if c in DECIDING] or columns)
-    title = "Held-out frames, compared with baselines without a model"
-    return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
-
-
-def _held_out_table(rows: list[MetricsRow], columns: list[Column]) -> str:
-    best = {key: _best(rows, key, sign) for key, _, _, sign in columns}
-    cells = [
-        [
-            parts.text(label),
-            *(_metric(row.get(key), n, best[key]) for key, _, n, _ in columns),
-        ]
-        for label, row, _ in rows
-    ]
-    return html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
-
-
-def _eight_bit(rows: list[MetricsRow], columns: list[Column]) -> str:
-    """The folded table for pictures rounded to 8 bits; the values differ from the others in the second decimal."""
-    rounded = [c for c in columns if c not in DECIDING]
-    if not rounded or len(rounded) == len(columns):
-        return ""
-    measured = [row for row in rows if any(row[1].get(c[0]) is not None for c in rounded)]
-    summary = "With renders rounded to 8 bits<small>as measured from PNG files</small>"
-    return parts.details(summary, _held_out_table(measured, rounded))
-
-
-def _best(rows: list[MetricsRow], key: str, sign: int) -> float | None:
-    values = [row[key] for _, row, _ in rows if row.get(key) is not None]
-    return max(values, key=lambda v: sign * v) if len(values) > 1 else None
-
-
-def _metric(value: Any, digits: int, best: float | None) -> str:
-    shown = parts.number(value, digits)
-    return f'<span class="best">{shown}</span>' if value is not None and value == best else shown
-
-
-def _absent_reasons(data: ReportData) -> str:
-    reasons = []
-    if reason := data.evaluation.get("lpips_reason"):
-        reasons.append(f"LPIPS: {reason}")
-    if frames := left_out(data.evaluation):
-        reasons.append(f"excluded from the tissue means (no finite value): {', '.join(frames)}")
-    if count := data.evaluation.get("not_finite"):
-        reasons.append(f"{count} value(s) were not finite and are shown as a dash")
-    return f'<p class="note">{parts.text("; ".join(reasons))}.</p>' if reasons else ""
-
-
 def temporal_gap(data: ReportData) -> str:
     """Means over training and held-out frames, and a chart of the held-out frames."""
-    held_out, training = _mean(data, "held_out"), _mean(data, "training")
+    held_out, training = mean_of(data, "held_out"), mean_of(data, "training")
     table = ""
     if held_out and training:
         rows = []
@@ -178,8 +105,8 @@ def temporal_gap(data: ReportData) -> str:
 def _motion(data: ReportData) -> str:
     """Sentences on the motion, compared with the cross-fade and with the truth, and on the pose correction."""
     sentences = []
-    faded = ((data.evaluation.get("cross_fade") or {}).get("mean") or {}).get("psnr_tissue")
-    ours = _mean(data, "held_out").get("psnr_tissue")
+    faded = mean_of(data, "cross_fade").get("psnr_tissue")
+    ours = mean_of(data, "held_out").get("psnr_tissue")
     if faded is not None and ours is not None:
         word, what = ("above", "adds") if ours > faded else ("below", "adds no")
         sentences.append(
@@ -214,6 +141,11 @@ def pictures(data: ReportData) -> str:
     if depths:
         bar = parts.colour_bar(figures.DEPTH_MAP, f"{span[0]:.4g}", f"{span[1]:.4g} {data.depth_unit}")
         legend.append(f"Rendered depth {bar}")
+    legend += [
+        f"{words} {parts.colour_box(colour)}"
+        for (times, colour), words in zip(figures.SELDOM_SEEN.items(), ("Never seen in training", "Seen once"))
+        if any(f.seen is not None and (f.mask & (f.seen == times)).any() for f in data.frames)
+    ]
     note = (
         "Worst first. Error: absolute difference, averaged over the colour channels, in display units from 0 to 1, "
         "with the same scale for all frames. Grey: excluded or without depth. The white border marks the window with "
@@ -245,6 +177,9 @@ def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened
     views = [("Render", panels.render), ("Truth", panels.truth), ("Error", panels.error)]
     if frame.depth is not None:
         views.append(("Depth", figures.depth_picture(frame.depth, *span, mask=frame.mask)))
+    seldom = 0 if frame.seen is None else int(np.count_nonzero(frame.mask & (frame.seen <= 1)))
+    if seldom:
+        views.append(("Seen", figures.seen_picture(frame.truth, frame.mask, frame.seen)))
     cells = []
     for label, picture in views:
         name = f"{label}, frame {frame.index}"
@@ -255,6 +190,8 @@ def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened
     for key, before, digits, after in (("psnr_tissue", "tissue", 2, " dB"), ("ssim_tissue", "SSIM", 4, "")):
         if (value := (frame.metrics or {}).get(key)) is not None:
             shown.append(f"{before} {parts.number(value, digits)}{after}")
+    if seldom:
+        shown.append(f"{seldom} px never seen in training or once")
     facts = " · ".join([*shown, parts.text(frame.name)])
     summary = f"Frame {frame.index}<small>{facts}</small>"
     return parts.details(summary, f'<div class="views">{"".join(cells)}</div>', opened)
@@ -269,8 +206,8 @@ def components(data: ReportData) -> str:
         change = "" if gain is None else f"{gain:+.2f} dB"
         rows.append([parts.text(row["label"]), *(parts.number(row.get(key), n) for key, _, n in SHOWN), change])
     note = (
-        "Held-out means of the trained model, rendered with the named residual set to zero. Component L, the Laplacian "
-        "loss, affects training only; to measure it, train with --model.no-laplacian."
+        "Means over all held-out frames, rendered from the trained model with the named residual set to zero. "
+        "Component L, the Laplacian loss, affects training only; to measure it, train with --model.no-laplacian."
     )
     table = html_table(["Rendered", *(label for _, label, _ in SHOWN), "Change, PSNR tissue"], rows) if rows else ""
     return parts.section("Contribution of each component", table, note=note)

@@ -82,6 +82,9 @@ def _measured(
             row["time"] = row["frame"] / scene.plan.frames
     metrics["frames"]["held_out"] = [i + first for i in metrics["frames"]["held_out"]]
     metrics["frames"]["training_sample"] = [i + first for i in metrics["frames"]["training_sample"]]
+    metrics["frames"]["extrapolated"] = [i + first for i in metrics["frames"].get("extrapolated", ())]
+    for counted in metrics["frames"].get("coverage") or ():
+        counted["frame"] += first
     return metrics
 
 
@@ -104,6 +107,8 @@ def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
         "held_out": [i for part in parts for i in part["frames"]["held_out"]],
         "training_sample": [i for part in parts for i in part["frames"]["training_sample"]],
         "tissue_fraction": float(np.mean([part["frames"]["tissue_fraction"] for part in parts])),
+        "extrapolated": [i for part in parts for i in part["frames"].get("extrapolated", ())],
+        "coverage": [row for part in parts for row in part["frames"].get("coverage") or ()] or None,
     }
     held_out, training = (joined_rows([part[name] for part in parts]) for name in ("held_out", "training"))
     baselines: dict[str, LabelledFrames] = {
