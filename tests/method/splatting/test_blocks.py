@@ -31,7 +31,7 @@ from endotsr.method.splatting.camera import Camera, camera_centre
 from endotsr.method.splatting.covariance import covariance_forward
 from endotsr.method.splatting.fast import blocks as compositing_blocks
 from endotsr.method.splatting.fast import tiles as compositing_tiles
-from endotsr.method.splatting.fast.tiles import TILE_HEIGHT, TILE_WIDTH, place
+from endotsr.method.splatting.fast.tiles import BLOCKS_ACROSS, TILE_HEIGHT, TILE_WIDTH, place
 from endotsr.method.splatting.harmonics import harmonics_forward
 from endotsr.method.splatting.projection import projection_forward
 from endotsr.method.splatting.records import (
@@ -327,11 +327,12 @@ def visited_and_lanes(record, top, left, log2_cutoff):
     visited = np.zeros(TILE_WIDTH * TILE_HEIGHT, bool)
     values = np.zeros((3, visited.size), record.dtype)
     tables = np.empty(compositing_blocks.TABLES, record.dtype)
-    words = compositing_blocks._visits_kernel(record, top, left, log2_cutoff)
+    words = compositing_blocks._visits_kernel(record, top, left, log2_cutoff, np.empty(TILE_HEIGHT, np.int32))
+    first_columns = (TILE_WIDTH // BLOCKS_ACROSS * np.arange(BLOCKS_ACROSS)).astype(record.dtype)
     for word in range(visited.size // (64 * count)):
         compositing_blocks._lane_tables_kernel(record, top, left, word, tables)
         for bit in range(64):
-            base, row, across = compositing_blocks._visit_kernel(record, word, np.uint64(bit))
+            base, row, across = compositing_blocks._visit_kernel(first_columns, word, np.uint64(bit))
             pixels = slice(int(base), int(base) + count)
             visited[pixels] = int(words[word]) >> bit & 1
             for k, part in enumerate((compositing_blocks.E, compositing_blocks.CENTRE_LINE, compositing_blocks.DY)):

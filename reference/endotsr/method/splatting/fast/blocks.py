@@ -81,7 +81,7 @@ ROUND_UP = 0.999  # to the next column; below 1, so rounding loses no column
 BATCH = 32  # pairs between two tests for a finished tile
 RECORDS_AHEAD = 8  # pairs between the prefetch of a record and its use
 
-_U64 = np.uint64
+_U64, _U32, _I32 = np.uint64, np.uint32, np.int32
 
 
 class BlocksSaved(NamedTuple):
@@ -103,10 +103,13 @@ def supports(settings: RasterSettings) -> bool:
     )
 
 
-def _visits(record, top, left, log2_cutoff):
+def _visits(record, top, left, log2_cutoff, columns):
     """The blocks of a tile to visit, as bits of two words: BLOCKS_ACROSS r + c for block c of row r of the word.
 
-    With blocks of four rows the second word is empty. All rows of the tile are computed at once (vector code).
+    columns   scratch, int32 (TILE_HEIGHT,): the bits of each row of pixels
+
+    With blocks of four rows the second word is empty. The first loop computes all rows of the tile at once. It has
+    only 32-bit numbers: the 64-bit words would halve the number of its lanes.
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
     beyond rounding: no pixel with alpha >= cutoff is missed, and a superfluous block has no effect. If a huge footprint
     just reaches a row, the reach is a difference of nearly equal numbers; `faintest` allows for its rounding.
@@ -121,7 +124,6 @@ def _visits(record, top, left, log2_cutoff):
     faintest = log2_cutoff - (one - log2_cutoff) * real(1e-6)
     first_row, across = real(top) + half - v, real(TILE_WIDTH)
     offset = u - half - real(left)
-    first_word, second_word = _U64(0), _U64(0)
     for y in range(TILE_HEIGHT):
         dy = first_row + real(y)
         centre_line = log2_opacity - r2 * dy * dy
@@ -129,11 +131,14 @@ def _visits(record, top, left, log2_cutoff):
         width = math.sqrt(max(spread * (centre_line - faintest), zero)) + margin
         low, high = min(max(middle - width, zero), across), min(max(middle + width + one, zero), across)
         first, stop = np.int32(low + real(ROUND_UP)), np.int32(high)
-        last = np.int32(max(stop, 1) - 1)
-        columns = (_U64(2) << _U64(last // BLOCK_WIDTH)) - (_U64(1) << _U64(first // BLOCK_WIDTH))
-        columns = columns if (centre_line >= log2_cutoff) & (first < stop) else _U64(0)
+        last = np.int32(max(stop, _I32(1)) - _I32(1))
+        begin, end = np.int32(_U32(first) // _U32(BLOCK_WIDTH)), np.int32(_U32(last) // _U32(BLOCK_WIDTH))
+        bits = np.int32(_I32(2) << (end & _I32(31))) - np.int32(_I32(1) << (begin & _I32(31)))
+        columns[_U64(y)] = np.int32(bits) if (centre_line >= log2_cutoff) & (first < stop) else _I32(0)
+    first_word, second_word = _U64(0), _U64(0)
+    for y in range(TILE_HEIGHT):
         row = y // block_height(record)
-        bits = columns << _U64(BLOCKS_ACROSS * (row % WORD_ROWS))
+        bits = _U64(columns[_U64(y)]) << _U64(BLOCKS_ACROSS * (row % WORD_ROWS))
         first_word |= bits if row < WORD_ROWS else _U64(0)
         second_word |= bits if row >= WORD_ROWS else _U64(0)
     return first_word, second_word
@@ -158,16 +163,25 @@ def _lane_tables(record, top, left, word, tables):
         tables[k + _U64(DY)] = dy
 
 
-def _visit(like, word, bit):
+def _first_columns(like):
+    """The first column of each block of a row of blocks. A visit loads it, which is faster than a conversion."""
+    found = local_array(BLOCKS_ACROSS, like)
+    for block in range(BLOCKS_ACROSS):
+        found[_U64(block)] = like.dtype.type(np.int32(block * BLOCK_WIDTH))
+    return found
+
+
+def _visit(first_columns, word, bit):
     """For a visited block: offset of its first pixel in a plane, offset of its row in the tables, first column."""
     row, column = bit // _U64(BLOCKS_ACROSS), bit % _U64(BLOCKS_ACROSS)
-    many = _U64(lanes(like))
-    return (_U64(64 * word) + bit) * many, row * many, like.dtype.type(np.int32(column * _U64(BLOCK_WIDTH)))
+    many = _U64(lanes(first_columns))
+    return (_U64(64 * word) + bit) * many, row * many, first_columns[column]
 
 
 _visits_kernel = jit_inline(_visits)
 _lane_tables_kernel = jit_inline(_lane_tables)
 _visit_kernel = jit_inline(_visit)
+_first_columns_kernel = jit_inline(_first_columns)
 
 
 def _record(records, ranks, p, end):
@@ -214,6 +228,7 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
     height, width = depth.shape
     tiles_x, words = (width + TILE_WIDTH - 1) // TILE_WIDTH, TILE_HEIGHT // (WORD_ROWS * block_height(records))
     buffer, tables = local_array(FORWARD_NUMBERS, records), local_array(TABLES, records)
+    columns, first_columns = local_array(TILE_HEIGHT, ranks), _first_columns_kernel(records)
     for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         start, end = starts[tile], starts[tile + 1]
@@ -223,13 +238,13 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
                 break
             record = _record_kernel(records, ranks, p, end)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            first_word, second_word = _visits_kernel(record, top, left, log2_cutoff)
+            first_word, second_word = _visits_kernel(record, top, left, log2_cutoff, columns)
             for word in range(words):
                 visits = first_word if word == 0 else second_word
                 if visits != _U64(0):
                     _lane_tables_kernel(record, top, left, word, tables)
                 while visits != _U64(0):
-                    base, row, across = _visit_kernel(records, word, lowest_bit(visits))
+                    base, row, across = _visit_kernel(first_columns, word, lowest_bit(visits))
                     visits &= visits - _U64(1)
                     _blend_block_kernel(
                         buffer, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max
@@ -304,6 +319,7 @@ def _blend_reverse(
     height, width = depth.shape
     tiles_x, words = (width + TILE_WIDTH - 1) // TILE_WIDTH, TILE_HEIGHT // (WORD_ROWS * block_height(records))
     buffer, tables = local_array(REVERSE_NUMBERS, records), local_array(TABLES, records)
+    columns, first_columns = local_array(TILE_HEIGHT, ranks), _first_columns_kernel(records)
     sums = _new_sums_kernel(records)
     for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
@@ -322,13 +338,13 @@ def _blend_reverse(
                     column[_U64(lane)] = zero
             record = _record_kernel(records, ranks, p, end)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            first_word, second_word = _visits_kernel(record, top, left, log2_cutoff)
+            first_word, second_word = _visits_kernel(record, top, left, log2_cutoff, columns)
             for word in range(words):
                 visits = first_word if word == 0 else second_word
                 if visits != _U64(0):
                     _lane_tables_kernel(record, top, left, word, tables)
                 while visits != _U64(0):
-                    base, row, across = _visit_kernel(records, word, lowest_bit(visits))
+                    base, row, across = _visit_kernel(first_columns, word, lowest_bit(visits))
                     visits &= visits - _U64(1)
                     _blend_block_reverse_kernel(
                         buffer, sums, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max
