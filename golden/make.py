@@ -2,13 +2,15 @@
 
     python golden/make.py check [--within-tolerance] [--golden DIR]    compare the files with a fresh computation
     python golden/make.py write [FAMILY ...] [--golden DIR]            replace the files, and print what moved
+    python golden/make.py pack DIR [--golden DIR]                      write the files to hand on: see below
     python golden/make.py wrong                                        list the mistakes
     python golden/make.py wrong FLAG OUTDIR [--golden DIR]             write what a port with this mistake answers
 
 `check` compares bitwise on the class of machine named in the manifest, and otherwise, or with `--within-tolerance`,
 within the float64 tolerance. It ends with exit code 1 if anything differs. `write` computes the named families, or all,
 and keeps the stored bytes of values that agree within the tolerance. It always ends with exit code 1: no test run may
-rewrite its own expected values. `wrong` writes in float64.
+rewrite its own expected values. `wrong` writes in float64. `pack` writes the vectors as an archive with its hash, the
+judge as a program that needs NumPy alone, and the data wheel `endotsr-golden`.
 """
 
 import argparse
@@ -17,6 +19,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.port.judge.store import golden_folder, read_golden
+from makers.delivery import pack
 from makers.generate import check, write
 from makers.registry import all_wrong_ports
 from makers.wrong import answer_wrongly
@@ -40,6 +43,13 @@ def run_write(options: argparse.Namespace) -> int:
     return 1
 
 
+def run_pack(options: argparse.Namespace) -> int:
+    """Write the archive of the vectors, the judge and the data wheel."""
+    for path in pack(golden_folder(options.golden), options.outdir):
+        print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
+    return 0
+
+
 def run_wrong(options: argparse.Namespace) -> int:
     """List the mistakes, or write the outputs of a port that makes one. Raises: InputError for an unknown flag."""
     known = all_wrong_ports()
@@ -57,7 +67,7 @@ def main(words: list[str]) -> int:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for name, call in {"check": run_check, "write": run_write, "wrong": run_wrong}.items():
+    for name, call in {"check": run_check, "write": run_write, "pack": run_pack, "wrong": run_wrong}.items():
         command = commands.add_parser(name, help=call.__doc__)
         command.add_argument("--golden", type=Path, metavar="DIR", default=HERE, help="folder of the golden cases")
         command.set_defaults(call=call)
@@ -65,6 +75,8 @@ def main(words: list[str]) -> int:
             command.add_argument("--within-tolerance", action="store_true", help="accept other bits on any machine")
         if name == "write":
             command.add_argument("families", nargs="*", metavar="FAMILY", help="only these; default: all")
+        if name == "pack":
+            command.add_argument("outdir", type=Path, metavar="DIR", help="folder for the files")
         if name == "wrong":
             command.add_argument("flag", nargs="?", metavar="FLAG", help="name of the mistake")
             command.add_argument("outdir", nargs="?", type=Path, metavar="OUTDIR", help="folder for the outputs")

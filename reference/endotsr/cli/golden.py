@@ -21,7 +21,7 @@ class _Reported:
     level: Level = 5
     """level to judge; exit code 0 if it is complete"""
     golden: Annotated[Path | None, Option("DIR")] = None
-    """folder of the golden cases (default: golden/ of the source tree or of the working folder)"""
+    """folder or archive of the golden cases (default: golden/ or archive at hand)"""
     json: JsonFile = None
     """also write the report as JSON"""
     html: Annotated[Path | None, Option("FILE", written=True)] = None
@@ -106,25 +106,15 @@ def _judge(words: list[str]) -> int:
 
 
 def _run(words: list[str]) -> int:
-    from endotsr.port.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
+    from endotsr.port.judge.call import called
     from endotsr.port.judge.store import golden_folder, read_golden
-    from endotsr.port.judge.verdict import judge, only_of, without_claim
 
     options = parse(RunOptions, words, "golden run")
-    refuse_command(options.port)
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
-        root = options.keep or Path(scratch)
-        requests, *folders = (root / name for name in KEPT)
-        clear_kept(root)
-        write_requests(only_of(golden, options.only), requests, options.precision, options.level)
-        calls = folders if options.level >= 5 else folders[:1]
-        notes = [run_port(options.port, requests, folder, options.timeout) for folder in calls]
-        again = folders[1] if options.level >= 5 else None
-        report = judge(golden, folders[0], options.precision, level=options.level, again=again, only=options.only)
-        if any(notes):
-            without_claim(report, list(filter(None, notes)))
-        return _report(report, golden, folders[0], options)
+        asked = {"level": options.level, "only": options.only, "timeout": options.timeout}
+        report, outputs = called(golden, options.port, options.keep or Path(scratch), options.precision, **asked)
+        return _report(report, golden, outputs, options)
 
 
 def _report(report, golden, outdir: Path, options: _Reported) -> int:
@@ -139,8 +129,7 @@ def _report(report, golden, outdir: Path, options: _Reported) -> int:
         options.json.write_bytes(as_json(report))
     if options.html:
         options.html.write_text(as_html(report, golden, outdir), encoding="utf-8", newline="\n")
-    accepted = all(case.status in ("passed", "not ported") for case in report.cases) if options.only else report.passed
-    return 0 if accepted else 1
+    return 0 if (report.accepted if options.only else report.passed) else 1
 
 
 def _reference(words: list[str]) -> int:

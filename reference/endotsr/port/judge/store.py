@@ -11,10 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.port.judge.archive import archive_at_hand, unpacked
 from endotsr.port.judge.format import Case, FileEntry, Manifest, read_struct
 from endotsr.port.judge.npy import LARGEST as LARGEST_ARRAY
 from endotsr.port.judge.npy import read_plain
 from endotsr.untrusted.files import read_bytes, read_text
+
+WAYS = (
+    "put the archive endotsr-golden-VERSION.zip into the working folder, install the wheel endotsr-golden, or name "
+    "folder or archive with --golden (in Python golden=); `python golden/make.py pack DIR` in the repository of "
+    "endotsr makes both"
+)
 
 
 class Golden(NamedTuple):
@@ -50,12 +57,19 @@ def in_precision(inputs: Mapping[str, NDArray], precision: str) -> dict[str, NDA
 
 
 def golden_folder(given: Path | None = None) -> Path:
-    """The named folder, else `golden/` of the source tree, else `golden/` of the working folder."""
+    """The named folder or archive, else `golden/` of the source tree or the working folder, else an archive at hand.
+
+    An archive is unpacked into a temporary folder: see `archive`.
+    Raises: InputError without vectors, with the ways to get them.
+    """
     places = [given] if given else [Path(__file__).parents[4] / "golden", Path("golden")]
     for place in places:
         if (place / "VERSION").is_file():
             return place.resolve()  # the caller may change the working folder
-    raise InputError(f"{places[-1]}: no golden folder (no file VERSION); name it with --golden")
+    archive = given if given and given.is_file() else None if given else archive_at_hand()
+    if archive:
+        return unpacked(archive)
+    raise InputError(f"{places[-1]}: no golden folder (no file VERSION); {WAYS}")
 
 
 def read_golden(folder: Path, *, verify: bool = True) -> Golden:

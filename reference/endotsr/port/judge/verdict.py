@@ -101,6 +101,11 @@ class Report(msgspec.Struct, kw_only=True):
         """Whether the requested level is complete."""
         return self.level >= self.asked_level
 
+    @property
+    def accepted(self) -> bool:
+        """Whether no judged case is refused or missing, as asked of a part."""
+        return all(case.status in ("passed", "not ported") for case in self.cases)
+
 
 def judge(
     golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None, only: str = ""

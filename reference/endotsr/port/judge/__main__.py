@@ -1,0 +1,74 @@
+"""The judge as a program of its own: `python endotsr-golden.pyz run ...`. It needs NumPy and no other library.
+
+It has no search for the line of the definition that a port computes: `endotsr golden` of the package has.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from endotsr.errors import InputError
+from endotsr.port.judge.call import called
+from endotsr.port.judge.format import LEVELS
+from endotsr.port.judge.report import as_html, as_json, as_table
+from endotsr.port.judge.store import Golden, golden_folder, read_golden
+from endotsr.port.judge.verdict import Report, judge
+
+NO_SEARCH = "the line of the definition that your port computes is searched by `endotsr golden` of the package endotsr"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="endotsr-golden", description="Judge a port of the method.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    run = commands.add_parser("run", help="call a port's command and judge its outputs")
+    run.add_argument("--port", required=True, help="the command, with {requests} and {outputs} for the folders")
+    run.add_argument("--timeout", type=float, default=600.0, help="time limit of a call, seconds")
+    run.add_argument("--keep", type=Path, metavar="DIR", help="keep requests and outputs in this folder")
+    judged = commands.add_parser("judge", help="judge a folder of outputs")
+    judged.add_argument("outdir", type=Path, metavar="OUTDIR")
+    judged.add_argument("--again", type=Path, metavar="DIR", help="outputs of a second run, for level 5")
+    for command in (run, judged):
+        command.add_argument("--precision", choices=("float32", "float64"), default="float32")
+        command.add_argument("--level", type=int, choices=tuple(LEVELS), default=5)
+        command.add_argument("--golden", type=Path, metavar="DIR", help="folder or archive of the vectors")
+        command.add_argument("--only", default="", metavar="FAMILY[/CASE]", help="this part alone, without a claim")
+        command.add_argument("--json", type=Path, metavar="FILE", help="also write the report as JSON")
+        command.add_argument("--html", type=Path, metavar="FILE", help="also write the report as one page")
+        command.add_argument("--all", action="store_true", help="list all cases")
+    return parser
+
+
+def _judged(golden: Golden, options: argparse.Namespace, scratch: Path) -> tuple[Report, Path]:
+    asked = {"level": options.level, "only": options.only}
+    if options.command == "run":
+        root = options.keep or scratch
+        return called(golden, options.port, root, options.precision, timeout=options.timeout, **asked)
+    for folder in filter(None, (options.outdir, options.again)):
+        if not folder.is_dir():
+            raise InputError(f"{folder}: not a folder")
+    return judge(golden, options.outdir, options.precision, again=options.again, **asked), options.outdir
+
+
+def main(words: list[str]) -> int:
+    """The command: exit code 0 if the level is complete, 1 if it is not, 2 if it cannot be judged."""
+    options = _parser().parse_args(words)
+    try:
+        golden = read_golden(golden_folder(options.golden))
+        with tempfile.TemporaryDirectory() as scratch:
+            report, outputs = _judged(golden, options, Path(scratch))
+            if report.first_wrong:
+                report.notes.append(NO_SEARCH)
+            print(as_table(report, everything=options.all))
+            if options.json:
+                options.json.write_bytes(as_json(report))
+            if options.html:
+                options.html.write_text(as_html(report, golden, outputs), encoding="utf-8", newline="\n")
+    except (InputError, OSError) as error:
+        print(f"endotsr-golden: error: {error}", file=sys.stderr)
+        return 2
+    return 0 if (report.accepted if options.only else report.passed) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
