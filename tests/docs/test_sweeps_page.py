@@ -1,0 +1,89 @@
+"""The files of open questions: each is a sweep that can run, and the table says what its record holds."""
+
+import json
+
+import pytest
+from pages.full_size import sweeps
+
+from endotsr.errors import InputError
+
+FILES = {file.stem: file for file in sweeps.files()}
+
+
+def row(configuration, seed, psnr, **changes):
+    values = {"sequence": "clip", "split": "every_eighth", "configuration": configuration, "seed": seed}
+    metrics = {"psnr_full": psnr, "psnr_tissue": psnr - 2, "ssim_full": 0.9, "lpips": None}
+    return values | metrics | {"status": "finished", "arrays_sha256": {"images": "a"}} | changes
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_is_a_sweep_of_three_seeds_with_a_question(name):
+    spec, clips = sweeps.read(FILES[name])
+    assert sweeps.question(FILES[name]).count("?") >= 1
+    assert spec.seeds == (0, 1, 2) and set(clips) <= {"endonerf_pulling", "endonerf_cutting"}
+    assert all(len(c.name) < 40 for c in spec.configurations) and len(spec.configurations) >= 2
+
+
+def configurations(name):
+    return {c.name: c.config for c in sweeps.read(FILES[name])[0].configurations}
+
+
+def test_the_files_ask_what_they_say():
+    assert {c.loss.ssim_weight for c in configurations("similarity_weight").values()} == {0.0, 0.05, 0.1, 0.2}
+    weights = [c.loss.lambda_msp for name, c in configurations("matern_weight").items() if name != "base"]
+    assert weights == [0.0, 1.0, 1e2, 1e4, 1e6]
+    assert sweeps.read(FILES["blocks"])[0].splits == ("blocks 4", "blocks 8", "blocks 16")
+    assert sweeps.read(FILES["other_views"])[0].measures == ("right_view", "depth")
+    light = configurations("light")
+    assert light["A fixed"].model.appearance and not light["A fixed"].model.exposure
+    assert light["exposure fixed"].model.exposure and not light["exposure fixed"].model.appearance
+
+
+def test_frozen_geometry_leaves_the_rate_of_the_colour_residual_as_it_is():
+    light = configurations("light")
+    free, frozen = light["A fixed"].optimiser, light["A frozen"].optimiser
+    rate = lambda optimiser: optimiser.deformation * optimiser.appearance_factor
+    assert rate(frozen) == pytest.approx(rate(free)) and frozen.deformation < 1e-5 * free.deformation
+    assert (frozen.position, frozen.opacity, frozen.scale, frozen.rotation) == (0, 0, 0, 0)
+
+
+def test_the_table_is_what_the_records_say():
+    assert sweeps.fragments()["table"] in sweeps.PAGE.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "w.toml").write_text(
+        '# Does it matter?\nsequences = ["clip"]\nseeds = [0, 1, 2]\n[configurations.one]\n[configurations.two]\n'
+    )
+    monkeypatch.setattr(sweeps, "FOLDER", tmp_path)
+    return tmp_path
+
+
+def stored(folder, rows):
+    (folder / "results.json").write_text(json.dumps({"rows": rows}))
+    sweeps.store("w", folder / "results.json")
+
+
+def test_differences_are_paired_by_seed(folder):
+    """The same gain on every seed has no width; an open run is not stored, a later one replaces an earlier one."""
+    stored(
+        folder,
+        [row("one", s, 30.0 + s) for s in range(3)] + [row("two", 0, 1.0), {**row("two", 2, 9.9), "status": "open"}],
+    )
+    stored(folder, [row("two", s, 30.5 + s) for s in range(2)])
+    table = sweeps.fragments()["table"]
+    assert "| `w` | Does it matter? | 6 | 5 |" in table
+    assert "| one | 3 | 31.00 ± 2.48 | 29.00 ± 2.48 | 0.9000 ± 0.0000 | - |" in table
+    assert "| two, difference to one | 2 | +0.50 ± 0.00 | +0.50 ± 0.00 | +0.0000 ± 0.0000 | - |" in table
+
+
+def test_a_pair_of_different_frames_is_refused(folder):
+    stored(folder, [row("one", 0, 30.0), row("two", 0, 31.0, arrays_sha256={"images": "b"})])
+    with pytest.raises(InputError, match="two and one, seed 0: the runs of a pair must read the same frames"):
+        sweeps.fragments()
+
+
+def test_an_unknown_sweep_is_refused(folder):
+    with pytest.raises(InputError, match="use one of: w"):
+        sweeps.store("other", folder / "results.json")
