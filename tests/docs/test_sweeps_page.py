@@ -7,6 +7,7 @@ from pages.full_size import sweeps
 
 from endotsr.errors import InputError
 
+KEPT_BY_A_CHECKPOINT = ("deformation", "exposure", "pose_correction", "bases", "harmonics_degree", "frequencies")
 FILES = {file.stem: file for file in sweeps.files()}
 
 
@@ -24,6 +25,18 @@ def test_a_file_is_a_sweep_of_three_seeds_with_a_question(name):
     assert all(len(c.name) < 40 for c in spec.configurations) and len(spec.configurations) >= 2
 
 
+@pytest.mark.parametrize("name", FILES)
+def test_a_configuration_can_continue_from_its_start(name):
+    """A checkpoint holds no exposures, poses or other bases than those it was trained with."""
+    made = configurations(name)
+    for configuration in sweeps.read(FILES[name])[0].configurations:
+        if configuration.start:
+            began, goes_on = made[configuration.start.configuration], configuration.config
+            for key in KEPT_BY_A_CHECKPOINT:
+                assert getattr(began.model, key) == getattr(goes_on.model, key), (configuration.name, key)
+            assert configuration.start.iteration == goes_on.training.residual_activation and goes_on.density.until == 0
+
+
 def configurations(name):
     return {c.name: c.config for c in sweeps.read(FILES[name])[0].configurations}
 
@@ -35,12 +48,12 @@ def test_the_files_ask_what_they_say():
     assert sweeps.read(FILES["blocks"])[0].splits == ("blocks 4", "blocks 8", "blocks 16")
     assert sweeps.read(FILES["other_views"])[0].measures == ("right_view", "depth")
     light = configurations("light")
-    assert light["A fixed"].model.appearance and not light["A fixed"].model.exposure
-    assert light["exposure fixed"].model.exposure and not light["exposure fixed"].model.appearance
+    assert light["A"].model.appearance and not light["A"].model.exposure
+    assert light["exposure"].model.exposure and not light["exposure"].model.appearance
 
 
 def test_frozen_geometry_leaves_the_rate_of_the_colour_residual_as_it_is():
-    light = configurations("light")
+    light = configurations("frozen_geometry")
     free, frozen = light["A fixed"].optimiser, light["A frozen"].optimiser
     rate = lambda optimiser: optimiser.deformation * optimiser.appearance_factor
     assert rate(frozen) == pytest.approx(rate(free)) and frozen.deformation < 1e-5 * free.deformation
