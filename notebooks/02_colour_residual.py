@@ -242,8 +242,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. Two Gaussians have the same $A$, and one has twice the bound $\beta$. How do their colour changes compare for small
-#    and for large $x$?
+# 1. Two Gaussians have the same bound $\beta$, and one has twice the coefficients $A$. How do their colour changes compare
+#    for small and for large $x$?
 # 2. Write `appearance_forward` and `appearance_reverse` and let the golden cases judge them: `--only appearance`
 #    ({doc}`index`). The case `deep_saturation` refuses $1-\tanh^2x$ computed from a rounded $\tanh x$.
 # 3. The cell below answers this one. The **argument** $x$ of the residual has mean 0 over the training stamps, because

@@ -95,7 +95,7 @@ def _sine_cosine(phase: FloatArray) -> tuple[FloatArray, FloatArray]:
     quarter = np.rint(4.0 * turn)
     angle = 2.0 * np.pi * (turn - 0.25 * quarter)  # [-pi/4, pi/4]
     sine, cosine = np.sin(angle), np.cos(angle)
-    which = quarter.astype(np.int64) % 4
+    which = quarter.astype(np.intp) % 4  # np.choose refuses a wider index, and intp has 32 bits on some machines
     return (
         np.choose(which, [sine, cosine, -sine, -cosine]),
         np.choose(which, [cosine, -sine, -cosine, sine]),

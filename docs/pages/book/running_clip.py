@@ -1,0 +1,94 @@
+"""The running clip of the book: every seed of the preset `quick` on the simulated clip at full size, by held-out frame.
+
+    endotsr simulate pulling --out CLIP
+    endotsr train CLIP --preset quick --seed SEED --out RUN      once for each seed
+    python docs/make.py book.running_clip measure RUN ...        to docs/results/running_clip.json
+    python docs/make.py book.running_clip                        rewrite the table of chapter 14
+
+The file has numbers alone.
+"""
+
+import re
+import sys
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import endotsr
+from endotsr.errors import InputError
+from endotsr.results.evaluation.baselines import unit_image
+from endotsr.results.evaluation.metrics import psnr_tissue
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from pages.full_size.page import noise_of, predictions
+from pages.full_size.text import LABELS, PREDICTIONS
+from pages.store.marks import read_json
+
+FILE = Path(__file__).parents[2] / "results" / "running_clip.json"
+CHAPTER = Path(__file__).parents[3] / "notebooks" / "14_full_sequence.py"
+MARKED = re.compile(r"^(# <!-- running_clip:start -->)$.*?^(# <!-- running_clip:end -->)$", re.MULTILINE | re.DOTALL)
+COMMAND = "docs/pages/book/running_clip.py measure RUN ..."
+
+
+def of_run(folder: Path) -> dict[str, Any]:
+    """PSNR over tissue of every held-out frame, dB, for the model and every prediction without one."""
+    run = endotsr.open_run(folder)
+    if not isinstance(run, endotsr.Run):
+        raise InputError(f"{folder}: a recording in windows; use one run")
+    sequence = run.sequence
+    noise_of(Path(run.record["input"]["source"]), run.config.sequence.scale)  # refuses a clip of a patient
+    predict, frames = predictions(run), [int(k) for k in sequence.test_index]
+    found = {
+        name: [float(psnr_tissue(make(k), unit_image(sequence, k), sequence.masks[k])) for k in frames]
+        for name, make in predict.items()
+    }
+    kept = {key: run.record[key] for key in ("seed", "iterations_done", "threads", "machine")}
+    size = {"width": sequence.width, "height": sequence.height, "frame_count": sequence.count}
+    return (
+        kept | size | {"gaussians": [entry["gaussians"] for entry in run.log[::100]], "frames": frames, "psnr": found}
+    )
+
+
+def means(record: dict[str, Any]) -> dict[str, NDArray]:
+    """Mean over the held-out frames of every prediction, dB, one number for each seed."""
+    return {
+        name: np.array([np.mean(run["psnr"][name]) for run in record["runs"]]) for name in record["runs"][0]["psnr"]
+    }
+
+
+def table(record: dict[str, Any]) -> str:
+    """Mean of every prediction, its range over the seeds, and its distance from the blend in every seed."""
+    found, rows = means(record), []
+    for name in PREDICTIONS:
+        values, above = found[name], found[name] - found["two_neighbours"]
+        spread = f"{values.min():.2f} to {values.max():.2f}" if np.ptp(values) > 0 else "-"
+        rows.append([LABELS[name], f"{values.mean():.2f}", spread, f"{above.min():+.2f} to {above.max():+.2f}"])
+    run = record["runs"][0]
+    about = f"{run['iterations_done']} iterations, {run['gaussians'][-1]} Gaussians; {run['machine']['processor']}"
+    return (
+        markdown(("Prediction", "dB", f"{len(record['runs'])} seeds", "above the blend, dB"), rows)
+        + f"\n\nPreset `{record['preset']}`, {about}, {record['date']}."
+    )
+
+
+def with_table(text: str, made: str) -> str:
+    """The notebook with the table between its marks."""
+    lines = "\n".join(f"# {line}".rstrip() for line in made.splitlines())
+    return MARKED.sub(lambda match: f"{match[1]}\n{lines}\n{match[2]}", text)
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    try:
+        if words[:1] == ["measure"] and len(words) > 1:
+            runs = sorted((of_run(Path(folder)) for folder in words[1:]), key=lambda run: run["seed"])
+            write_json(FILE, {"date": date.today().isoformat(), "preset": "quick", "runs": runs})
+        elif words:
+            sys.exit(__doc__)
+        text, made = CHAPTER.read_text(encoding="utf-8"), table(read_json(FILE, COMMAND))
+        CHAPTER.write_text(with_table(text, made), encoding="utf-8", newline="\n")
+    except InputError as error:
+        sys.exit(f"error: {error}")
