@@ -246,9 +246,27 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(6.5) The footprint.** In float32 this form loses digits: $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer therefore goes
-# from the gradients of the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$.
-# This is the same chain rule, with $e_k=t_{0k}-m\,t_{1k}$ written so that nothing cancels:
+# **(6.5) The footprint.** $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer therefore goes from the
+# gradients of the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$, in four
+# steps.
+#
+# *The entries.* With the rows $\mathbf t_0,\mathbf t_1$ of $T$: $a=\sum_kS_k^2t_{0k}^2+\varepsilon$,
+# $b=\sum_kS_k^2t_{0k}t_{1k}$ and $c=\sum_kS_k^2t_{1k}^2+\varepsilon$. So $\partial(a,b,c)/\partial
+# S_k=2S_k\,(t_{0k}^2,\ t_{0k}t_{1k},\ t_{1k}^2)$, $\partial(a,b)/\partial t_{0k}=S_k^2\,(2t_{0k},\ t_{1k})$ and
+# $\partial(b,c)/\partial t_{1k}=S_k^2\,(t_{0k},\ 2t_{1k})$.
+#
+# *The semi-axes.* Insert $g_a=-A^2g_A$, $g_b=2A^2m\,g_A+r\,g_m$ and $g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r$ of (8.8). The
+# terms with $g_A$ are $-A^2(t_{0k}^2-2m\,t_{0k}t_{1k}+m^2t_{1k}^2)=-A^2e_k^2$ with $e_k=t_{0k}-m\,t_{1k}$. Those with
+# $g_m$ are $r\,(t_{0k}t_{1k}-m\,t_{1k}^2)=r\,t_{1k}e_k$. The square of a small $e_k$ has taken the place of three large
+# terms.
+#
+# *The entries of $T$.* In the same way $2g_at_{0k}+g_bt_{1k}=-2A^2g_A\,e_k+r\,g_m\,t_{1k}$, and
+# $g_bt_{0k}+2g_ct_{1k}=2A^2m\,g_A\,e_k+r\,g_m\,(t_{0k}-2m\,t_{1k})-2r^2g_r\,t_{1k}$, where
+# $t_{0k}-2m\,t_{1k}=e_k-m\,t_{1k}$.
+#
+# *$e_k$ itself.* $t_{0k}-m\,t_{1k}$ is a difference too. With $m=b/c$ it is $r\,(c\,t_{0k}-b\,t_{1k})$. Insert $b$ and
+# $c$: $\varepsilon t_{0k}$ remains of the low-pass, and the sum over $l$ has the terms
+# $S_l^2\,(t_{1l}^2t_{0k}-t_{0l}t_{1l}t_{1k})=S_l^2\,t_{1l}\,(t_{0k}t_{1l}-t_{1k}t_{0l})$. The term $l=k$ is exactly 0.
 #
 # $$
 # \begin{aligned}
