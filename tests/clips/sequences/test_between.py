@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import dense_flow
+from endotsr.clips.opencv import dense_flow, warp_bilinear
 from endotsr.clips.sequences.between import Flows, camera_between, flows_between, frame_between, motion_between
+from endotsr.clips.sequences.between_kernels import STEPS, WHOLE, moved_priors
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.splatting.camera import Camera, camera_centre
 
@@ -171,3 +172,32 @@ def test_the_flow_of_a_translation_is_found():
     sequence = two_frames(3.0)
     flow = dense_flow(sequence.images[0], sequence.images[1])
     assert np.median(np.abs(flow[:, 16:-16, 16:-16] - np.array([3.0, 0.0])[:, None, None])) < 0.5
+
+
+def bits(array):
+    return np.ascontiguousarray(array).view(np.uint8)
+
+
+@pytest.mark.parametrize("fraction", [0.25, 0.5, 5 / 6])
+def test_the_compiled_warps_have_the_bits_of_the_numpy_ones(fraction):
+    rng = np.random.default_rng(3)
+    flows = Flows(*rng.normal(0, 9, (2, 2, 31, 47)).astype(np.float32))  # many positions are outside
+    a, b = np.float32(fraction), np.float32(1.0 - fraction)
+    from_earlier, from_later = flows.forward, -flows.backward
+    for _ in range(STEPS):
+        from_earlier = warp_bilinear(flows.forward, -a * from_earlier)
+        from_later = -warp_bilinear(flows.backward, b * from_later)
+    field = motion_between(flows, fraction)
+    assert np.array_equal(bits(field), bits(b * from_earlier + a * from_later))
+    tissue, depth = rng.random((2, 31, 47)) < 0.9, rng.uniform(1, 9, (2, 31, 47)).astype(np.float32)
+    depth[rng.random(depth.shape) < 0.1] = 0
+    small = field / 20  # so that whole neighbourhoods occur
+    for given in (field, small):
+        factors = np.array([-a, 1 - a], np.float32)
+        found = moved_priors(tissue, depth, given, factors)
+        for k in range(2):
+            seen = warp_bilinear(tissue[k].astype(np.float32), factors[k] * given) > WHOLE
+            known = warp_bilinear((tissue[k] & (depth[k] > 0)).astype(np.float32), factors[k] * given) > WHOLE
+            assert np.array_equal(found.seen[k], seen) and np.array_equal(found.known[k], known)
+            assert np.array_equal(bits(found.depth[k]), bits(warp_bilinear(depth[k], factors[k] * given)))
+    assert found.known.any() and not found.known.all()

@@ -114,6 +114,7 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
     """Targets, losses and optimiser; with `everything` also the terms that the schedule activates later."""
     import numpy as np
 
+    from endotsr.clips.sequences.between import Flows, motion_between, moved_priors
     from endotsr.method.losses.masked_ssim import stored_target
     from endotsr.method.splatting.render import RenderOut
     from endotsr.training.fitting.objective import LossWeights, image_loss
@@ -126,6 +127,9 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
     image_loss(seen, constants.targets_of(0), weights, config.loss)
     if config.training.bridge_fraction > 0:  # bridged images are stored in finer steps
         stored_target(np.zeros(frame.image.shape, np.uint16), 1, frame.mask, config.training.precision)
+        flow, pair = np.zeros((2, *frame.mask.shape), np.float32), [0, 0]
+        field = motion_between(Flows(flow, flow), 0.5)
+        moved_priors(constants.sequence.masks[pair], constants.sequence.depth[pair], field, field[:, 0, 0])
 
 
 def rehearse_optimiser(constants: Any, state: Any) -> None:
