@@ -150,9 +150,9 @@ def rig_seeds() -> list[bytes]:
 
 
 def read_rig(path: Path) -> object:
-    from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
+    from endotsr.clips.sequences.calibrations import calibrated
 
-    return intrinsics_or_stereo(path, 64, 48)
+    return calibrated(path, 64, 48)
 
 
 def trajectory_seeds() -> list[bytes]:

@@ -11,6 +11,7 @@ from endotsr.errors import InputError
 from endotsr.untrusted.files import LARGEST_TEXT, MOST_PIXELS, read_text
 from endotsr.untrusted.names import plain_line, shown
 
+Keys = dict[str, Any]  # of a file, whose values are not checked yet
 MOST_DIGITS = 60  # of an integer: the state of a random generator has 39
 Count = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
 Side = Annotated[int, msgspec.Meta(ge=1, le=MOST_PIXELS)]
@@ -21,7 +22,7 @@ Text = Annotated[str, msgspec.Meta(max_length=1 << 16, pattern="^[^\\x00]*$")]
 Structure = TypeVar("Structure")
 
 
-def read_json(path: Path, largest: int = LARGEST_TEXT) -> dict[str, Any]:
+def read_json(path: Path, largest: int = LARGEST_TEXT) -> Keys:
     """The JSON object of a file. Raises InputError for an unreadable file and for any other content, including NaN."""
     data = parsed(read_text(path, largest), str(path))
     if not isinstance(data, dict):

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
+from endotsr.untrusted.json import Keys
 
 LARGEST_FILE = 1 << 20  # bytes
 DIRECTIVE = "%YAML"  # written by OpenCV with a colon, which is not YAML
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping of a file. An OpenCV matrix becomes a mapping with rows, cols and data.
+def read_yaml(path: Path) -> Keys:
+    """The mapping of a file, whose documents are equal. An OpenCV matrix becomes a mapping with rows, cols and data.
 
     Raises:  InputError if the file cannot be read or is not a mapping. Tags never create objects.
     """
@@ -28,9 +29,12 @@ def read_yaml(path: Path) -> dict[str, Any]:
     if text.startswith(DIRECTIVE):
         text = text.partition("\n")[2]
     try:
-        found = yaml.load(text, Loader)
+        documents = [document for document in yaml.load_all(text, Loader) if document is not None]
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise InputError(f"{path}: not YAML: {str(error).splitlines()[0] if str(error) else 'too deep'}") from None
+    found = documents[0] if documents and documents.count(documents[0]) == len(documents) else None
+    if len(documents) > 1 and found is None:
+        raise InputError(f"{path}: {len(documents)} documents that differ; use a file with one")
     if not isinstance(found, dict):
         raise InputError(f"{path}: holds no keys; allowed: YAML of the form `key: value`")
     return found

@@ -8,7 +8,7 @@ from public_layouts import K, stereo_yaml
 from raw_sources import ini
 
 from endotsr.clips.sequences.calibration_formats import FORMATS
-from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
+from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.errors import InputError
 
 SIZE = (128, 96)
@@ -46,23 +46,23 @@ def check_intrinsics(intrinsics, distortion):
 def test_one_camera_of_opencv(tmp_path):
     stereo_yaml(tmp_path / "a.yaml", image_width=128, image_height=96, camera_matrix=K,
                 distortion_coefficients=np.array([BENT]))  # fmt: skip
-    intrinsics, calibration = intrinsics_or_stereo(tmp_path / "a.yaml", *SIZE)
+    intrinsics, calibration = calibrated(tmp_path / "a.yaml", *SIZE)[:2]
     assert calibration is None
     check_intrinsics(intrinsics, BENT)
 
 
 def test_pictures_of_half_the_size_scale_a_calibration_that_says_its_size(tmp_path):
     stereo_yaml(tmp_path / "a.yaml", image_width=128, image_height=96, camera_matrix=K)
-    intrinsics = intrinsics_or_stereo(tmp_path / "a.yaml", 64, 48)[0]
+    intrinsics = calibrated(tmp_path / "a.yaml", 64, 48).intrinsics
     assert intrinsics[:4] == (50.0, 50.5, 32.0, 24.0)
     with pytest.raises(InputError, match="the calibration is of 128x96"):
-        intrinsics_or_stereo(tmp_path / "a.yaml", 64, 64)
+        calibrated(tmp_path / "a.yaml", 64, 64)
 
 
 def test_a_pair_of_opencv(tmp_path):
     bent = np.array([BENT])
     stereo_yaml(tmp_path / "a.yaml", M1=K, D1=bent, M2=K, D2=bent, R=TURN, T=SHIFT.reshape(3, 1))
-    intrinsics, calibration = intrinsics_or_stereo(tmp_path / "a.yaml", *SIZE)
+    intrinsics, calibration = calibrated(tmp_path / "a.yaml", *SIZE)[:2]
     assert intrinsics is None
     check_intrinsics(calibration.left, BENT)
     np.testing.assert_allclose(calibration.rotation, TURN)
@@ -72,13 +72,13 @@ def test_a_pair_of_opencv(tmp_path):
 def test_one_camera_of_ros_and_of_kalibr(tmp_path):
     (tmp_path / "ros.yaml").write_text(ros(K))
     (tmp_path / "kalibr.yaml").write_text(kalibr(pair=False))
-    check_intrinsics(intrinsics_or_stereo(tmp_path / "ros.yaml", *SIZE)[0], BENT)
-    check_intrinsics(intrinsics_or_stereo(tmp_path / "kalibr.yaml", *SIZE)[0], BENT[:4])
+    check_intrinsics(calibrated(tmp_path / "ros.yaml", *SIZE).intrinsics, BENT)
+    check_intrinsics(calibrated(tmp_path / "kalibr.yaml", *SIZE).intrinsics, BENT[:4])
 
 
 def test_a_pair_of_kalibr_is_in_metres(tmp_path):
     (tmp_path / "a.yaml").write_text(kalibr())
-    calibration = intrinsics_or_stereo(tmp_path / "a.yaml", *SIZE)[1]
+    calibration = calibrated(tmp_path / "a.yaml", *SIZE).calibration
     np.testing.assert_allclose(calibration.translation, SHIFT)
     np.testing.assert_allclose(calibration.rotation, TURN)
 
@@ -91,7 +91,7 @@ def test_a_pair_of_ros_is_that_of_stereo_rectify(tmp_path):
         changes = {"rectification_matrix": {"data": turn.ravel().tolist()},
                    "projection_matrix": {"data": projection.ravel().tolist()}}  # fmt: skip
         (tmp_path / f"{name}.yaml").write_text(ros(K, none, **changes))
-    calibration = intrinsics_or_stereo(tmp_path, *SIZE)[1]
+    calibration = calibrated(tmp_path, *SIZE).calibration
     np.testing.assert_allclose(calibration.rotation, TURN, atol=1e-9)
     np.testing.assert_allclose(calibration.translation, SHIFT, atol=1e-9)
 
@@ -100,12 +100,12 @@ def test_a_pair_of_ros_is_that_of_stereo_rectify(tmp_path):
                                   "100 0 63.5 0\n0 101 47.5 0\n0 0 1 0\n"])  # fmt: skip
 def test_a_matrix_as_text(text, tmp_path):
     (tmp_path / "K.txt").write_text(text)
-    check_intrinsics(intrinsics_or_stereo(tmp_path / "K.txt", *SIZE)[0], ())
+    check_intrinsics(calibrated(tmp_path / "K.txt", *SIZE).intrinsics, ())
 
 
 def test_the_ini_of_stereomis_is_one_of_them(tmp_path):
     (tmp_path / "a.ini").write_text(ini())
-    intrinsics, calibration = intrinsics_or_stereo(tmp_path / "a.ini", 64, 48)
+    intrinsics, calibration = calibrated(tmp_path / "a.ini", 64, 48)[:2]
     assert intrinsics is None and calibration.left.cx == 31.5 and calibration.translation.tolist() == [-4.0, 0.0, 0.0]
 
 
@@ -124,7 +124,7 @@ REFUSED = {
     "could not determine a constructor": ("a.yaml", "camera_matrix: !!python/object/apply:os.getcwd []"),
     "4 words": ("a.txt", "1 2 3 4"),
     "allowed: rows": ("a.txt", "100 0 63 0 100 47 0 1 1"),
-    "allowed: FILE.ini": ("a.xml", "<x/>"),
+    "allowed: FILE.ini": ("a.dat", "<x/>"),
 }  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def test_what_is_no_calibration_is_refused(said, tmp_path):
     name, text = REFUSED[said]
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=name) as caught:
-        intrinsics_or_stereo(tmp_path / name, *SIZE)
+        calibrated(tmp_path / name, *SIZE)
     assert said in str(caught.value)
 
 

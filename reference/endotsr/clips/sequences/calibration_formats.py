@@ -8,21 +8,26 @@ OpenCV's pixel coordinates, with pixel centres at integers. A pair satisfies x_r
 import configparser
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.sequences.files import shortened
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
+from endotsr.untrusted.json import Keys
+from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.yaml import matrix, read_yaml
 
-Keys = dict[str, Any]  # of a YAML file; empty for another file
 HALF_A_PIXEL = "its pixel centres are at integers, as in OpenCV: half a pixel was added to cx and cy"
 LARGEST_MATRIX, LARGEST_INI = 1 << 16, 1 << 20  # bytes
 COEFFICIENTS, FEWEST = 8, (8, 5, 4)  # kc_0 .. kc_7 of an ini file; the numbers of them that OpenCV allows
 KALIBR_MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radtan", "none")}
 ROS_MODELS, ROS_MARK = ("plumb_bob", "rational_polynomial"), "projection_matrix"
+ECHO = {"k": "camera_matrix", "d": "distortion_coefficients", "r": "rectification_matrix", "p": ROS_MARK,
+        "width": "image_width", "height": "image_height"}  # fmt: skip
 # Key names are free in OpenCV's YAML: these are the names of OpenCV's samples, SCARED and common tools.
 ONE = (("camera_matrix", "distortion_coefficients"), ("Camera_Matrix", "Distortion_Coefficients"), ("K", "D"),
        ("cameraMatrix", "distCoeffs"))  # fmt: skip
@@ -46,6 +51,8 @@ class StoredCalibration(NamedTuple):
     right: StoredIntrinsics | None = None
     rotation: FloatArray = np.eye(3)
     translation: FloatArray = np.zeros(3)  # millimetres
+    baseline: float | None = None  # of an already rectified pair, millimetres
+    notes: tuple[str, ...] = ()
 
 
 class Format(NamedTuple):
@@ -76,6 +83,7 @@ def read_stereo_ini(path: Path, keys: Keys) -> StoredCalibration | None:
     if path.suffix.lower() != ".ini":
         return None
     parser = configparser.ConfigParser(interpolation=None)
+    parser.optionxform = str  # type: ignore[assignment, method-assign]
     text = read_text(path, LARGEST_INI)
     try:
         parser.read_string(text)
@@ -84,10 +92,13 @@ def read_stereo_ini(path: Path, keys: Keys) -> StoredCalibration | None:
     for section in ("StereoLeft", "StereoRight"):
         if section not in parser:
             raise InputError(f"{path}: section [{section}] is missing; allowed: StereoLeft and StereoRight")
-    left, right = (_ini_camera(parser, section, path) for section in ("StereoLeft", "StereoRight"))
+    sections = ("StereoLeft", "StereoRight")
+    notes = [note for name in sections for note in INI.noted(dict(parser[name]), f"{path}: [{name}]")]
+    left, right = (_ini_camera(parser, section, path) for section in sections)
     rotation = [_ini_number(parser, "StereoRight", f"R_{k}", path) for k in range(9)]
     translation = [_ini_number(parser, "StereoRight", f"T_{k}", path) for k in range(3)]
-    return StoredCalibration(left, right, np.array(rotation).reshape(3, 3), np.array(translation))
+    turn = np.array(rotation).reshape(3, 3)
+    return StoredCalibration(left, right, turn, np.array(translation), notes=tuple(notes))
 
 
 def _ini_camera(parser: configparser.ConfigParser, section: str, path: Path) -> StoredIntrinsics:
@@ -114,8 +125,26 @@ def _ini_number(parser: configparser.ConfigParser, section: str, key: str, path:
 
 
 def read_matrix_text(path: Path, keys: Keys) -> StoredCalibration | None:
-    """One camera without distortion, from a text file. Raises InputError as `read_matrix`."""
-    return StoredCalibration(StoredIntrinsics(read_matrix(path))) if path.suffix.lower() == ".txt" else None
+    """One camera without distortion, from a text file. Raises InputError as `read_matrix`.
+
+    Nine numbers and one more: the second line is the baseline of a rectified pair in metres (FoundationStereo).
+    """
+    if path.suffix.lower() != ".txt":
+        return None
+    lines = [line for line in read_text(path, LARGEST_MATRIX).splitlines() if line.strip()]
+    if len(lines) == 2 and len(lines[0].split()) == 9 and len(lines[1].split()) == 1:
+        numbers = matrix([_number(word) for word in [*lines[0].split(), lines[1]]], f"{path}", (10,))
+        note = f"{path.name}: second line: baseline of the rectified pair, {numbers[9]:g} m"
+        found = StoredIntrinsics(_checked_matrix(numbers[:9].reshape(3, 3), path))
+        return StoredCalibration(found, baseline=1000.0 * float(numbers[9]), notes=(note,))
+    return StoredCalibration(StoredIntrinsics(read_matrix(path)))
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return float("nan")
 
 
 def read_matrix(path: Path) -> FloatArray:
@@ -130,9 +159,14 @@ def read_matrix(path: Path) -> FloatArray:
     rows = numbers.reshape(3, -1)
     if rows.shape[1] == 4 and rows[:, 3].any():
         raise InputError(f"{path}: the fourth column is not 0: a projection of another camera than the left one")
-    if (rows[2, :3] != (0, 0, 1)).any() or rows[1, 0] != 0:
+    return _checked_matrix(rows[:, :3], path)
+
+
+def _checked_matrix(rows: FloatArray, path: Path) -> FloatArray:
+    """K (3, 3). Raises InputError unless it has the zeros of a camera matrix."""
+    if (rows[2] != (0, 0, 1)).any() or rows[1, 0] != 0:
         raise InputError(f"{path}: allowed: rows `fx 0 cx`, `0 fy cy`, `0 0 1`")
-    return rows[:, :3]
+    return rows
 
 
 def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
@@ -143,10 +177,14 @@ def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
     if not isinstance(keys.get("cam0"), dict):
         return None
     left = _kalibr_camera(path, keys["cam0"], "cam0")
+    notes = [note for name in ("cam0", "cam1") for note in KALIBR.noted(keys.get(name) or {}, f"{path}: {name}")]
+    if more := sorted(set(keys) - {"cam0", "cam1"}):
+        notes.append(f"{path}: not used: {shortened([plain_line(name) for name in more])}; a pair has cam0 and cam1")
     if not isinstance(keys.get("cam1"), dict):
-        return StoredCalibration(left)
+        return StoredCalibration(left, notes=tuple(notes))
     motion = matrix(keys["cam1"].get("T_cn_cnm1"), f"{path}: cam1: T_cn_cnm1", (4, 4))
-    return StoredCalibration(left, _kalibr_camera(path, keys["cam1"], "cam1"), motion[:3, :3], 1000.0 * motion[:3, 3])
+    right = _kalibr_camera(path, keys["cam1"], "cam1")
+    return StoredCalibration(left, right, motion[:3, :3], 1000.0 * motion[:3, 3], notes=tuple(notes))
 
 
 def _kalibr_camera(path: Path, keys: Keys, name: str) -> StoredIntrinsics:
@@ -172,11 +210,12 @@ def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
     Raises:  InputError for another distortion model, or a pair without a baseline.
     """
     if not path.is_dir():
-        return StoredCalibration(_ros_camera(path, keys)) if ROS_MARK in keys else None
+        keys, notes = _ros_keys(keys, path)
+        return StoredCalibration(_ros_camera(path, keys), notes=tuple(notes)) if ROS_MARK in keys else None
     files = [path / f"{side}.yaml" for side in ("left", "right")]
     if not all(file.is_file() for file in files):
         return None
-    left, right = (read_yaml(file) for file in files)
+    (left, notes), (right, more) = (_ros_keys(read_yaml(file), file) for file in files)
     turns = [matrix(k.get("rectification_matrix"), f"{f}: rectification_matrix", (3, 3))
              for k, f in zip((left, right), files)]  # fmt: skip
     projection = matrix(right.get(ROS_MARK), f"{files[1]}: {ROS_MARK}", (3, 4))
@@ -184,7 +223,19 @@ def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
         raise InputError(f"{files[1]}: {ROS_MARK}: Tx = {projection[0, 3]:g}; allowed: below 0, -fx times the baseline")
     across = np.array([1000.0 * projection[0, 3] / projection[0, 0], 0.0, 0.0])
     cameras = _ros_camera(files[0], left), _ros_camera(files[1], right)
-    return StoredCalibration(*cameras, turns[1].T @ turns[0], turns[1].T @ across)
+    return StoredCalibration(*cameras, turns[1].T @ turns[0], turns[1].T @ across, notes=(*notes, *more))
+
+
+def _ros_keys(keys: Keys, path: Path) -> tuple[Keys, list[str]]:
+    """The keys of a ROS file under the names of its form on disk, and notes on unknown ones; other keys unchanged.
+
+    `rostopic echo` prints K, D, R, P, width and height; ROS 2 spells k, d, r, p.
+    """
+    echoed = "distortion_model" in keys and ("K" in keys or "k" in keys)
+    if not echoed and ROS_MARK not in keys:
+        return keys, []
+    found = {ECHO.get(name.lower() if len(name) == 1 else name, name): value for name, value in keys.items()}
+    return found, ROS.noted(keys, path)
 
 
 def _ros_camera(path: Path, keys: Keys) -> StoredIntrinsics:
@@ -204,7 +255,9 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
 
     Raises:  InputError for a pair without R or T.
     """
-    size = _opencv_size(keys)
+    size, notes = _opencv_size(keys), ()
+    if any(name in keys for names in (*ONE, *PAIRS) for name in names[:1]):
+        notes = tuple(OPENCV.noted(keys, path))
     for left, left_distortion, right, right_distortion in PAIRS:
         if left in keys and right in keys:
             for name in ("R", "T"):
@@ -215,9 +268,10 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
                 _opencv_camera(path, keys, right, right_distortion, size),
                 matrix(keys["R"], f"{path}: R", (3, 3)),
                 matrix(keys["T"], f"{path}: T", (3,)),
+                notes=notes,
             )
     one = next((names for names in ONE if names[0] in keys), None)
-    return StoredCalibration(_opencv_camera(path, keys, *one, size)) if one else None
+    return StoredCalibration(_opencv_camera(path, keys, *one, size), notes=notes) if one else None
 
 
 def _opencv_camera(
@@ -237,8 +291,8 @@ def _opencv_size(keys: Keys) -> tuple[int, int] | None:
 
 FORMATS = (  # in the order in which they are tried
     Format("FILE.ini with StereoLeft and StereoRight, millimetres", read_stereo_ini),
-    Format("FILE.txt with a camera matrix K of 3x3 numbers", read_matrix_text),
+    Format("FILE.txt with a camera matrix K of 3x3 numbers, and a baseline in metres", read_matrix_text),
     Format("camchain.yaml of Kalibr (pinhole, radtan), metres", read_kalibr),
     Format("camera_info of ROS, FILE.yaml or a folder with left.yaml and right.yaml, metres", read_ros),
-    Format("FILE.yaml of OpenCV (camera_matrix, or M1 D1 M2 D2 R T in millimetres)", read_opencv),
+    Format("FILE.yaml, .xml or .json of OpenCV (camera_matrix, or M1 D1 M2 D2 R T in millimetres)", read_opencv),
 )

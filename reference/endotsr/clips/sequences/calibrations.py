@@ -4,12 +4,15 @@ OpenCV's pixel centres are at integers; half a pixel is added to cx and cy, beca
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from endotsr.clips.sequences.calibration_formats import FORMATS, StoredCalibration, StoredIntrinsics
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration, checked_rotation, intrinsics_of_matrix
 from endotsr.errors import InputError
+from endotsr.untrusted.json import read_json
+from endotsr.untrusted.storage import read_storage
 from endotsr.untrusted.yaml import read_yaml
 
 
@@ -18,7 +21,8 @@ def read_calibration(path: Path) -> StoredCalibration:
 
     Raises:  InputError naming the file, the key and what is allowed.
     """
-    keys = read_yaml(path) if path.suffix.lower() in (".yaml", ".yml") else {}
+    read = {".yaml": read_yaml, ".yml": read_yaml, ".json": read_json, ".xml": read_storage}.get(path.suffix.lower())
+    keys = read(path) if read else {}
     for entry in FORMATS:
         found = entry.read(path, keys)
         if found is not None:
@@ -27,8 +31,17 @@ def read_calibration(path: Path) -> StoredCalibration:
     raise InputError(f"{path}: no calibration that is known here; allowed: {known}")
 
 
-def intrinsics_or_stereo(path: Path, width: int, height: int) -> tuple[Intrinsics | None, StereoCalibration | None]:
-    """The intrinsics, or the calibration of a pair, for pictures of this size. Proportional sizes are scaled.
+class StatedCamera(NamedTuple):
+    """What a user states about the camera of a source; None for the rest."""
+
+    intrinsics: Intrinsics | None = None
+    calibration: StereoCalibration | None = None
+    baseline: float | None = None  # of an already rectified pair, millimetres
+    notes: tuple[str, ...] = ()
+
+
+def calibrated(path: Path, width: int, height: int) -> StatedCamera:
+    """The camera or the pair of a file, for pictures of this size. Proportional sizes are scaled.
 
     Raises:  InputError naming the file, the key and what is allowed.
     """
@@ -40,14 +53,14 @@ def intrinsics_or_stereo(path: Path, width: int, height: int) -> tuple[Intrinsic
         whole = intrinsics_of_matrix(stored.matrix, *(stored.size or (width, height)), distortion, where=where)
         return fitted_intrinsics(whole, width, height, where)
 
+    left = intrinsics(found.left, "left")
     if found.right is None:
-        return intrinsics(found.left, "left"), None
+        return StatedCamera(left, baseline=found.baseline, notes=found.notes)
     rotation = checked_rotation(found.rotation, f"{path}: rotation between the cameras")
     if not np.isfinite(found.translation).all() or not found.translation.any():
         raise InputError(f"{path}: both cameras are in one place; allowed: a translation between them")
-    return None, StereoCalibration(
-        intrinsics(found.left, "left"), intrinsics(found.right, "right"), rotation, found.translation
-    )
+    pair = StereoCalibration(left, intrinsics(found.right, "right"), rotation, found.translation)
+    return StatedCamera(calibration=pair, notes=found.notes)
 
 
 def fitted_intrinsics(intrinsics: Intrinsics, width: int, height: int, where: object) -> Intrinsics:

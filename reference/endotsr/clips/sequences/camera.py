@@ -13,9 +13,14 @@ from endotsr.method.kernels.arrays import FloatArray
 
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
+SPREAD = 0.003  # of the focal length and the picture: 1 px at the border of a picture of 640 px
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
-# x right, y down, z forward; and x right, y up, z backward. x_opencv = AXES[name] @ x_name, for each camera.
-AXES = {"opencv": np.eye(3), "opengl": np.diag([1.0, -1.0, -1.0])}
+# x right, y down, z forward; x right, y up, z backward; x down, y right, z backward. x_opencv = AXES[name] @ x_name.
+AXES = {
+    "opencv": np.eye(3),
+    "opengl": np.diag([1.0, -1.0, -1.0]),
+    "llff": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+}
 
 
 def scene_factor(unit: str) -> float:
@@ -145,3 +150,26 @@ def opencv_matrix(intrinsics: Intrinsics) -> FloatArray:
     """The 3x3 matrix in OpenCV's convention (pixel centres at integers)."""
     fx, fy, cx, cy, *_ = intrinsics
     return np.array([[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]])
+
+
+def shared_intrinsics(cameras: list[Intrinsics], where: object, notes: list[str]) -> Intrinsics:
+    """The median of the cameras of single pictures, which a reconstruction estimates one by one; noted if they differ.
+
+    Raises:  InputError for several picture sizes, or focal lengths and principal points that differ by more than
+             `SPREAD`.
+    """
+    if len(set(cameras)) == 1:
+        return cameras[0]
+    if len({(c.width, c.height, len(c.distortion)) for c in cameras}) > 1:
+        raise InputError(f"{where}: {len(set(cameras))} cameras of different kinds or sizes; use one for all frames")
+    rows = np.array([[*c[:4], *c.distortion] for c in cameras])
+    middle = np.median(rows, axis=0)
+    apart = np.abs(rows[:, :4] - middle[:4]).max(axis=0) / (middle[0], middle[1], cameras[0].width, cameras[0].height)
+    if apart.max() > SPREAD or np.abs(rows[:, 4:] - middle[4:]).max(initial=0.0) > SPREAD:
+        raise InputError(
+            f"{where}: the cameras of the pictures differ by {apart.max():.2%}, more than {SPREAD:.1%}; use one camera"
+            " for all frames (COLMAP: --ImageReader.single_camera 1)"
+        )
+    notes.append(f"one camera per picture, which differ by {apart.max():.2%} at most: their median is used")
+    fx, fy, cx, cy, *bent = middle.tolist()
+    return Intrinsics(fx, fy, cx, cy, cameras[0].width, cameras[0].height, tuple(bent))

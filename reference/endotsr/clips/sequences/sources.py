@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.clips.sequences.calibrations import intrinsics_or_stereo
+from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import (
     ARBITRARY,
     CameraPose,
     Intrinsics,
-    StereoCalibration,
     checked_intrinsics,
     scene_factor,
 )
@@ -185,19 +184,18 @@ def with_stated(clip: Clip, options: SourceOptions) -> Clip:
     return replace(clip, masks=masks or clip.masks, depth=depth or clip.depth)
 
 
-def stated_camera(
-    options: SourceOptions, width: int, height: int, where: object
-) -> tuple[Intrinsics | None, StereoCalibration | None]:
-    """What `--camera` or `--calibration` states for pictures of this size; (None, None) without either.
+def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> StatedCamera:
+    """What `--camera`, `--calibration` and `--baseline` state for pictures of this size.
 
     Raises:  InputError for a calibration of another aspect ratio; proportional sizes are scaled.
     """
     if options.calibration is not None:
-        return intrinsics_or_stereo(options.calibration, width, height)
+        found = calibrated(options.calibration, width, height)
+        return found._replace(baseline=options.baseline or found.baseline)
     if options.camera is None:
-        return None, None
-    fx, fy, cx, cy = options.camera
-    return checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, options.distortion), where), None
+        return StatedCamera(baseline=options.baseline)
+    stated = checked_intrinsics(Intrinsics(*options.camera, width, height, options.distortion), where)
+    return StatedCamera(stated, baseline=options.baseline)
 
 
 def stated_poses(

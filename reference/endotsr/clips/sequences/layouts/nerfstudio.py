@@ -1,7 +1,8 @@
-"""nerfstudio and instant-ngp: `transforms.json` with intrinsics, camera-to-world matrices and names of pictures.
+"""nerfstudio, instant-ngp and Blender: `transforms.json` or `transforms_train.json`.
 
-Camera axes are OpenGL's, pixel edges are at integers, masks are black on excluded pixels, and depth files store
-thousandths of the unknown unit of the matrices. `ply_file_path` names points of a reconstruction.
+The file holds intrinsics, camera-to-world matrices and names of pictures. Camera axes are OpenGL's, pixel edges are at
+integers, masks are black on excluded pixels, and depth files store thousandths of the unknown unit of the matrices.
+`FIELDS` lists all fields.
 """
 
 from pathlib import Path
@@ -9,44 +10,104 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics, checked_intrinsics, pose_of
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
+from endotsr.clips.sequences.camera import (
+    ARBITRARY,
+    CameraPose,
+    Intrinsics,
+    checked_intrinsics,
+    pose_of,
+    shared_intrinsics,
+)
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import time_order
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_bytes
-from endotsr.untrusted.json import integer, listed, number, read_json
+from endotsr.untrusted.json import Keys, integer, listed, number, read_json
 from endotsr.untrusted.names import relative_path
 from endotsr.untrusted.yaml import matrix
 
-FILE = "transforms.json"
+FILES = ("transforms.json", "transforms_train.json")
+OTHERS = ("transforms_test.json", "transforms_val.json")
 LARGEST_FILE = 1 << 28  # bytes
 DEPTH_STEP = 1e-3  # units of the matrices per step of the stored depth
 INTRINSICS = ("fl_x", "fl_y", "cx", "cy")
 MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
+CAMERA = {
+    "camera_model": f"camera model, one of {', '.join(MODELS)}",
+    "fl_x fl_y cx cy": "focal lengths and principal point, pixels",
+    "w h": "size of the pictures, pixels",
+    "k1 k2 p1 p2 k3": "distortion in OpenCV's model",
+    "camera_angle_x camera_angle_y": "field of view, radians, in place of fl_x and fl_y",
+}
+OTHER_CAMERA = {
+    "k4 k5 k6": "a distortion of higher order is not supported: undistort the pictures first",
+    "is_fisheye ftheta_* latlong equirectangular fisheye_crop_radius": "only pinhole cameras are supported: undistort"
+    " the pictures first",
+    "rolling_shutter": "a rolling shutter is not supported: export the matrices of a global shutter",
+    "x_fov y_fov": "write the field of view as camera_angle_x, in radians",
+}
+SAME = "is part of the matrices already, and the unit of lengths is free"
+FIELDS = Inventory(
+    "transforms.json of nerfstudio, instant-ngp and Blender",
+    used=CAMERA | {"frames": "one entry per picture", "ply_file_path": "points of a reconstruction, as prior depth"},
+    refused=OTHER_CAMERA
+    | {"from_mitsuba": "these axes are not supported: convert the matrices to OpenGL's",
+       "integer_depth_scale": "depth of instant-ngp is not read: write depth_file_path in thousandths of the unit",
+       "n_extra_learnable_dims": "latent codes per picture are not supported"},
+    harmless={
+        "aabb aabb_scale render_aabb offset scale up": "the scene of another program has bounds; here it has none",
+        "applied_transform applied_scale orientation_override": SAME,
+        "train_filenames val_filenames test_filenames": "the split is a setting here (sequence.split)",
+        "white_transparent black_transparent sharpen is_hdr": "a setting of another program's pictures",
+        "enable_depth_loading enable_ray_loading": "a switch of another program",
+    },
+    neutral={"from_mitsuba": (False,)},
+)  # fmt: skip
+FRAME_FIELDS = Inventory(
+    "an entry of frames in transforms.json",
+    used=CAMERA | {
+        "file_path": "the picture; its ending may be missing",
+        "transform_matrix": "camera-to-world, OpenGL axes",
+        "mask_path": "mask, black = excluded",
+        "depth_file_path": "depth in thousandths of the unit of the matrices",
+        "time": "time of the picture; with --source-rate only its spacing counts",
+    },
+    refused=OTHER_CAMERA | {"depth_path": "depth of instant-ngp is not read: write it as depth_file_path"},
+    harmless={
+        "colmap_im_id camera_id": "a number of the reconstruction",
+        "sharpness": "a measure of the picture, which changes no pixel",
+        "rotation": "the step of Blender's turntable; transform_matrix contains it",
+    },
+)  # fmt: skip
 
 
 def recognises(path: Path) -> bool:
     """Whether a path is such a file or its folder."""
-    return path.name == FILE or (path / FILE).is_file()
+    return path.name in FILES or any((path / name).is_file() for name in FILES)
 
 
-def read_intrinsics(data: dict[str, Any], frame: dict[str, Any], size: tuple[int, int], where: str) -> Intrinsics:
+def read_intrinsics(data: Keys, frame: Keys, size: tuple[int, int], where: str) -> Intrinsics:
     """The intrinsics of a frame, by default those of the file. Raises InputError."""
     found = data | frame
-    if found.get("camera_model", MODELS[0]) not in MODELS or found.get("k4"):
-        raise InputError(
-            f"{where}: camera_model {found.get('camera_model')!r}; allowed: {', '.join(MODELS)}, without k4"
-        )
+    if found.get("camera_model", MODELS[0]) not in MODELS:
+        raise InputError(f"{where}: camera_model {found.get('camera_model')!r}; use one of {', '.join(MODELS)}")
     width, height = (integer(found.get(key, side), f"{where}: {key}", 1) for key, side in zip(("w", "h"), size))
-    if "fl_x" not in found and "camera_angle_x" in found:
-        angle = number(found["camera_angle_x"], f"{where}: camera_angle_x", 1e-3, 3.14)
-        focal = width / 2 / np.tan(angle / 2)
-        found = {"fl_x": focal, "fl_y": focal, "cx": width / 2, "cy": height / 2} | found
+    angles = {
+        key: number(found[key], f"{where}: {key}", 1e-3, 3.14)
+        for key in ("camera_angle_x", "camera_angle_y")
+        if key in found
+    }
+    if "fl_x" not in found and "camera_angle_x" in angles:
+        across = width / 2 / np.tan(angles["camera_angle_x"] / 2)
+        down = height / 2 / np.tan(angles["camera_angle_y"] / 2) if "camera_angle_y" in angles else across
+        found = {"fl_x": across, "fl_y": down, "cx": width / 2, "cy": height / 2} | found
     fx, fy, cx, cy = (
         number(found.get(key, found.get("fl_x") if key == "fl_y" else None), f"{where}: {key}") for key in INTRINSICS
     )
@@ -58,41 +119,40 @@ def read_points(path: Path) -> FloatArray:
     """Points (n, 3) of an ASCII PLY file with first columns x y z. Raises InputError."""
     head, mark, body = read_bytes(path, LARGEST_FILE).decode("ascii", "replace").partition("end_header\n")
     if not mark or "format ascii" not in head:
-        raise InputError(f"{path}: allowed: a PLY file in ASCII, as nerfstudio writes it")
+        raise InputError(f"{path}: use a PLY file in ASCII, as nerfstudio writes it")
     try:
         rows = np.array([line.split()[:3] for line in body.splitlines() if line.strip()], np.float64)
     except ValueError:
         rows = np.zeros((0, 0))
     if rows.ndim != 2 or rows.shape[1] != 3 or not np.isfinite(rows).all():
-        raise InputError(f"{path}: allowed: lines of numbers that begin with x y z")
+        raise InputError(f"{path}: use lines of numbers that begin with x y z")
     return rows
 
 
 def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     """The file as a clip. Raises InputError naming the frame and the key."""
-    file = path if path.is_file() else path / FILE
+    file = path if path.is_file() else next((path / name for name in FILES if (path / name).is_file()), path / FILES[0])
     data, folder = read_json(file, LARGEST_FILE), file.parent
-    entries = listed(data.get("frames"), f"{file}: frames")
-    if not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{file}: frames: allowed: at least one object with file_path and transform_matrix")
-    files = [_named(folder, entry.get("file_path"), f"{file}: file_path") for entry in entries]
-    files = [name for name in files if name is not None]
-    if len(files) < len(entries):
-        raise InputError(f"{file}: a frame has no file_path")
-    order = time_order(files)
+    entries, notes = _entries(data, file), FIELDS.noted(data, file)
+    for entry in entries:
+        notes += [note for note in FRAME_FIELDS.noted(entry, f"{file}: frames") if note not in notes]
+    files = [_picture(folder, entry.get("file_path"), f"{file}: file_path") for entry in entries]
+    order, times = time_order(files), _times(entries, options.rate, file, notes)
+    if times is not None:
+        order = np.argsort(times, kind="stable").tolist()
     files, entries = [files[i] for i in order], [entries[i] for i in order]
+    width, height = size_of(files)
+    cameras = [read_intrinsics(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)]
+    masks = stated_masks(options, files, width, height)
     masked, planes = ([_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
-    width, height = size_of(files)
-    lenses = {read_intrinsics(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)}
-    if len(lenses) > 1:
-        raise InputError(f"{file}: {len(lenses)} different cameras; allowed: one for all frames")
-    masks = stated_masks(options, files, width, height)
     if masks is None and any(masked):
         masks = masks_of(masked, "black", width, height)
-    points = _named(folder, data.get("ply_file_path"), f"{file}: ply_file_path")
-    cloud = read_points(points) if points is not None and points.is_file() else None
     depth = depth_of(planes, DEPTH_STEP) if any(planes) else None
+    cloud = None if depth is not None else _cloud(folder, data, file, notes)
+    notes += [found.line for found in gap_findings(files)]
+    if beside := [name for name in OTHERS if file.name == FILES[1] and (folder / name).is_file()]:
+        notes.append(f"{file.name} is read; not read: {', '.join(beside)}")
     return Clip(
         layout="nerfstudio",
         where=path,
@@ -100,29 +160,78 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         pictures=pictures_from_files(files, []),
         masks=masks,
         depth=depth,
-        points=None if cloud is None or depth is not None else lambda i: cloud,
+        points=None if cloud is None else lambda i: cloud,
         unit=ARBITRARY,
-        intrinsics=lenses.pop(),
+        intrinsics=shared_intrinsics(cameras, file, notes),
         poses=[_pose(entry, f"{file}: frame {i}: transform_matrix") for i, entry in enumerate(entries)],
         rate=options.rate,
-        notes=[f"{FILE}: {len(files)} frames, unit of lengths unknown"]
-        + [found.line for found in gap_findings(files)]
-        + ([] if cloud is None else [f"{len(cloud)} points: the file does not state their visibility"]),
+        times=None if times is None else np.sort(times),
+        notes=[f"{file.name}: {len(files)} frames, unit of lengths unknown", *notes],
     )
 
 
+def _entries(data: Keys, file: Path) -> list[Keys]:
+    """The entries of frames. Raises InputError."""
+    entries = listed(data.get("frames"), f"{file}: frames")
+    if not entries or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError(f"{file}: frames: use at least one object with file_path and transform_matrix")
+    return entries
+
+
+def _times(entries: list[Keys], rate: float | None, file: Path, notes: list[str]) -> FloatArray | None:
+    """Seconds of the frames from the first one, in the order of the file; None unless every frame states a time.
+
+    Raises:  InputError if two frames have one time.
+    """
+    if not all("time" in entry for entry in entries):
+        if any("time" in entry for entry in entries):
+            raise InputError(f"{file}: time: {sum('time' in e for e in entries)} of {len(entries)} frames have one")
+        return None
+    times = np.array([number(entry["time"], f"{file}: frame {i}: time") for i, entry in enumerate(entries)])
+    if len(set(times.tolist())) < len(times):
+        raise InputError(f"{file}: time: two frames have one time; use one camera")
+    times = times - times.min()
+    if rate and len(times) > 1:
+        times *= (len(times) - 1) / rate / times.max()
+    else:
+        notes.append(f"time: read as seconds, {times.max():g} s in all; --source-rate states the mean rate instead")
+    return times
+
+
+def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray | None:
+    """The points (n, 3) that the file names, with a note; None without."""
+    path = _named(folder, data.get("ply_file_path"), f"{file}: ply_file_path")
+    if path is None or not path.is_file():
+        return None
+    cloud = read_points(path)
+    notes.append(f"{len(cloud)} points: the file does not state their visibility")
+    return cloud
+
+
 def _named(folder: Path, name: Any, where: str) -> Path | None:
-    return None if name is None else folder / relative_path(str(name).removeprefix("./"), where)
+    """The file of this name, which may be written with the separators of another system."""
+    return None if name is None else folder / relative_path(str(name).replace("\\", "/").removeprefix("./"), where)
 
 
-def _pose(entry: dict[str, Any], where: str) -> CameraPose:
+def _picture(folder: Path, name: Any, where: str) -> Path:
+    """The file of a picture, whose ending may be missing. Raises InputError without a name."""
+    path = _named(folder, name, where)
+    if path is None:
+        raise InputError(f"{where}: a frame has none")
+    if path.suffix.lower() in PICTURE_ENDINGS:
+        return path
+    found = [path.with_name(path.name + ending) for ending in PICTURE_ENDINGS]
+    return next((file for file in found if file.is_file()), path)
+
+
+def _pose(entry: Keys, where: str) -> CameraPose:
     stored = matrix(entry.get("transform_matrix"), where, (4, 4), (3, 4))
     return pose_of(stored[:3, :3], stored[:3, 3], "camera_to_world", "opengl", where)
 
 
 LAYOUT = Layout(
     name="nerfstudio",
-    about=f"a folder with {FILE} of nerfstudio",
+    about=f"a folder with {FILES[0]} of nerfstudio",
     rank=3,
     recognises=recognises,
     describe=describe_nerfstudio,

@@ -82,7 +82,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     if right and stereo != "none":
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
     width, height = halves(*size_of(left), stereo)
-    intrinsics, calibration = stated_camera(options, width, height, path)
+    camera = stated_camera(options, width, height, path)
     poses, notes = stated_poses(options, len(left), options.rate)
     return Clip(
         layout="pictures",
@@ -92,12 +92,12 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         masks=stated_masks(options, left, width, height),
         depth=stated_depth(options, left),
         unit=unit_of(options, "m"),
-        intrinsics=intrinsics,
-        calibration=calibration,
-        baseline=options.baseline,
+        intrinsics=camera.intrinsics,
+        calibration=camera.calibration,
+        baseline=camera.baseline,
         poses=poses,
         rate=options.rate,
-        notes=[found.line for found in profile_findings(left[0]) + gap_findings(left)] + notes,
+        notes=[found.line for found in profile_findings(left[0]) + gap_findings(left)] + [*camera.notes, *notes],
     )
 
 

@@ -61,7 +61,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
     width, height = size_of(files)
-    intrinsics, _ = stated_camera(options, width, height, path)
+    intrinsics = stated_camera(options, width, height, path).intrinsics
     notes = []
     if intrinsics is None and (width, height) == (640, 480):
         intrinsics = Intrinsics(*DEFAULT, width, height)

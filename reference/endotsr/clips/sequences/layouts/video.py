@@ -35,7 +35,7 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     width, height = halves(across, down, stereo)
     rate = options.rate or facts.rate
     times = None if options.rate else facts.times
-    intrinsics, calibration = stated_camera(options, width, height, path)
+    camera = stated_camera(options, width, height, path)
     notes = _notes(facts, rate, path)
     if facts.turn:
         done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
@@ -55,13 +55,13 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         masks=stated_masks(options, facts.count, width, height),
         depth=stated_depth(options, facts.count),
         unit=unit_of(options, "m"),
-        intrinsics=intrinsics,
-        calibration=calibration,
-        baseline=options.baseline,
+        intrinsics=camera.intrinsics,
+        calibration=camera.calibration,
+        baseline=camera.baseline,
         poses=poses,
         rate=rate,
         times=times,
-        notes=notes + note,
+        notes=[*notes, *camera.notes, *note],
     )
 
 

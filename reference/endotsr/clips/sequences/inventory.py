@@ -1,0 +1,51 @@
+"""What becomes of every field of a file: used, refused by name, or harmless. A field that is not listed is noted.
+
+Every reader of a format has an `Inventory` beside it. `noted` applies it to the names in a file. The guide prints all
+of them (`python docs/make.py recordings.fields`).
+"""
+
+from collections.abc import Iterable, Mapping
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from endotsr.clips.sequences.files import shortened
+from endotsr.errors import InputError
+from endotsr.untrusted.names import plain_line, shown
+
+
+class Inventory(NamedTuple):
+    """The fields of a format. The keys are names, several separated by spaces; `*` stands for any characters."""
+
+    about: str  # the format, in words
+    used: Mapping[str, str]  # names -> meaning
+    refused: Mapping[str, str] = {}  # names -> what they would change, and the remedy
+    harmless: Mapping[str, str] = {}  # names -> why they change nothing
+    neutral: Mapping[str, tuple[object, ...]] = {}  # values with which a refused field changes nothing
+
+    def reason(self, use: Mapping[str, str], name: str) -> str | None:
+        """The text on a name in one of the three groups; None if it is not there."""
+        return next((text for names, text in use.items() if any(fnmatchcase(name, n) for n in names.split())), None)
+
+    def noted(self, fields: Mapping[str, object] | Iterable[str], where: object) -> list[str]:
+        """Notes on the fields of a file that are not listed.
+
+        fields   names, with their values if these decide
+
+        Raises:  InputError naming a refused field.
+        """
+        values = fields if isinstance(fields, Mapping) else {}
+        unknown = []
+        for name in map(str, fields):
+            why = self.reason(self.refused, name)
+            if why is not None and not self._changes_nothing(name, values.get(name)):
+                raise InputError(f"{where}: {name} = {shown(values[name])}: {why}" if name in values else
+                                 f"{where}: {name}: {why}")  # fmt: skip
+            if why is None and self.reason(self.used, name) is None and self.reason(self.harmless, name) is None:
+                unknown.append(plain_line(name)[:60])
+        return [f"{where}: not used, because unknown here: {shortened(sorted(set(unknown)))}"] if unknown else []
+
+    def _changes_nothing(self, name: str, value: object) -> bool:
+        """Whether a refused field has a neutral value: nothing, zero, false, empty or one that is listed."""
+        if not value or (isinstance(value, list) and not any(value)):
+            return True
+        return any(value == neutral for neutral in self.neutral.get(name, ()))

@@ -1,0 +1,48 @@
+"""OpenCV's storage in XML: plain values and matrices, without entities."""
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import read_text
+from endotsr.untrusted.json import Keys
+from endotsr.untrusted.names import plain_line
+
+LARGEST_FILE = 1 << 20  # bytes
+
+
+def read_storage(path: Path) -> Keys:
+    """The keys below `opencv_storage`: numbers, texts, and matrices as a mapping with rows, cols and data.
+
+    Raises:  InputError for a file that is not XML, declares entities, or has another root.
+    """
+    text = read_text(path, LARGEST_FILE)
+    if "<!" in text.replace("<!--", ""):
+        raise InputError(f"{path}: declares a document type; use a file as OpenCV writes it")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: not XML: {plain_line(str(error))}") from None
+    if root.tag != "opencv_storage":
+        raise InputError(f"{path}: the root is {plain_line(root.tag)[:60]}; use a file with opencv_storage")
+    return {child.tag: _value(child) for child in root}
+
+
+def _value(node: ElementTree.Element) -> Any:
+    """A mapping for nested keys, a number, or the text."""
+    if len(node):
+        inner = {child.tag: _value(child) for child in node}
+        data = node.findtext("data")
+        return inner if data is None else inner | {"data": [_number(word) for word in data.split()]}
+    words = (node.text or "").split()
+    return _number(words[0]) if len(words) == 1 else " ".join(words)
+
+
+def _number(word: str) -> float | int | str:
+    for kind in (int, float):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return word

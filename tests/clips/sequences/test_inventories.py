@@ -1,0 +1,97 @@
+"""Every field of a format is used, refused by name, harmless with a reason, or noted as unknown."""
+
+import pytest
+from field_inputs import FORMATS, Format
+
+from endotsr.clips.sequences.inventory import Inventory
+from endotsr.errors import InputError
+
+USED = [(name, field) for name, found in FORMATS.items() for field in found.changed]
+REFUSED = [(name, field) for name, found in FORMATS.items() for field in found.refused]
+
+
+def outcome(found: Format, folder, keys) -> object:
+    """The result of the reader, or its refusal."""
+    folder.mkdir()
+    found.write(folder, keys)
+    try:
+        return found.read(folder)
+    except InputError as error:
+        return str(error).replace(str(folder), "")
+
+
+def matters(found: Format, field: str, folder) -> bool:
+    """Whether another value of a field gives another result."""
+    before = outcome(found, folder / "a", found.base)
+    return outcome(found, folder / "b", found.base | {field: found.changed[field]}) != before
+
+
+@pytest.mark.parametrize(("name", "field"), USED)
+def test_a_used_field_changes_the_result(name, field, tmp_path):
+    assert FORMATS[name].inventory.reason(FORMATS[name].inventory.used, field) is not None
+    assert matters(FORMATS[name], field, tmp_path)
+
+
+@pytest.mark.parametrize(("name", "field"), REFUSED)
+def test_a_refused_field_is_refused_by_name(name, field, tmp_path):
+    found = FORMATS[name]
+    assert isinstance(outcome(found, tmp_path / "a", found.base), tuple)
+    said = outcome(found, tmp_path / "b", found.base | {field: found.refused[field]})
+    assert isinstance(said, str) and field in said and found.inventory.reason(found.inventory.refused, field) in said
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_base_has_every_used_field_or_a_change_adds_it(name):
+    """A field of the inventory without a change would be listed as used without proof."""
+    found = FORMATS[name]
+    patterns = [word for names in found.inventory.used for word in names.split()]
+    tried = {*found.changed, *found.base}
+    spelled = {"nerfstudio frame": {"camera_angle_x", "camera_angle_y"}, "ros": ALIASES, "ros echo": ALIASES,
+               "opencv": OTHER_NAMES}.get(name, set())  # fmt: skip
+    for pattern in patterns:
+        inventory = Inventory("", {pattern: "x"})
+        assert pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried), pattern
+
+
+ALIASES = {"image_width", "width", "image_height", "height", "camera_matrix", "K", "k", "distortion_coefficients", "D",
+           "d", "rectification_matrix", "R", "r", "projection_matrix", "P", "p"}  # fmt: skip
+OTHER_NAMES = {"camera_matrix", "Camera_Matrix", "K", "cameraMatrix", "distortion_coefficients",
+               "Distortion_Coefficients", "D", "distCoeffs", "K1", "K2", "cameraMatrix1", "cameraMatrix2",
+               "distCoeffs1", "distCoeffs2", "image_Width", "image_Height", "width", "height"}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["nerfstudio", "nerfstudio frame"])
+def test_a_file_with_a_new_field_says_so(name, tmp_path):
+    from endotsr.clips.sequences.layouts import describe
+
+    found = FORMATS[name]
+    found.write(tmp_path, found.base | {"lens_shading_map": [1, 2]})
+    assert any("unknown here: lens_shading_map" in note for note in describe(tmp_path).notes)
+
+
+@pytest.mark.parametrize("name", ["kalibr", "ros", "ros echo", "opencv", "ini"])
+def test_a_calibration_with_a_new_field_says_so(name, tmp_path):
+    from endotsr.clips.sequences.calibrations import calibrated
+
+    found = FORMATS[name]
+    found.write(tmp_path, found.base | {"thin_prism": 1})
+    file = next(tmp_path.glob("file.*"), tmp_path)
+    assert any("unknown here: thin_prism" in note for note in calibrated(file, 32, 24).notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "field"),
+    [("nerfstudio", "k1"), ("nerfstudio frame", "time"), ("kalibr", "T_cn_cnm1"), ("opencv", "D2"), ("ini", "T_0")],
+)
+def test_a_reader_that_drops_a_field_is_found(name, field, tmp_path):
+    """The proof of a used field fails for a reader that does not look at it."""
+    found = FORMATS[name]
+    blind = found._replace(write=lambda folder, keys: found.write(folder, keys | {field: found.base[field]}))
+    assert not matters(blind, field, tmp_path)
+
+
+def test_a_neutral_value_of_a_refused_field_changes_nothing():
+    inventory = Inventory("x", {"a": ""}, {"b": "no"}, {}, {"b": ("none",)})
+    assert inventory.noted({"b": 0, "a": 1}, "f") == inventory.noted({"b": "none"}, "f") == []
+    with pytest.raises(InputError, match="f: b = 1: no"):
+        inventory.noted({"b": 1}, "f")
