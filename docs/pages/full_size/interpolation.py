@@ -20,6 +20,7 @@ from endotsr.results.evaluation.lpips import load_lpips_weights
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import machine, now, versions
+from pages.store.intervals import interval
 from pages.store.marks import read_json, write_marked
 
 DOCS = Path(__file__).parents[2]
@@ -53,11 +54,17 @@ def mean(part: dict[str, Any], name: str, key: str, without: tuple[int, ...] = (
     return float(np.mean(values)) if values else float("nan")
 
 
+def half_width(part: dict[str, Any], name: str, key: str) -> float:
+    """Half width of the 95 % interval of the mean over the held-out frames, as if they were independent."""
+    return interval([value for value in part["baselines"][name][key] if value is not None])[1]
+
+
 def row(part: dict[str, Any], name: str, without: tuple[int, ...]) -> list[str]:
     """Cells of a baseline: full and tissue PSNR, SSIM, LPIPS; in brackets without the frames that are left out."""
     cells = []
     for key, digits in (("psnr_full", 2), ("psnr_tissue", 2), ("ssim_full", 4), ("lpips", 4)):
         cell = f"{mean(part, name, key):.{digits}f}"
+        cell += f" ± {half_width(part, name, key):.{digits}f}" if key == "psnr_tissue" else ""
         cells.append(cell + (f" ({mean(part, name, key, without):.{digits}f})" if without else ""))
     return [EVERY_BASELINE[name][0], *(cell.replace("nan", "-") for cell in cells)]
 
@@ -78,7 +85,8 @@ def table(result: dict[str, Any]) -> str:
             )
             parts.append(markdown(head, [row(part, name, without) for name in NAMES]))
     made = f"{result['machine']['processor']}, {result['date'][:10]}."
-    note = "The first three rows read every pixel of the other frames, instruments included."
+    note = "± is a 95 % interval over the frames, as if they were independent. "
+    note += "The first three rows read every pixel of the other frames, instruments included."
     return "\n\n".join([*parts, f"{made} {note}"])
 
 
