@@ -1,4 +1,4 @@
-"""`endotsr masks`: propose instrument masks for a clip without masks."""
+"""`endotsr masks`: instrument masks for a clip without masks, proposed or carried from a few key frames."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,11 +7,16 @@ from typing import Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.errors import InputError
 
 
 @dataclass
 class MasksOptions:
-    """Propose instrument masks from metallic grey and from motion relative to the tissue.
+    """Propose instrument masks from metallic grey and from motion relative to the tissue, or carry drawn ones.
+
+    With --keys, the masks of a few frames, drawn in any program, are carried to all frames by dense flow from both
+    sides. The command names the frames whose two sides disagree, and the frame whose mask would help most: draw it, and
+    repeat the command with --replace.
 
     Without --out, SEQUENCE is a folder from `endotsr prepare`, and the masks are added to it. With --out, SEQUENCE is
     any source of `prepare`; masks/ and the overlay are written to FOLDER and marked as a proposal. Inspect
@@ -24,6 +29,10 @@ class MasksOptions:
     """folder to create, instead of adding the masks to the sequence"""
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
+    keys: Annotated[Path | None, Option("FOLDER")] = None
+    """masks of key frames: PNG pictures named as their frames, white = instrument; all black where there is none"""
+    margin: int = 2
+    """with --keys: px by which the masks grow; 0 = the carried outline itself"""
     replace: bool = False
     """replace existing masks"""
     json: JsonFile = None
@@ -35,16 +44,22 @@ def run(words: list[str]) -> int:
     options = parse(MasksOptions, words, "masks")
     from endotsr.clips.sequences.files import shortened
     from endotsr.clips.sequences.layouts import describe
-    from endotsr.clips.sequences.make_masks import OVERLAY, enter_masks, write_proposal
+    from endotsr.clips.sequences.make_masks import OVERLAY, enter_masks, from_keys, write_proposal
     from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.untrusted.writing import refuse_existing
 
+    if options.margin < 0:
+        raise InputError(f"masks: --margin {options.margin} is not allowed; use 0 or more pixels")
+    if options.keys is None and options.margin != 2:
+        raise InputError("masks: --margin needs --keys FOLDER; proposed masks have a margin of their own")
+    said: list[str] = []
+    propose = None if options.keys is None else from_keys(options.keys, options.margin, said)
     if options.out is None:
-        proposal, place = enter_masks(options.sequence, options.replace), options.sequence
+        proposal, place = enter_masks(options.sequence, options.replace, propose), options.sequence
     else:
         refuse_existing(options.out)
         clip = describe(options.sequence, SourceOptions(layout=options.layout))
-        proposal, place = write_proposal(clip, options.out), options.out
+        proposal, place = write_proposal(clip, options.out, propose), options.out
     fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)
     write_result(
         options.json, folder=place, found=proposal.found, reason=proposal.reason, excluded_fraction=fraction,
@@ -57,5 +72,6 @@ def run(words: list[str]) -> int:
     if proposal.without_tissue:
         named = shortened([str(i) for i in proposal.without_tissue])
         print(f"warning: hardly any tissue is left in {len(proposal.without_tissue)} frames: {named}")
+    print(*said, sep="\n", end="\n" if said else "")
     print(f"these masks are proposals: inspect {place / OVERLAY} before training")
     return 0

@@ -162,6 +162,27 @@ def gaussian_blur(plane: Array, deviation: float) -> NDArray[np.float32]:
     return _cv2().GaussianBlur(plane, (0, 0), deviation)
 
 
+def warp_mask(mask: Array, flow: Array) -> NDArray[np.float32]:
+    """A soft mask (H, W) float32 at y + flow[1], x + flow[0], bilinear; beyond the border, the nearest value.
+
+    OpenCV rounds positions to 1/32 pixel, which is finer than the accuracy of any flow.
+    """
+    height, width = mask.shape
+    x = (np.arange(width, dtype=np.float32)[None, :] + flow[0]).astype(np.float32)
+    y = (np.arange(height, dtype=np.float32)[:, None] + flow[1]).astype(np.float32)
+    cv2 = _cv2()
+    return cv2.remap(np.ascontiguousarray(mask), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def grown(mask: NDArray[np.bool_], pixels: float) -> NDArray[np.bool_]:
+    """The mask (H, W) and all pixels at most `pixels` px (Euclidean, between centres) from it; itself for 0."""
+    if pixels <= 0 or not mask.any():
+        return mask.copy()
+    cv2 = _cv2()
+    distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return distance <= pixels
+
+
 def sample_bilinear(image: Array, x: Array, y: Array) -> Array:
     """image[..., y, x] by bilinear interpolation. Outside the image, the nearest border value.
 

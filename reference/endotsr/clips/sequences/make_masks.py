@@ -5,21 +5,24 @@ In: a clip. Out: mask pictures (white = excluded), an overlay for inspection, an
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import area_resize, write_png
+from endotsr.clips.opencv import area_resize, read_png, write_png
+from endotsr.clips.sequences.carry_masks import carry_masks, motion_of
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts.common import describe_prepared
+from endotsr.clips.sequences.masks import threshold_masks
 from endotsr.clips.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.sources import PROPOSAL
 from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import BoolArray
 from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
 
 OVERLAY = "proposed_masks.png"
@@ -61,12 +64,53 @@ def without_tissue(clip: Clip, proposal: Proposal) -> list[str]:
     return [clip.names[i] for i in proposal.without_tissue]
 
 
-def enter_masks(folder: Path, replace: bool = False) -> Proposal:
+Propose = Callable[[Clip], Proposal]
+
+
+def from_keys(folder: Path, margin: int, said: list[str]) -> Propose:
+    """Masks carried from those of a folder: one picture per key frame with the name of the frame, white = instrument.
+
+    margin   px by which the masks grow, see `carry_masks`
+    said     receives a line for frames that are not trusted, and one for the frame to draw next
+
+    The function raises InputError for a folder without keys, a name that is no frame, and a picture that is no mask.
+    """
+
+    def propose(clip: Clip) -> Proposal:
+        keys = read_keys(folder, clip)
+        carried = carry_masks(motion_of(list(left_pictures(clip))), keys, margin)
+        if carried.distrusted:
+            named = shortened([clip.names[i] for i in carried.distrusted])
+            said.append(f"not trusted, look at these frames or draw one of them: {named}")
+        if carried.next_key is not None:
+            said.append(f"the mask that would help most: {clip.names[carried.next_key]}")
+        frames = f"{len(keys)} key frame{'s' if len(keys) != 1 else ''}"
+        return Proposal(carried.excluded, f"carried from {frames}, margin {margin} px")
+
+    return propose
+
+
+def read_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
+    """Frame -> mask (H, W), True = instrument, of the pictures of a folder. Raises: see `from_keys`."""
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".png") if folder.is_dir() else []
+    if not files:
+        raise InputError(f"{folder}: no PNG masks of key frames; name each as its frame, such as {clip.names[0]}.png")
+    place = {name: i for i, name in enumerate(clip.names)}
+    for file in files:
+        if file.stem not in place:
+            raise InputError(f"{file}: is not the name of a frame; use names such as {clip.names[0]}.png")
+    pictures = [read_png(file) for file in files]
+    planes = [picture if picture.ndim == 2 else picture.max(axis=2) for picture in pictures]
+    return {place[f.stem]: threshold_masks([plane], [f.name], [])[0] for f, plane in zip(files, planes)}
+
+
+def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = None) -> Proposal:
     """Propose masks for a folder in the common format and record them. Without a proposal the folder is unchanged.
 
     A mask that is equal in all frames, such as a field of view, is united with the proposal.
 
     replace   whether existing masks may be replaced
+    propose   where the masks come from; None = by colour and motion
 
     Raises:  InputError, leaving the folder unchanged.
     """
@@ -74,7 +118,7 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
     static = None if replace else _static_mask(clip)
     if (clip.masks or (folder / MASKS).exists()) and not replace and static is None:
         raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
-    proposal = _proposed(clip)
+    proposal = (propose or _proposed)(clip)
     if proposal.found and static is not None:
         united = [plane | static for plane in proposal.excluded]
         proposal = proposal._replace(excluded=united, reason=f"{proposal.reason}; united with the mask of all frames")
@@ -88,12 +132,14 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
     return proposal
 
 
-def write_proposal(clip: Clip, out: Path) -> Proposal:
+def write_proposal(clip: Clip, out: Path, propose: Propose | None = None) -> Proposal:
     """Write masks, overlay and mark into the new folder `out`. Without a proposal nothing is written.
+
+    propose   where the masks come from; None = by colour and motion
 
     Raises:  InputError, leaving nothing behind.
     """
-    proposal = _proposed(clip)
+    proposal = (propose or _proposed)(clip)
     if not proposal.found:
         return proposal
     with new_folder(out) as place:

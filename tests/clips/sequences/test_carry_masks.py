@@ -1,0 +1,159 @@
+"""Masks of key frames carried to the others: exact for exact flows, named where the two sides disagree, by command."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from common_folder import written
+
+from data_folder import data_folder
+from endotsr.cli.main import main
+from endotsr.clips.opencv import grown, read_png, write_png
+from endotsr.clips.sequences.carry_masks import Motion, carried_once, carry_masks, motion_of
+from endotsr.errors import InputError
+
+SIZE = (60, 80)
+
+
+def tool(left: int) -> np.ndarray:
+    """A square of 20 px at a column."""
+    mask = np.zeros(SIZE, bool)
+    mask[20:40, left : left + 20] = True
+    return mask
+
+
+def sliding(count: int, step: int = 3) -> tuple[Motion, list[np.ndarray]]:
+    """A tool that slides to the right, tissue around it that moves with it, and its masks: no pixel is uncovered."""
+    masks = [tool(5 + step * i) for i in range(count)]
+    field = np.stack([np.full(SIZE, step), np.zeros(SIZE)]).astype(np.float32)
+    return Motion([field.copy() for _ in range(count - 1)], [-field for _ in range(count - 1)]), masks
+
+
+def overlap(one, other) -> float:
+    return (one & other).sum() / (one | other).sum()
+
+
+def test_exact_flows_carry_a_mask_exactly():
+    motion, masks = sliding(12)
+    found = carry_masks(motion, {0: masks[0], 11: masks[11]})
+    for mask, true in zip(found.excluded, masks, strict=True):
+        np.testing.assert_array_equal(mask, true)
+    assert found.agreement == [1.0] * 12 and found.next_key is None and found.distrusted == []
+
+
+def test_the_flow_of_the_inside_serves_the_edge():
+    """Dense flow smears the motion of the tool into the tissue: half of it 4 px inside, none outside."""
+    motion, masks = sliding(2, step=6)
+    smeared = motion.backward[0].copy()
+    inner = ~grown(~masks[1], 4)
+    smeared[0][~masks[1]] = 0
+    smeared[0][masks[1] & ~inner] *= 0.5
+    moved = carried_once(masks[0].astype(np.float32), smeared) > 0.5
+    plain = np.zeros(SIZE, bool)
+    columns = np.clip(np.arange(80) + smeared[0], 0, 79).round().astype(int)
+    plain = np.take_along_axis(masks[0], columns, axis=1)
+    assert overlap(moved, masks[1]) > overlap(plain, masks[1]) + 0.05
+
+
+def test_a_margin_grows_the_mask_and_takes_either_side_in_the_middle():
+    still = Motion([np.zeros((2, *SIZE), np.float32)] * 4, [np.zeros((2, *SIZE), np.float32)] * 4)
+    one, other = tool(5), tool(15)
+    found = carry_masks(still, {0: one, 4: other}, margin=3)
+    np.testing.assert_array_equal(found.excluded[0], grown(one, 3))
+    np.testing.assert_array_equal(found.excluded[2], grown(one | other, 3))  # half way, one side is enough
+    np.testing.assert_array_equal(carry_masks(still, {0: one, 4: other}).excluded[1], one)  # the nearer side
+    disc = grown(np.pad([[True]], 5), 3)
+    rows, columns = np.mgrid[-5:6, -5:6]
+    np.testing.assert_array_equal(disc, rows**2 + columns**2 <= 9)
+
+
+def test_an_empty_and_a_full_key_are_keys():
+    still = Motion([np.zeros((2, *SIZE), np.float32)] * 2, [np.zeros((2, *SIZE), np.float32)] * 2)
+    empty, full = np.zeros(SIZE, bool), np.ones(SIZE, bool)
+    assert not np.any(carry_masks(still, {0: empty, 2: empty}).excluded)
+    assert np.all(carry_masks(still, {0: full, 2: full}).excluded)
+    assert carry_masks(still, {0: empty, 2: empty}).agreement == [1.0] * 3
+    assert carry_masks(still, {0: empty, 2: full}).distrusted == [1]
+
+
+def test_frames_beyond_the_keys_are_named_and_drawn_next():
+    motion, masks = sliding(9)
+    found = carry_masks(motion, {2: masks[2], 4: masks[4]})
+    assert found.distrusted == [0, 1, 5, 6, 7, 8] and found.next_key == 8
+    np.testing.assert_array_equal(found.excluded[8], masks[8])
+    assert carry_masks(motion, {4: masks[4]}).distrusted == [0, 1, 2, 3, 5, 6, 7, 8]
+
+
+def test_the_next_key_lies_where_the_sides_disagree_far_from_keys():
+    """The second of two gaps has flows of no motion, although the tool moves."""
+    motion, masks = sliding(11)
+    for i in range(5, 10):
+        motion.forward[i][:] = motion.backward[i][:] = 0
+    found = carry_masks(motion, {0: masks[0], 5: masks[5], 10: masks[10]})
+    assert found.next_key in (7, 8) and found.agreement[3] == 1.0 > found.agreement[7]
+    better = carry_masks(motion, {0: masks[0], 5: masks[5], found.next_key: masks[found.next_key], 10: masks[10]})
+    assert np.mean(better.agreement) > np.mean(found.agreement)
+
+
+def test_wrong_keys_are_refused():
+    motion, masks = sliding(3)
+    with pytest.raises(InputError, match="no key frame is given"):
+        carry_masks(motion, {})
+    with pytest.raises(InputError, match="key frame 3 is not a frame of the clip; use one of 0 to 2"):
+        carry_masks(motion, {3: masks[0]})
+    with pytest.raises(InputError, match="key 1 is 40x60, the pictures 80x60"):
+        carry_masks(motion, {1: masks[0][:, :40]})
+
+
+def test_the_command_carries_the_masks_of_a_folder(tmp_path, capsys):
+    folder = tmp_path / "clip"
+    written(folder)
+    names = sorted(file.stem for file in (folder / "images").iterdir())
+    height, width = read_png(folder / "images" / f"{names[0]}.png").shape[:2]
+    mask = np.zeros((height, width), np.uint8)
+    mask[: height // 2, : width // 3] = 255
+    keys = tmp_path / "keys"
+    keys.mkdir()
+    for name in (names[0], names[-1]):
+        write_png(keys / f"{name}.png", mask)
+    words = ["masks", str(folder), "--keys", str(keys), "--margin", "0", "--replace"]
+    assert main([*words, "--json", str(tmp_path / "said.json")]) == 0
+    assert "carried from 2 key frames, margin 0 px" in capsys.readouterr().out
+    assert json.loads((tmp_path / "said.json").read_text())["found"]
+    for name in (names[0], names[-1]):
+        np.testing.assert_array_equal(read_png(folder / "masks" / f"{name}.png"), mask)
+    assert len(list((folder / "masks").iterdir())) == len(names)
+    write_png(keys / "other.png", mask)
+    assert main(words) == 2
+    assert "other.png: is not the name of a frame; use names such as" in capsys.readouterr().err
+    assert main(["masks", str(folder), "--keys", str(tmp_path / "none"), "--replace"]) == 2
+    assert "no PNG masks of key frames" in capsys.readouterr().err
+    assert main(["masks", str(folder), "--margin", "5"]) == 2
+    assert "--margin needs --keys" in capsys.readouterr().err
+
+
+def rows_of_the_page(column: int) -> dict[int, tuple[float, float]]:
+    """Key distance -> (mean, worst) as printed in conventions, *Masks*."""
+    page = (Path(__file__).parents[3] / "docs/specification/conventions.md").read_text(encoding="utf-8")
+    found = re.findall(r"^\| (\d+) frames \| (.+) \|$", page, re.MULTILINE)
+    cells = {int(key): [float(value) for value in row.split(" | ")] for key, row in found}
+    return {key: (row[2 * column], row[2 * column + 1]) for key, row in cells.items()}
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(("clip", "column"), [("endonerf_pulling", 0), ("endonerf_cutting", 1)])
+def test_the_table_of_the_specification(clip, column):
+    """Copying the nearest key gives a mean of 0.851 on pulling with a key every ten frames, the plain flow 0.909."""
+    folder = data_folder(clip)
+    pictures = [read_png(file) for file in sorted((folder / "images").iterdir())]
+    true = [read_png(file) for file in sorted((folder / "gt_masks").iterdir())]
+    true = [(plane if plane.ndim == 2 else plane[..., 0]) > 127 for plane in true]
+    motion, last = motion_of(pictures), len(true) - 1
+    for distance, (mean, worst) in rows_of_the_page(column).items():
+        keys = {*range(0, last, distance), last}
+        found = carry_masks(motion, {key: true[key] for key in keys})
+        scores = [overlap(found.excluded[i], true[i]) for i in range(last) if i not in keys]
+        assert np.mean(scores) == pytest.approx(mean, abs=0.002), (distance, np.mean(scores))
+        assert np.min(scores) == pytest.approx(worst, abs=0.006), (distance, np.min(scores))
