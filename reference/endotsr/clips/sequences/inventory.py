@@ -1,7 +1,6 @@
 """What becomes of every field of a file: used, refused by name, or harmless. A field that is not listed is noted.
 
-Every reader of a format has an `Inventory` beside it. `noted` applies it to the names in a file. The guide prints all
-of them (`python docs/make.py recordings.fields`).
+A reader of a format has an `Inventory` beside it. `noted` applies it to the names in a file.
 """
 
 from collections.abc import Iterable, Mapping
