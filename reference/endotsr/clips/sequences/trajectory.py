@@ -5,6 +5,7 @@ The stamp is a time in seconds or a frame number. In: the file, its unit, direct
 pose per frame in millimetres or the arbitrary unit; None for frames without a pose.
 """
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,10 +54,11 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
 
 
 def _rows(path: Path) -> tuple[FloatArray, list[int]]:
-    rows, lines = [], []
+    rows, lines, order = [], [], "xyzw"
     for number, line in enumerate(read_text(path).splitlines(), 1):
         words = line.replace(",", " ").split()
         if not words or words[0].startswith("#"):
+            order = _stated_order(line) or order
             continue
         try:
             row = [float(word) for word in words]
@@ -69,11 +71,17 @@ def _rows(path: Path) -> tuple[FloatArray, list[int]]:
                 f"{path}: line {number}: the quaternion has length {np.linalg.norm(row[4:]):.4g}; allowed: 1,"
                 " in the order x y z w"
             )
-        rows.append(row)
+        rows.append(row[:4] + [row[4 + order.index(axis)] for axis in "xyzw"])
         lines.append(number)
     if not rows:
         raise InputError(f"{path}: holds no pose; allowed: lines of 8 numbers, stamp tx ty tz qx qy qz qw")
     return np.array(rows), lines
+
+
+def _stated_order(line: str) -> str:
+    """The order of the quaternion that a head line states, such as `q_w, q_x, q_y, q_z`; "" without one."""
+    found = re.findall(r"\bq\w*?_?([wxyz])\b", line)
+    return "".join(found) if sorted(found) == list("wxyz") else ""
 
 
 def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> CameraPose:
