@@ -1,9 +1,11 @@
 """Bridged times between the training frames: which are drawn, what is kept of them, and that a training uses them."""
 
 import itertools
+import time
 from collections import Counter
 
 import msgspec
+import numba
 import numpy as np
 import pytest
 
@@ -11,13 +13,14 @@ from endotsr.clips.sequences.between import flows_between, frame_between
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import DEMO, TrainingConfig
+from endotsr.method.kernels.memory import Kept
 from endotsr.training.fitting import bridged as module
-from endotsr.training.fitting.bridged import BridgedTargets
+from endotsr.training.fitting.bridged import BridgedTargets, TargetsAhead
 from endotsr.training.fitting.objective import frame_targets
 from endotsr.training.fitting.packed import STEPS
 from endotsr.training.fitting.sampling import BridgedTime, draw_view
 from endotsr.training.fitting.state import new_training, training_constants
-from endotsr.training.fitting.trainer import training_step
+from endotsr.training.fitting.trainer import train, training_step
 
 FLOW = TrainingConfig(bridge_fraction=1.0)
 
@@ -105,3 +108,57 @@ def test_without_bridges_no_target_is_made(sequence):
     for _ in range(4):
         training_step(state, constants)
     assert not len(constants.bridged.stored)
+
+
+needs_two_threads = pytest.mark.skipif(
+    bool(numba.config.DISABLE_JIT) or numba.config.NUMBA_NUM_THREADS < 2, reason="targets are not computed ahead"
+)
+
+
+def wait_for(condition):
+    limit = time.monotonic() + 60
+    while not condition() and time.monotonic() < limit:
+        time.sleep(0.01)
+    assert condition()
+
+
+@needs_two_threads
+def test_targets_computed_ahead_have_the_same_bits(sequence):
+    numba.set_num_threads(2)
+    ready, late = BridgedTargets(sequence, DEMO), BridgedTargets(sequence, DEMO)
+    with TargetsAhead() as ahead:
+        ahead.follow(ready)
+        wait_for(lambda: len(ready.stored) == len(sequence.train_index) - 1)
+    for a, b in itertools.pairwise(map(int, sequence.train_index)):
+        for one, two in zip(flat(ready.observed(BridgedTime(a, b, 0.5))), flat(late.observed(BridgedTime(a, b, 0.5)))):
+            np.testing.assert_array_equal(one, two)
+
+
+@needs_two_threads
+def test_nothing_is_computed_ahead_that_there_is_no_room_for(sequence):
+    numba.set_num_threads(2)
+    first = BridgedTargets(sequence, DEMO)
+    first.of_gap(0, 2)
+    limited = BridgedTargets(sequence, DEMO, Kept(2.5 * first.stored.bytes))
+    with TargetsAhead() as ahead:
+        ahead.follow(limited)
+        wait_for(lambda: not ahead._thread.is_alive())
+    kept = [(int(a), int(b)) for a, b in itertools.pairwise(sequence.train_index) if (a, b) in limited.stored]
+    assert kept and kept[0] == (0, 2) and len(kept) < len(sequence.train_index) - 1
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_training_does_not_depend_on_what_was_ready(sequence, threads):
+    training = {"bridge_fraction": 1.0, "iterations": 12, "threads": threads}
+    points = msgspec.structs.replace(DEMO.initialisation, first_frame_points=300, other_frame_points=60)
+    config = msgspec.structs.replace(
+        DEMO, training=msgspec.structs.replace(DEMO.training, **training), initialisation=points
+    )
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    state, constants = new_training(sequence, config), training_constants(sequence, config)
+    while state.iteration < 12:
+        training_step(state, constants)
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    other = train(new_training(sequence, config), sequence, config, lambda _: None, lambda _: None)
+    np.testing.assert_array_equal(other.gaussians.position, state.gaussians.position)
+    np.testing.assert_array_equal(other.gaussians.harmonics, state.gaussians.harmonics)

@@ -1,12 +1,16 @@
 """Targets of the renders at times between training frames (B14), computed once and cached.
 
 In: a sequence and a time between two of its training frames. Out: the targets of its losses and its camera. The first
-visit of a gap computes the targets of all its times, which need the same two flows. This module computes no loss.
+visit of a gap computes the targets of all its times, which need the same two flows. `TargetsAhead` computes them in a
+second thread before they are needed. This module computes no loss.
 """
 
+import itertools
+import threading
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from endotsr.clips.sequences.between import flows_between, frame_between
@@ -48,19 +52,29 @@ class BridgedTargets:
     sequence: Sequence
     config: Config
     stored: Kept[tuple[int, int], dict[BridgedTime, Stored]] = field(default_factory=Kept)  # by gap
+    lock: threading.Lock = field(default_factory=threading.Lock)  # of `stored`
 
     def observed(self, at: BridgedTime) -> tuple[Targets, Camera]:
         """The targets at a bridged time, in the precision of the training, and the camera there."""
-        made = self.stored.get((at.earlier, at.later), lambda: self._made(at))[at]
+        made = self.of_gap(at.earlier, at.later)[at]
         mask, precision = unpacked_mask(made.mask), self.config.training.precision
         depth = None if made.depth is None else unpacked_depth(made.depth, precision)
         rule = self.config.loss.upsampling
         supports = None if made.supports is None else unpacked_supports(made.supports, mask, rule)
         return targets_of(stored_target(made.image, STEPS, mask, precision), depth, supports, self.config), made.camera
 
-    def _made(self, wanted: BridgedTime) -> dict[BridgedTime, Stored]:
-        """The targets of all times of the gap that contains `wanted`."""
-        earlier, later, _ = wanted
+    def of_gap(self, earlier: int, later: int) -> dict[BridgedTime, Stored]:
+        """The targets of all times of a gap, from any thread. Two threads may compute the same gap, with equal bits."""
+        gap = (earlier, later)
+        with self.lock:
+            if gap in self.stored:
+                return self.stored[gap]
+        made = self._made(earlier, later)
+        with self.lock:
+            return self.stored.get(gap, lambda: made)
+
+    def _made(self, earlier: int, later: int) -> dict[BridgedTime, Stored]:
+        """The targets of all times of a gap."""
         config, precision, found = self.config, self.config.training.precision, {}
         flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)
         for place in range(1, count):
@@ -74,3 +88,53 @@ class BridgedTargets:
                 made.camera,
             )
         return found
+
+
+class TargetsAhead:
+    """A second thread that computes the targets of every gap, in order of time, while the training runs.
+
+    It ends when every gap is stored, before the limit of `BridgedTargets.stored` would drop one, or on an exception,
+    which the training then raises itself at that gap. With one thread, or with the JIT off, nothing is computed ahead.
+    No result depends on it.
+    """
+
+    def __init__(self) -> None:
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> "TargetsAhead":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+
+    def follow(self, bridged: BridgedTargets) -> None:
+        """Compute these targets from now on, instead of earlier ones."""
+        self._end()
+        alone = numba.config.DISABLE_JIT or numba.get_num_threads() < 2  # type: ignore[attr-defined]
+        if bridged.config.training.bridge_fraction > 0 and not alone:
+            self._stop = threading.Event()
+            self._thread = threading.Thread(target=_compute, args=(bridged, self._stop), daemon=True)
+            self._thread.start()
+
+    def _end(self) -> None:
+        """Wait for the gap in progress."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._thread = None
+
+
+def _compute(bridged: BridgedTargets, stop: threading.Event) -> None:
+    """The targets of every gap for which there is room."""
+    numba.set_num_threads(1)  # of this thread
+    largest = 0
+    for earlier, later in itertools.pairwise(map(int, bridged.sequence.train_index)):
+        before = bridged.stored.bytes
+        if stop.is_set() or before + 2 * largest > bridged.stored.limit:
+            return
+        try:
+            bridged.of_gap(earlier, later)
+        except Exception:
+            return  # the training meets the same exception
+        largest = max(largest, bridged.stored.bytes - before)

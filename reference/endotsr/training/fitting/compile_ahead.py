@@ -129,7 +129,7 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
         stored_target(np.zeros(frame.image.shape, np.uint16), 1, frame.mask, config.training.precision)
         flow, pair = np.zeros((2, *frame.mask.shape), np.float32), [0, 0]
         field = motion_between(Flows(flow, flow), 0.5)
-        moved_priors(constants.sequence.masks[pair], constants.sequence.depth[pair], field, field[:, 0, 0])
+        moved_priors(constants.sequence.masks[pair], constants.sequence.depth[pair], field, np.zeros(2, np.float32))
 
 
 def rehearse_optimiser(constants: Any, state: Any) -> None:

@@ -22,6 +22,7 @@ from endotsr.method.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderGrads, RenderOut
 from endotsr.training.fitting.adam import adam_update, add_array, regather
+from endotsr.training.fitting.bridged import TargetsAhead
 from endotsr.training.fitting.coarse_start import coarse_ends, coarse_start
 from endotsr.training.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.training.fitting.fused.step import optimise
@@ -93,16 +94,19 @@ def train(
     if coarse:
         on_message("coarse start: half-size frames until the fit error is below the detail that they lack")
     constants = coarse.constants if coarse else training_constants(sequence, config)
-    while state.iteration < config.training.iterations:
-        if coarse and coarse_ends(state, coarse):
-            coarse, state.coarse, constants = None, False, training_constants(sequence, config)
-            on_message(f"coarse start: full-size frames after iteration {state.iteration}")
-        entry = training_step(state, constants)
-        on_iteration(entry)
-        if advice := watch.see(entry, state.gaussians):
-            on_message(advice)
-        if state.iteration % config.training.checkpoint_every == 0:
-            on_checkpoint(state)
+    with TargetsAhead() as ahead:
+        ahead.follow(constants.bridged)
+        while state.iteration < config.training.iterations:
+            if coarse and coarse_ends(state, coarse):
+                coarse, state.coarse, constants = None, False, training_constants(sequence, config)
+                ahead.follow(constants.bridged)
+                on_message(f"coarse start: full-size frames after iteration {state.iteration}")
+            entry = training_step(state, constants)
+            on_iteration(entry)
+            if advice := watch.see(entry, state.gaussians):
+                on_message(advice)
+            if state.iteration % config.training.checkpoint_every == 0:
+                on_checkpoint(state)
     return state
 
 
