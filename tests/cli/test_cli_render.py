@@ -116,7 +116,7 @@ def test_a_film_in_slow_motion(finished_run, tmp_path, capsys):
         (["--out", "{}/a", "--camera", "-1"], "--camera -1 is not allowed; allowed: a frame from 0 to 8"),
         (["--out", "{}/a", "--size", "12"], "--size '12' is not allowed; allowed: WIDTHxHEIGHT"),
         (["--out", "{}/a", "--size", "0x9"], "allowed: an integer from 1 to 16384"),
-        (["--out", "{}/a", "--angle", "90"], "--angle 90 is not allowed"),
+        (["--out", "{}/a", "--camera", "orbit", "--angle", "90"], "--angle 90 is not allowed"),
         (["--out", "{}/a", "--offset", "nan", "0", "0"], "--offset is not allowed"),
     ],
 )

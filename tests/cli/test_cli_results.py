@@ -210,7 +210,7 @@ def test_every_setting_that_calibrate_takes_changes_the_answer(words, finished_r
 def test_calibrate_refuses_options_of_a_training(words, finished_run, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").touch()
-    said = f"{words[0]} with --calibrate-only is not allowed"
+    said = f"--calibrate-only with {words[0]}: the settings of a run are fixed"
     assert_refused(capsys, [*CALIBRATE, str(finished_run), *words], said)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.clips.sequences.stereo_depth import StereoSettings
 from endotsr.errors import InputError
@@ -58,7 +58,7 @@ def run(words: list[str]) -> int:
     options = parse(DepthOptions, words, "depth")
     if not 0 < options.unit_scale < float("inf"):
         raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
-    _refuse_contradictions(options)
+    _check_ratio(options)
     from endotsr.clips.sequences.checks.kinds import KINDS
 
     report = _made(options)
@@ -71,6 +71,8 @@ def run(words: list[str]) -> int:
     )
     if report.file.depth.method.startswith(("relative", "assumed")):
         print(f"  {report.file.depth.method}")
+    if "farthest-over-nearest" in given_names(DepthOptions, words) and not report.file.depth.assumed:
+        print("  --farthest-over-nearest changes nothing: the clip has depth that fixes scale and shift")
     if report.file.depth.assumed:
         print(f"not metric ({report.file.depth.assumed} of the depth assumed): {KINDS['assumed-depth'].why}")
     print(f"next: endotsr train {options.sequence} --out RUN")
@@ -78,12 +80,8 @@ def run(words: list[str]) -> int:
     return 0
 
 
-def _refuse_contradictions(options: DepthOptions) -> None:
-    """Raises InputError for options that exclude each other, and for an invalid ratio."""
-    if options.flat and options.given is not None:
-        raise InputError("--flat reads no files; allowed: --flat or --given")
-    if options.kind == "relative" and options.given is None:
-        raise InputError("--kind relative is not allowed without --given; allowed: --given FOLDER")
+def _check_ratio(options: DepthOptions) -> None:
+    """Raises InputError for an invalid ratio of depths."""
     if not 1 < options.farthest_over_nearest <= LARGEST_RATIO:
         raise InputError(
             f"--farthest-over-nearest {options.farthest_over_nearest:g} is not allowed; allowed: a number over 1 to"

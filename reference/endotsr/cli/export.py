@@ -5,9 +5,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import given_names, parse
+from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
-from endotsr.errors import InputError
+
+# The fact `format` of related_options: what --out writes, by its ending.
+FORMATS = {".htm": "page", ".html": "page", ".npz": "slim model", ".glb": "animated points", ".ply": "one time"}
 
 
 @dataclass
@@ -59,23 +62,20 @@ class ExportOptions:
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.method.kernels.threads import use_threads
-    from endotsr.results.export.files import GAUSSIANS, Content, export
+    from endotsr.results.export.files import Content, export
     from endotsr.results.export.times import Times
     from endotsr.studies.windows.scene import open_any, refuse_one_set
 
     options = parse(ExportOptions, words, "export")
+    kind = FORMATS.get(options.out.suffix.lower(), "folder")
+    check_relations("export", options, given_names(ExportOptions, words), {"format": kind})
     use_threads(options.threads)
     refuse_one_set(options.scene, options.out)
     times = Times(options.times, options.frames, options.count)
     content = Content(options.content, options.opacity, options.without, options.voxel)
-    if options.out.suffix.lower() in (".html", ".htm"):
-        if times.chosen or content != GAUSSIANS:
-            raise InputError(f"{options.out}: a page contains all times and the whole scene; allowed: --out alone")
+    if kind == "page":
         _write_page(options)
         return 0
-    for name, given in (("keys", options.keys), ("title", options.title), ("sequence", options.sequence)):
-        if given:
-            raise InputError(f"export: --{name} applies to a page only; allowed: with --out PAGE.html")
     said = export(open_any(options.scene), options.out, times, content)
     print(said)
     files = sorted(options.out.iterdir()) if options.out.is_dir() else [options.out]

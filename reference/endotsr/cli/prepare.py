@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import given_names, parse
+from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 
@@ -92,7 +93,7 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(PrepareOptions, words, "prepare")
     from endotsr.clips.sequences.editing import cropped, united
-    from endotsr.clips.sequences.layouts import describe
+    from endotsr.clips.sequences.layouts import describe, layout_of
     from endotsr.clips.sequences.prepare import PrepareSettings, prepare
     from endotsr.clips.sequences.sequence_file import RIGHT
     from endotsr.untrusted.writing import refuse_existing
@@ -100,10 +101,14 @@ def run(words: list[str]) -> int:
     if not options.replace:
         refuse_existing(options.out)
     _check_numbers(options)
+    layout = layout_of(options.source, options.layout).name
+    check_relations("prepare", options, given_names(PrepareOptions, words), {"layout": layout})
     settings = PrepareSettings(
         options.frames, options.drop, options.rate, options.scale, options.gaps, options.pictures, options.points
     )
     clip = describe(options.source, _stated(options))
+    if options.baseline is not None and clip.calibration is not None:
+        raise InputError("prepare: --baseline with the calibration of a pair: it states the baseline; omit --baseline")
     if options.unite_masks:
         clip = united(clip, options.unite_masks, _stated(options))
     if options.crop:
@@ -114,11 +119,13 @@ def run(words: list[str]) -> int:
         from endotsr.clips.sequences.for_others import describe_for
 
         notes += describe_for(options.out, options.also)
+    pair = (options.out / RIGHT).is_dir()
+    if options.baseline is not None and not pair:
+        notes.append("--baseline has no effect without right pictures: it is written, but nothing reads it")
     for note in notes:
         print(f"  {note}")
     camera = found.camera
     print(f"written: {options.out}, {found.frames} frames of {camera.width}x{camera.height}")
-    pair = (options.out / RIGHT).is_dir()
     print(_next_step(options.out, found.depth is not None, camera.baseline > 0, pair))
     write_result(
         options.json, source=options.source, layout=clip.layout, folder=options.out, frames=found.frames,

@@ -84,8 +84,6 @@ def run(words: list[str]) -> int:
         raise InputError("train: --out RUN is missing: the run folder to create")
     if options.calibrate_only:
         return _calibrate(options, words)
-    if options.json and not options.evaluate:
-        raise InputError("train: --json with --no-evaluate is not allowed: there are no metrics to write")
     if options.evaluate:
         load_lpips_weights(options.lpips)  # raises for unusable weights before the training
     if options.windows is not None or (options.resume and is_windowed(options.out)):
@@ -109,8 +107,6 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
     from endotsr.studies.windows.make import recording_settings, with_visits
 
     assert options.out is not None
-    if options.effects != "everything":
-        raise InputError("train: --effects auto with --windows is not allowed; allowed: `inspect` a part, set options")
     place = Place(options.workers, options.settings.training.threads or None, options.scheduler)
     check_place("train", place)
     if options.resume:
@@ -148,9 +144,6 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
     from endotsr.cli.parts.calibration import calibrate_run
 
     assert options.out is not None
-    for name in ("config", "iterations", "minutes", "resume"):
-        if getattr(options, name):
-            raise InputError(f"train: --{name} with --calibrate-only is not allowed: the settings of a run are fixed")
     folder = open_run(options.out)
     config = parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())).settings
     calibrate_run(folder, config, options.sequence or None, options.json)
@@ -170,8 +163,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     if not options.sequence:
         raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
     assert options.out is not None
-    if options.minutes is not None and (options.iterations is not None or not 0 < options.minutes < math.inf):
-        raise InputError(f"train: --minutes {options.minutes:g}: allowed: a number > 0, without --iterations")
+    if options.minutes is not None and not 0 < options.minutes < math.inf:
+        raise InputError(f"train: --minutes {options.minutes:g}: use a number > 0")
     config, source = options.settings, options.sequence
     refuse_existing(options.out)
     if source != SIMULATED:
@@ -223,8 +216,8 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     folder = open_run(options.out)
     kept = folder.config()
     remembered, simulator = run_source(folder)
-    if options.minutes is not None:
-        raise InputError(f"{options.out}: --minutes with --resume is not allowed: the length of a run is fixed")
+    if options.workers is not None or options.scheduler is not None:
+        raise InputError(f"{options.out}: --workers and --scheduler have no effect: it is no run of windows; omit them")
     asked = _accepted_settings(options.out, words, kept, len(folder.sequence_record().train_index))
     source = options.sequence or remembered
     sequence = load_sequence(source, kept, simulator)

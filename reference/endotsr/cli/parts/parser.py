@@ -15,6 +15,8 @@ import msgspec
 from endotsr.cli.parts.fields import REQUIRED, Field, fields_of
 from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
+from endotsr.cli.parts.related_options import FACTS
+from endotsr.cli.parts.relations import check_relations
 from endotsr.config import allowed_values, checked, merged
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_unwritable
@@ -31,8 +33,8 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
 
     `--help` prints the short help, `--help-all` all options; both raise SystemExit(0).
 
-    Raises:  InputError for an unknown option, a value of the wrong type or range, a missing option, and a file that
-             cannot be written.
+    Raises:  InputError for an unknown option, a value of the wrong type or range, a missing option, options that
+             exclude one another or lack their partner, and a file that cannot be written.
     """
     fields = fields_of(options, default)
     if HELP & set(words):
@@ -47,6 +49,8 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
         names = ", ".join(f.name if f.positional else f"{f.name} {f.metavar}" for f in missing)
         raise InputError(f"{command}: missing: {names}; `endotsr {command} --help` lists the options")
     found = _built(options, fields, given, default)
+    if command not in FACTS:
+        check_relations(command, found, _names(fields, given))
     refuse_unwritable(*(getattr(found, field.path[0]) for field in fields if field.written))
     return found
 
@@ -55,6 +59,17 @@ def parse_known(options: type[T], words: list[str]) -> T:
     """These options only, from words that may have others too. Raises InputError for an invalid value."""
     fields = fields_of(options)
     return _built(options, fields, _given(fields, words)[0], None)
+
+
+def given_names(options: type, words: list[str]) -> frozenset[str]:
+    """Names of the given options without dashes, as in the terms of `relations`: `model.bases`, `source-rate`."""
+    fields = fields_of(options)
+    return _names(fields, _given(fields, words)[0])
+
+
+def _names(fields: list[Field], given: dict[tuple[str, ...], Any]) -> frozenset[str]:
+    named = {field.path: field.name.removeprefix("--") for field in fields}
+    return frozenset(named[path] for path in given)
 
 
 def given_keys(options: type, words: list[str]) -> frozenset[str]:

@@ -103,6 +103,8 @@ def _poses_and_masks(
             raise InputError(f"{clip.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
         filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
+    if gaps != "refuse" and not any(lacking.values()):
+        notes.append(f"no frame lacks a mask or a pose: --gaps {gaps} changes nothing")
     if gaps == "drop":
         without = set().union(*lacking.values())
         chosen = [i for i in chosen if i not in without]

@@ -37,6 +37,8 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     times = None if options.rate else facts.times
     camera = stated_camera(options, width, height, path)
     notes = _notes(facts, rate, path)
+    if options.orientation is not None and not facts.turn:
+        notes.append(f"{path.name} states no rotation: --orientation {options.orientation} changes nothing")
     if facts.turn:
         done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
         notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth refer to these")

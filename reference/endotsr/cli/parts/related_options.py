@@ -1,0 +1,148 @@
+"""The related options of the commands: which ones exclude one another, and which ones need another.
+
+Every option that another one makes pointless stands here; `parser.parse` refuses the combination with the reason.
+`tests/cli/test_option_pairs.py` tries all pairs, and `docs/guides/options.md` shows them. In `prepare`, what a layout
+reads of the statements on a source stands in its own module (`takes`).
+"""
+
+from endotsr.cli.parts.relations import Excludes, Needs, Relation
+
+OF_PAIRS = ("nearest", "farthest", "block", "smooth", "no-smooth", "agreement", "confidence", "temporal")
+OF_FILES = ("kind", "unit-scale", "align", "farthest-over-nearest", "trust-depth")
+OF_PAGE = ("keys", "title", "no-held-out", "sequence")
+NOT_OF_PAGE = ("content", "times", "frames", "count", "opacity", "voxel", "without")
+ONE_RUN = "the settings of a run are fixed"
+RESIDUALS = ("model.appearance", "model.spectral-motion")
+
+# layout: of the source, stated or detected
+PREPARE = (
+    Excludes(("camera", "distortion"), ("calibration",), "a calibration file states intrinsics and distortion"),
+    Needs(("distortion",), ("camera",), "the coefficients belong to the intrinsics that are stated with them"),
+    Needs(
+        ("trajectory-unit", "trajectory-direction", "trajectory-axes"),
+        ("trajectory", "layout=stereomis", "layout=tum"),
+        "it describes the poses of this file",
+    ),
+    Excludes(("trajectory-axes",), ("layout=tum",), "the poses of this layout have the axes of OpenCV"),
+    Needs(("excluded-value",), ("masks", "unite-masks"), "it describes the masks of these files"),
+    Needs(("depth-unit", "depth-scale", "trust-depth"), ("depth",), "it describes the depth of these files"),
+    Needs(("points",), ("layout=colmap", "layout=points"), "only a reconstruction has points"),
+    Excludes(
+        ("source-rate",),
+        tuple(f"layout={name}" for name in ("common", "endonerf", "scared", "servct", "tum")),
+        "the layout states its times, or has none",
+    ),
+)  # fmt: skip
+DEPTH = (
+    Excludes(("flat",), ("given",), "a plane reads no files"),
+    Needs(OF_FILES, ("given",), "it describes the files of another program"),
+    Needs(
+        ("align", "farthest-over-nearest", "trust-depth"),
+        ("kind=relative",),
+        "only relative depth has a scale and a shift to fit",
+    ),
+    Excludes(("unit-scale",), ("kind=relative",), "the scale of relative depth is fitted or assumed"),
+    Excludes(("given", "flat"), OF_PAIRS, "it sets the matching of stereo pairs"),
+    Excludes(("no-smooth",), ("confidence",), "the confidence is that of the smoothing"),
+)
+TRAIN = (
+    Excludes(
+        ("calibrate-only",),
+        ("config", "preset", "iterations", "minutes", "schedule", "effects", "windows", "resume"),
+        ONE_RUN,
+    ),
+    Excludes(("calibrate-only",), ("no-evaluate", "lpips"), "it trains nothing and evaluates nothing"),
+    Excludes(("resume",), ("minutes", "effects", "windows", "overlap", "chain"), ONE_RUN),
+    Excludes(("minutes",), ("iterations",), "both set the length of the run"),
+    Excludes(("minutes", "effects=auto"), ("windows",), "each window would get settings of its own"),
+    Needs(("schedule",), ("iterations",), "only a stated length stretches the schedule"),
+    Needs(("overlap", "chain"), ("windows",), "it describes the windows"),
+    Needs(("workers", "scheduler"), ("windows", "resume"), "only windows are trained at the same time"),
+    Excludes(("workers",), ("scheduler",), "the cluster has its own workers"),
+    Excludes(("json", "lpips"), ("no-evaluate",), "there are no metrics to write"),
+)
+# Settings on the command line that others switch off. A preset or a file may hold them all.
+SETTINGS = (
+    Needs(("model.beta", "optimiser.appearance-factor"), ("model.appearance",), "it belongs to component A"),
+    Needs(
+        ("model.correlation-length", "loss.lambda-msp", "optimiser.spectral-motion-factor", "initialisation.motion"),
+        ("model.spectral-motion",),
+        "it belongs to component S",
+    ),
+    Needs(
+        ("model.frequencies", "model.frequency-min", "model.frequency-max", "training.residual-activation",
+         "optimiser.restart-residual-schedule", "optimiser.no-restart-residual-schedule"),
+        RESIDUALS,
+        "it belongs to the components A and S",
+    ),
+    Needs(
+        ("loss.lambda-lap", "loss.laplacian-from", "loss.laplacian-full", "loss.upsampling"),
+        ("model.laplacian",),
+        "it belongs to component L",
+    ),
+    Needs(
+        ("loss.gradient-ratio", "loss.calibration-views"),
+        ("loss.lambda-lap=auto",),
+        "it belongs to the calibration of this weight",
+    ),
+    Needs(
+        ("model.basis", "model.bases", "model.initial-width", "optimiser.deformation-position-factor"),
+        ("model.deformation",),
+        "it belongs to the deformation model",
+    ),
+    Needs(("optimiser.deformation",), ("model.deformation", *RESIDUALS), "it is the rate of deformation and residuals"),
+    Needs(("optimiser.exposure",), ("model.exposure",), "it is the rate of the exposures"),
+    Needs(("optimiser.pose",), ("model.pose-correction",), "it is the rate of the corrections of poses"),
+    Needs(
+        ("optimiser.harmonics-rest", "training.harmonics-interval"),
+        ("model.harmonics-degree",),
+        "degree 0 has no further harmonics",
+    ),
+    Needs(
+        ("loss.total-variation-factor", "loss.smoothness-from"),
+        ("loss.smoothness-weight",),
+        "it belongs to the smoothness terms",
+    ),
+    Needs(("density.gradient-threshold",), ("density.growth=threshold",), "a budget has no threshold"),
+    Excludes(("optimiser.annealing-from",), ("optimiser.annealed-factor=1.0",), "a factor of 1 anneals nothing"),
+    Needs(
+        ("sequence.block-length",), ("sequence.split=blocks", "sequence.split=end"), "the other splits have no blocks"
+    ),
+    Excludes(("sequence.excluded-value",), ("sequence.masks=none",), "no mask is read"),
+    Needs(
+        ("initialisation.motion-threshold",),
+        ("initialisation.other-frame-points",),
+        "it selects points of the other frames",
+    ),
+)  # fmt: skip
+RENDER = (
+    Excludes(("times", "frames", "count"), ("times", "frames", "count"), "each of them chooses the times"),
+    Excludes(("rate",), ("slow",), "both set the speed of the film"),
+    Needs(("rate", "slow", "panels"), ("film",), "it describes a film"),
+    Needs(("npy",), ("out",), "arrays are written to the folder of the pictures"),
+    Needs(("depth",), ("out", "panels=depth"), "neither pictures of depth nor a panel of depth is written"),
+    Needs(("angle",), ("camera=orbit", "camera=sway"), "the other cameras do not turn"),
+    Needs(("sequence",), ("panels=truth", "panels=error"), "only these panels show the frames of the sequence"),
+)
+# format: of --out, by its ending
+EXPORT = (
+    Excludes(("times", "frames", "count"), ("times", "frames", "count"), "each of them chooses the times"),
+    Excludes(("format=page",), NOT_OF_PAGE, "a page contains all times and the whole scene"),
+    Excludes(("format=slim model",), NOT_OF_PAGE, "a slim model stores all times and the whole scene"),
+    Excludes(("format=animated points",), ("content", "voxel"), "a .glb file stores animated points"),
+    Needs(OF_PAGE, ("format=page",), "it describes a page"),
+    Excludes(("no-held-out",), ("sequence",), "without held-out frames the sequence is not read"),
+    Needs(("opacity",), ("content=points", "format=animated points"), "it selects points"),
+    Needs(("voxel",), ("content=mesh",), "it is the resolution of a mesh"),
+)
+
+RELATIONS: dict[str, tuple[Relation, ...]] = {
+    "prepare": PREPARE,
+    "depth": DEPTH,
+    "train": (*TRAIN, *(relation._replace(unless=("resume", "calibrate-only")) for relation in SETTINGS)),
+    "render": RENDER,
+    "export": EXPORT,
+}
+# Options that only permit something: without an occasion they change nothing.
+PERMISSIONS = {"prepare": ("replace", "trust-depth", "gaps"), "depth": ("replace", "trust-depth")}
+FACTS = {"prepare": "layout", "export": "format"}  # of a command: follows from its options, and the command checks it
