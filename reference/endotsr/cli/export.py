@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
+from endotsr.cli.parts.related_options import EXPORT
 from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
 
@@ -68,7 +69,7 @@ def run(words: list[str]) -> int:
 
     options = parse(ExportOptions, words, "export")
     kind = FORMATS.get(options.out.suffix.lower(), "folder")
-    check_relations("export", options, given_names(ExportOptions, words), {"format": kind})
+    check_relations("export", EXPORT, options, given_names(ExportOptions, words), {"format": kind})
     use_threads(options.threads)
     refuse_one_set(options.scene, options.out)
     times = Times(options.times, options.frames, options.count)

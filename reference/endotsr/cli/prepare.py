@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
+from endotsr.cli.parts.related_options import PREPARE
 from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
@@ -93,22 +94,16 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(PrepareOptions, words, "prepare")
     from endotsr.clips.sequences.editing import cropped, united
-    from endotsr.clips.sequences.layouts import describe, layout_of
+    from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.prepare import PrepareSettings, prepare
     from endotsr.clips.sequences.sequence_file import RIGHT
-    from endotsr.untrusted.writing import refuse_existing
 
-    if not options.replace:
-        refuse_existing(options.out)
-    _check_numbers(options)
-    layout = layout_of(options.source, options.layout).name
-    check_relations("prepare", options, given_names(PrepareOptions, words), {"layout": layout})
+    _check_options(options, words)
     settings = PrepareSettings(
         options.frames, options.drop, options.rate, options.scale, options.gaps, options.pictures, options.points
     )
     clip = describe(options.source, _stated(options))
-    if options.baseline is not None and clip.calibration is not None:
-        raise InputError("prepare: --baseline with the calibration of a pair: it states the baseline; omit --baseline")
+    _refuse_two_baselines(options, clip.calibration is not None)
     if options.unite_masks:
         clip = united(clip, options.unite_masks, _stated(options))
     if options.crop:
@@ -133,6 +128,24 @@ def run(words: list[str]) -> int:
         notes=list(notes),
     )  # fmt: skip
     return 0
+
+
+def _check_options(options: PrepareOptions, words: list[str]) -> None:
+    """Raises InputError for an existing output, for wrong numbers, and for options that do not go together."""
+    from endotsr.clips.sequences.layouts import layout_of
+    from endotsr.untrusted.writing import refuse_existing
+
+    if not options.replace:
+        refuse_existing(options.out)
+    _check_numbers(options)
+    layout = layout_of(options.source, options.layout).name
+    check_relations("prepare", PREPARE, options, given_names(PrepareOptions, words), {"layout": layout})
+
+
+def _refuse_two_baselines(options: PrepareOptions, of_pair: bool) -> None:
+    """Raises InputError for a baseline beside the calibration of a pair."""
+    if options.baseline is not None and of_pair:
+        raise InputError("prepare: --baseline with the calibration of a pair: it states the baseline; omit --baseline")
 
 
 def _check_numbers(options: PrepareOptions) -> None:

@@ -15,7 +15,7 @@ import msgspec
 from endotsr.cli.parts.fields import REQUIRED, Field, fields_of
 from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
-from endotsr.cli.parts.related_options import FACTS
+from endotsr.cli.parts.related_options import FACTS, RELATIONS
 from endotsr.cli.parts.relations import check_relations
 from endotsr.config import allowed_values, checked, merged
 from endotsr.errors import InputError
@@ -50,7 +50,7 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
         raise InputError(f"{command}: missing: {names}; `endotsr {command} --help` lists the options")
     found = _built(options, fields, given, default)
     if command not in FACTS:
-        check_relations(command, found, _names(fields, given))
+        check_relations(command, RELATIONS.get(command, ()), found, _names(fields, given))
     refuse_unwritable(*(getattr(found, field.path[0]) for field in fields if field.written))
     return found
 

@@ -9,7 +9,7 @@ option is given; in a list of what another option needs, it holds if its value i
 holds for this value, whether given or the default.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -48,17 +48,22 @@ class _Line(NamedTuple):
     facts: Mapping[str, str]  # what follows from the values, such as the layout of the source
 
 
-def check_relations(command: str, options: Any, given: frozenset[str], facts: Mapping[str, str] = NO_FACTS) -> None:
-    """Raises InputError for the first relation of `related_options` that a command line violates.
+def check_relations(
+    command: str,
+    relations: Iterable[Relation],
+    options: Any,
+    given: frozenset[str],
+    facts: Mapping[str, str] = NO_FACTS,
+) -> None:
+    """Raises InputError for the first relation that a command line violates.
 
+    relations  those of the command in `related_options`
     options   the options of a command, with their defaults
     given     names of the options on the command line, as in a term
     facts     name and value of what follows from the options; terms name them too, as in `layout=tum`
     """
-    from endotsr.cli.parts.related_options import RELATIONS
-
     line = _Line(options, given, facts)
-    for relation in RELATIONS.get(command, ()):
+    for relation in relations:
         if any(_is_given(term, line) for term in relation.unless):
             continue
         for first in (term for term in relation.first if _is_given(term, line)):
