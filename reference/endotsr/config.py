@@ -66,7 +66,7 @@ class ModelConfig(Section, frozen=True, kw_only=True):
     pose_correction: bool = False
     """rotation and translation on top of the given pose of every training frame, eq. (B16)"""
     basis: Literal["quartic", "gaussian"] = "quartic"
-    """FDM time basis: `quartic` is what the released code computes"""
+    """FDM time basis: `quartic` is what Deform3DGS and SurgicalGS compute"""
     bases: PositiveCount = 17
     """B, time bases per channel"""
     initial_width: Positive = 0.01
@@ -171,7 +171,7 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     epsilon: Positive = 1e-15
     """Adam epsilon"""
     legacy_skip: bool = False
-    """skip the Adam step on densify iterations, as the released code does"""
+    """skip the Adam step on densify iterations, as Deform3DGS and SurgicalGS do"""
 
 
 class DensityConfig(Section, frozen=True, kw_only=True):

@@ -137,6 +137,15 @@ def test_the_answer_says_why_the_plan_for_paper_saves_more():
     one = {"psnr": 30.0, "seconds": 10.0, "numbers": 11, "gaussians": 100}
     result = {"real": ["clip"], "scenes": dict.fromkeys(("still", "clip"), [{"everything": one, "auto": one}] * 3)}
     plan = {"changes": [{"key": "model.spectral_motion"}], "time_saved": 0.04, "memory_saved": 0.072}
-    said = effects_parts.answer(result, {"clips": {"clip": {"plan": plan}}})
-    assert "nothing to save with `demo`" in said and "save 4% of the time" in said and "7% of the memory" in said
-    assert "paper" not in effects_parts.answer(result, {"clips": {"clip": {"plan": plan | {"changes": []}}}})
+    bench = {"parts": {"spectral_motion": {"saved": 0.0246, "memory_saved": 0.072}}}
+    said = effects_parts.answer(result, {"clips": {"clip": {"plan": plan}}}, bench)
+    assert "nothing to save with `demo`" in said and "saves 2% of the time" in said and "7% of the memory" in said
+    assert "paper" not in effects_parts.answer(result, {"clips": {"clip": {"plan": plan | {"changes": []}}}}, bench)
+
+
+def test_the_saving_of_the_answer_is_that_of_the_table():
+    found = effects.read()
+    row = next(line for line in effects_parts.costs(found["bench"]).splitlines() if "model.spectral_motion" in line)
+    time, memory = (cell.strip() for cell in row.split("|")[4:6])
+    made = effects.fragments(found)["answer"]
+    assert f"saves {time} of the time of an iteration and {memory} of the memory" in made

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from pages.claims import paper
 from pages.store.marks import replaced
+from pages.store.published import SEVEN_OTHERS
 
 from endotsr import __version__
 from endotsr.errors import InputError
@@ -26,12 +27,29 @@ def test_every_equation_of_the_paper_has_a_sentence():
 
 
 def test_every_claim_of_the_paper_stands_on_the_page():
-    """Levels once each (LPIPS for one of its two ranges), gains and the largest step; ours are not the paper's."""
-    table = paper.CLAIMS.read_text(encoding="utf-8").split("<!-- claims:verdicts:start -->")[1]
-    claims = [line.strip("| ").split(" | ")[0] for line in table.split("<!-- claims:verdicts:end -->")[0].splitlines()]
+    """Each statement of the verdicts has a sentence; of its metrics one is enough."""
+    table = paper.CLAIMS.read_text(encoding="utf-8").split("<!-- claims:verdicts_pulling:start -->")[1]
+    rows = table.split("<!--")[0].strip().splitlines()[2:]
+    claims = {row.strip("| ").split(" | ")[0].split(": ")[0].split(", ")[0] for row in rows}
     shown = [s.verdict for sentences in paper.SECTIONS.values() for s in sentences if s.verdict]
-    left = [c for c in claims[3:] if not any(c.startswith(start) for start in shown)]
-    assert all(c.startswith(("Ours", "The other sequences", "LPIPS, if its input is in [-1")) for c in left), left
+    left = [c for c in claims if not any(start.startswith(c) or c.startswith(start) for start in shown)]
+    assert left == []
+
+
+def test_what_the_paper_does_not_contain_is_not_on_its_page():
+    said = " ".join(s.says for sentences in paper.SECTIONS.values() for s in sentences).lower()
+    assert not any(words in said for words in ("right eye", "every second", "blocks of two", "end of the clip"))
+
+
+def test_lpips_has_the_verdict_of_both_ranges_of_its_input():
+    shown = [s.verdict for s in paper.SECTIONS["Results"] if s.verdict.startswith("Level: LPIPS")]
+    assert shown == ["Level: LPIPS, input in [0, 1]", "Level: LPIPS, input in [-1, 1]"]
+    assert paper.verdict_on("pulling", shown[0]) != paper.verdict_on("pulling", shown[1])
+
+
+def test_the_other_systems_have_their_printed_values():
+    table = paper.systems()
+    assert all(f"| {value:.2f} |" in table for value in SEVEN_OTHERS) and "not at hand" not in table
 
 
 def test_a_name_that_is_gone_stops_the_page():

@@ -1,4 +1,4 @@
-"""Write the generated parts of docs/claims.md and docs/guides/sweep.md, and pictures, from the existing results.
+"""Write the generated parts of docs/claims.md, docs/guides/sweep.md and the answer of README.md and docs/paper.md.
 
     python docs/make.py claims            from docs/results
     python docs/make.py claims FOLDER     from the files of another folder
@@ -9,6 +9,8 @@ To measure, on an otherwise idle machine (each command continues where it was in
 
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
         --json docs/results/ablation_pulling.json
+    endotsr ablate ../shared/data/endonerf_cutting --out runs/ablation_cutting --lpips LPIPS.npz \
+        --json docs/results/ablation_cutting.json
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_half --lpips LPIPS.npz --scale 0.5 \
         --iterations 1750 --splits every_second --configurations base A+S+L --no-fixed-count \
         --measures right_view --json docs/results/ablation_pulling_half.json
@@ -32,7 +34,9 @@ from typing import Any
 from endotsr.errors import InputError
 from endotsr.studies.sweeps.ablation_page import ablation_record, draw
 from endotsr.studies.sweeps.execute import FINISHED
+from endotsr.studies.sweeps.results import METRICS
 from endotsr.training.runs.files import write_json
+from pages.claims import answer as claims_answer
 from pages.claims import parts as claims_parts
 from pages.claims import power as claims_power
 from pages.claims import protocols as claims_protocols
@@ -41,14 +45,19 @@ from pages.store.marks import read_json, write_marked
 
 DOCS = Path(__file__).parents[2]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
+PAGES = (PAGE, GUIDE, DOCS / "paper.md", DOCS.parent / "README.md")  # with a part of this program
 FILES = {
     "pulling": "ablation_pulling.json",
+    "cutting": "ablation_cutting.json",
     "pulling_half": "ablation_pulling_half.json",
     "pulling_half_blocks": "ablation_pulling_half_blocks.json",
     "pulling_half_fixed": "ablation_pulling_half_fixed.json",
     "simulated": "ablation_simulated.json",
     "simulated_paper": "ablation_simulated_paper.json",
 }
+UNSEEN = 73  # test frame of cutting with a region that no training frame shows
+PICTURE = "![Differences between configurations on cutting with their intervals](results/ablation_cutting.svg)\n\n"
+NO_FRAMES = "The metrics of single frames are not recorded in these runs (`endotsr ablate --collect` records them)."
 COST = "sweep_cost.json"  # by docs/pages/claims/sweep_cost.py
 RUNS = "pulling*.json"  # records of single runs, by docs/pages/full_size/record.py
 
@@ -64,8 +73,20 @@ def read(folder: Path) -> dict[str, Any]:
 def compared(record: Any) -> Any:
     """The record of an ablation with the differences listed in `COMPARISONS`."""
     rows: Any = [{**row, "status": FINISHED} for row in record["rows"]]
-    again = ablation_record(rows, record["command"])
-    return {**record, "levels": again["levels"], "increments": again["increments"]}
+    again = ablation_record(rows, record["command"], unrecorded=True)
+    return {**record, **{key: again[key] for key in ("format", "levels", "increments")}}
+
+
+def without_frames(record: Any, left_out: set[int]) -> Any:
+    """The record with means over the other held-out frames; None if the metrics of the frames are not recorded."""
+    if record is None or not all(row.get("per_frame") for row in record["rows"]):
+        return None
+    rows = []
+    for row in record["rows"]:
+        frames = [frame for frame in row["per_frame"] if frame["frame"] not in left_out]
+        of = {metric: [f[metric] for f in frames if f.get(metric) is not None] for metric in METRICS}
+        rows.append({**row, **{metric: sum(v) / len(v) if v else None for metric, v in of.items()}})
+    return compared({**record, "rows": rows})
 
 
 def read_runs(folder: Path) -> list[dict[str, Any]]:
@@ -78,19 +99,39 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
     found, runs, cost = read(folder), read_runs(folder), folder / COST
     half = [found[name] for name in FILES if name.startswith("pulling_half")]
     return {
-        "verdicts": claims_verdicts.verdicts(found["pulling"], half, runs),
+        **{f"verdicts_{clip}": claims_verdicts.verdicts(found[clip], clip) for clip in claims_verdicts.CLIPS},
+        "verdicts_both": claims_verdicts.verdicts_of_both(found),
+        "cutting_without": without_73(found["cutting"]),
+        "ours": claims_protocols.ours(found, half),
+        "visits": claims_protocols.visits(),
+        "answer": claims_answer.answer(folder, found_clips(found), half, claims_protocols.gain_of_the_right_eye(half)),
+        "spread": " ".join(claims_power.common_spread(found[clip], clip) for clip in claims_verdicts.CLIPS),
         "right_eye": claims_protocols.right_eye(found["pulling_half"]),
         "power": claims_power.sentences(found["pulling"]),
         "pulling": claims_parts.tables(found["pulling"]),
+        "cutting": (PICTURE if found["cutting"] else "") + claims_parts.tables(found["cutting"]),
         "pulling_half": claims_parts.tables(found["pulling_half"]),
         "pulling_half_blocks": claims_parts.tables(found["pulling_half_blocks"]),
         "pulling_half_fixed": claims_parts.tables(found["pulling_half_fixed"]),
         "simulated": claims_parts.tables(found["simulated"]),
         "simulated_paper": claims_parts.tables(found["simulated_paper"]),
-        "protocols": claims_parts.protocols([found["pulling"], *half], runs),
+        "protocols": claims_parts.protocols([found["pulling"], found["cutting"], *half], runs),
         "cost": claims_parts.cost(found["pulling"], runs),
         "divided": claims_parts.divided(read_json(cost, "docs/pages/claims/sweep_cost.py") if cost.exists() else None),
     }
+
+
+def found_clips(found: dict[str, Any]) -> dict[str, Any]:
+    """The ablations of the two clips of the paper."""
+    return {clip: found[clip] for clip in claims_verdicts.CLIPS}
+
+
+def without_73(cutting: Any) -> str:
+    """The verdicts on cutting without the test frame that shows a region of no training frame."""
+    if cutting is None:
+        return claims_verdicts.NOT_YET
+    found = without_frames(cutting, {UNSEEN})
+    return NO_FRAMES if found is None else claims_verdicts.verdicts(found, "cutting")
 
 
 def draw_ablations(folder: Path) -> None:
@@ -108,7 +149,7 @@ def main(words: list[str]) -> None:
     try:
         folder = Path(words[0]) if words else RESULTS
         made = parts(folder)
-        for page in (PAGE, GUIDE):
+        for page in PAGES:
             write_marked(page, made, "claims")
         draw_ablations(folder)
     except InputError as error:

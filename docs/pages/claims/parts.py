@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.results.report.tables import markdown
-from endotsr.studies.sweeps.ablation_page import increment_table, level_table
+from endotsr.studies.sweeps.ablation_page import UNRECORDED, increment_table, level_table
 from pages.claims.verdicts import FULL, NOT_YET
 
 BEGIN_MINUTES = 1.0  # of a worker before its first iteration, kernels not compiled before
@@ -24,7 +24,7 @@ def tables(found: Record | None) -> str:
         f"{runs['finished']} of {runs['planned']} runs, {len(runs['failed'])} failed; {machine['processor']}, "
         f"{machine['cores']} cores, {found['date'][:10]}."
     )
-    parts = [made]
+    parts = [made] if all(row["input_recorded"] for row in found["increments"]) else [made, UNRECORDED]
     for split in dict.fromkeys(level["split"] for level in found["levels"]):
         parts += [f"Held out: `{split}`", level_table(found, split), differences(found, split)]
     return "\n\n".join(parts)

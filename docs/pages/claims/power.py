@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.studies.sweeps.ablation import COMPARISONS, FIXED
+from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS, FIXED
+from pages.claims.estimates import spread as variance
 
 POWER, LEVEL = 0.8, 0.05
+NAMES = {"ssim_tissue": "SSIM of tissue", "lpips": "LPIPS"}
 FREE, AT_FIXED = "a free number of Gaussians", "a fixed number"
 Record = dict[str, Any]
 
@@ -46,10 +48,13 @@ def least_size(pairs: int) -> float:
 @lru_cache
 def pairs_needed(size: float) -> int:
     """The smallest number of seeds that distinguishes a mean over the standard deviation from 0."""
-    pairs = 2
-    while power(size, pairs) < POWER:
-        pairs += 1 if pairs < 20 else pairs // 10
-    return pairs
+    low, high = 1, 2
+    while power(size, high) < POWER:
+        low, high = high, 2 * high
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if power(size, middle) >= POWER else (middle, high)
+    return high
 
 
 def spread(found: Record, metric: str, kind: str) -> float:
@@ -84,13 +89,30 @@ def sentences(found: Record | None) -> str:
         f"{least_size(pairs) * deviation:.2f} dB with {kind} (standard deviation {deviation:.3f} dB)"
         for kind, deviation in spreads.items()
     )
-    steps = [c for c in COMPARISONS if c.published]
+    gains = [(c.claim, clip, of["psnr_full"]) for c in COMPARISONS for clip, of in c.published.items()]
     needed = ", ".join(
-        f"{c.claim} {c.published:+.2f} dB: {pairs_needed(abs(c.published or 1) / spreads[kind_of(c.claim)])}"
-        for c in steps
+        f"{claim}{'' if clip == BOTH else f' ({clip})'} {gain:+.2f} dB: {pairs_needed(gain / spreads[kind_of(claim)])}"
+        for claim, clip, gain in gains
     )
     return (
         f"**Power.** {pairs} seeds distinguish a true difference from 0 with a probability of {100 * POWER:.0f} % "
         f'if it is at least {seen}. A smaller one is most likely "not decided", whether it exists or not. The '
         f"published gains would need this many seeds: {needed}."
     )
+
+
+def common_spread(found: Record | None, clip: str) -> str:
+    """The standard deviation of the run x seed analysis of variance, with its degrees of freedom."""
+    if found is None:
+        return f"EndoNeRF {clip}: not measured yet."
+    shown = []
+    for kind, fixed in ((FREE, False), (AT_FIXED, True)):
+        of = {metric: variance(found, metric, fixed) for metric in ("psnr_full", "ssim_tissue", "lpips")}
+        known = {metric: value for metric, value in of.items() if value is not None}
+        if first := known.get("psnr_full"):
+            rest = ", ".join(f"{NAMES[m]} {value.deviation:.5f}" for m, value in known.items() if m != "psnr_full")
+            shown.append(
+                f"with {kind} {first.deviation:.3f} dB ({rest}) from {first.configurations} configurations and "
+                f"{first.seeds} seeds, {first.freedom} degrees of freedom"
+            )
+    return f"EndoNeRF {clip}: {'; '.join(shown)}." if shown else f"EndoNeRF {clip}: not enough seeds yet."

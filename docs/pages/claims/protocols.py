@@ -1,7 +1,7 @@
-"""Rows of docs/claims.md on other held-out frames, the right camera and a fixed count, where nothing is published.
+"""Rows of docs/claims.md that the paper does not contain: other held-out frames, the right camera, single components.
 
-They come from ablations at half size (`ablation_pulling_half*.json`), paired by seed: the whole method minus the base,
-and at a fixed count the whole method minus the method without the detail loss.
+Those on other frames come from ablations at half size (`ablation_pulling_half*.json`), paired by seed: the whole method
+minus the base, and at a fixed count the whole method minus the method without the detail loss.
 `endotsr evaluate --measures right_view` measures the right camera on two sets of frames: held-out frames, with a new
 time and view, and training frames, with only a new view.
 """
@@ -10,9 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.studies.sweeps.ablation import COMPARISONS, FIXED, Contrast, paired
+from endotsr.clips.sequences.splits import split_frames
+from endotsr.results.report.tables import markdown
+from endotsr.studies.sweeps.ablation import COMPARISONS, FIXED, NO_PRIOR, Contrast, paired
 from endotsr.studies.sweeps.execute import FINISHED
+from pages.claims.estimates import SPLIT, Estimate, contrast
 from pages.claims.power import least_size
+from pages.claims.rules import LEAST_PAIRS, few, without_published
+from pages.claims.verdicts import CLIPS, FULL, METRICS, between, student
 from pages.store.intervals import interval
 
 Record = Any  # content of a file of docs/results
@@ -26,15 +31,82 @@ PROTOCOLS = (  # what is held out, comparison, split, metric
     ("Blocks of 2 frames held out", WHOLE, "blocks 2", "psnr_full"),
     ("The end of the clip held out", WHOLE, "end 8", "psnr_full"),
 )
+SINGLE = (  # statement, coefficients, with a common spread of the configurations
+    ("A against S, each alone on the base", {"A": 1, "S": -1}),
+    ("A alone improves on the base", {"A": 1, "base": -1}),
+    ("L alone improves on the base", {"L": 1, "base": -1}),
+    ("The Matérn prior with a free number of Gaussians", {"S": 1, NO_PRIOR: -1}),
+)
 MOVED = "left picture moved by the prior depth"  # needs no model, and no other frame
-LEAST_PAIRS = 3  # with fewer, no verdict
-UNMEASURED = ["not at hand", "not measured", "-", "-", "-"]
+FRAMES = 63  # of pulling
+UNMEASURED = ["not measured", "-", "-", "-"]
+HEADS = ("ours", "compared", "verdict", "mean", "95 % interval", "seen with 80 %")
+
+
+def ours(found: dict[str, Record | None], half: list[Record | None]) -> str:
+    """Every row that the paper does not contain."""
+    rows = [_single_row(found[clip], clip, *one) for clip in CLIPS for one in SINGLE]
+    rows += protocol_rows(half)
+    rows += [_motion_row(found[clip], clip) for clip in CLIPS]
+    return markdown(HEADS, rows)
+
+
+def _single_row(found: Record | None, clip: str, says: str, terms: dict[str, int]) -> list[str]:
+    first, second = terms
+    claim = [f"{says}, {clip}", f"{first} - {second}"]
+    estimate = contrast(found, terms, "psnr_full")
+    if estimate is None:
+        return [*claim, *UNMEASURED]
+    form = METRICS["psnr_full"].signed
+    verdict = without_published(estimate.paired, len(estimate.values))
+    return [*claim, verdict, form.format(estimate.mean), between(estimate.paired, form), _resolved(estimate)]
+
+
+def _resolved(of: Estimate) -> str:
+    """The smallest true difference that the seeds of this row distinguish from 0."""
+    count = len(of.values)
+    return "-" if count < 2 else f"{least_size(count) * float(np.std(of.values, ddof=1)):.2f} dB"
+
+
+def _motion_row(found: Record | None, clip: str) -> list[str]:
+    """Whether the motion improves times between frames."""
+    claim = [f"Between the frames the motion is better than a cross-fade of the model's own renders, {clip}",
+             f"{FULL} - cross-fade, tissue"]  # fmt: skip
+    rows = [] if found is None else [r for r in found["rows"] if (r["configuration"], r["split"]) == (FULL, SPLIT)]
+    values = [
+        r["psnr_tissue"] - r["cross_fade_psnr_tissue"] for r in rows
+        if r.get("psnr_tissue") is not None and r.get("cross_fade_psnr_tissue") is not None
+    ]  # fmt: skip
+    if not values:
+        return [*claim, *UNMEASURED]
+    mean, limits = student(values)
+    verdict = without_published(limits, len(values))
+    return [*claim, verdict, f"{mean:+.2f} dB", between(limits, "{:+.2f} dB"), "-"]
+
+
+def visits() -> str:
+    """Training frames and visits of a frame, for every split of the trainings at half size."""
+    length, full = 1750, 6000
+    shown = []
+    for split, of, label in (("every_second", 0, "every second frame"), ("blocks", 2, "blocks of 2"),
+                             ("end", 8, "the end"), ("every_eighth", 0, "every eighth frame")):  # fmt: skip
+        trained = len(split_frames(FRAMES, split, of)[0])
+        shown.append(f"{length / trained:.0f} visits to each of {trained} frames with {label} held out")
+    published = full / len(split_frames(FRAMES, "every_eighth", 0)[0])
+    return f"{length} iterations make {'; '.join(shown)}. A full training makes {published:.0f} visits to each frame."
 
 
 def protocol_rows(half: list[Record | None]) -> list[list[str]]:
-    """Claim, configurations, published value, verdict, mean, 95 % interval, smallest resolved difference."""
+    """Statement, configurations, verdict, mean, 95 % interval, smallest resolved difference."""
     rows = [with_right_eye(row) for found in half if found is not None for row in found["rows"]]
     return [_row(rows, *protocol) for protocol in PROTOCOLS]
+
+
+def gain_of_the_right_eye(half: list[Record | None]) -> str:
+    """Mean and interval of the gain on the right camera at held-out times, or ""."""
+    label = next(protocol[0] for protocol in PROTOCOLS if protocol[3] == "held_out_psnr")
+    _, _, verdict, mean, limits, _ = next(row for row in protocol_rows(half) if row[0] == label)
+    return "" if verdict == UNMEASURED[0] else f"{mean} (95 % interval {limits})"
 
 
 def with_right_eye(row: Record) -> Record:
@@ -50,17 +122,17 @@ def _row(rows: list[Record], label: str, of: Contrast, split: str, metric: str) 
     if not found:
         return [*claim, *UNMEASURED]
     if len(found) < LEAST_PAIRS:
-        few = f"not decided: {len(found)} of {LEAST_PAIRS} seeds"
-        return [*claim, "not at hand", few, f"{np.mean(found):+.2f} dB", "-", "-"]
+        return [*claim, few(len(found)), f"{np.mean(found):+.2f} dB", "-", "-"]
     mean, half_width = interval(found)
     low, high = mean - half_width, mean + half_width
     least = least_size(len(found)) * float(np.std(found, ddof=1))
     shown = f"{round(mean, 2) + 0.0:+.2f} dB"  # no "-0.00"
-    return [*claim, "not at hand", decided(low, high), shown, f"{low:+.2f} to {high:+.2f} dB", f"{least:.2f} dB"]
+    verdict = without_published((low, high), len(found))
+    return [*claim, verdict, shown, f"{low:+.2f} to {high:+.2f} dB", f"{least:.2f} dB"]
 
 
 def _differences(rows: list[Record], of: Contrast, split: str, metric: str) -> list[float]:
-    return [pair.difference for pair in paired(rows, of, split, metric)]
+    return [pair.difference for pair in paired(rows, of, split, metric, unrecorded=True)]
 
 
 def right_eye(half: Record | None) -> str:
@@ -76,11 +148,6 @@ def right_eye(half: Record | None) -> str:
     labels = {row["label"]: row["training_psnr"] for row in measured[0]["measures"]["right_view"]["rows"]}
     models = ", ".join(f"`{name}` {mean:.2f} dB" for name, mean in means.items())
     return f"Right camera at training times: {models}, {MOVED} {labels[MOVED]:.2f} dB."
-
-
-def decided(low: float, high: float) -> str:
-    """The verdict without a published value, from the ends of the interval."""
-    return "gains" if low > 0 else "loses" if high < 0 else "not decided: the interval contains 0"
 
 
 def _about(rows: list[Record], split: str) -> str:

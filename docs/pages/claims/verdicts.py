@@ -1,191 +1,238 @@
-"""The verdicts of docs/claims.md, claim by claim.
+"""The verdicts of docs/claims.md on what the paper states, clip by clip and for the mean of both clips.
 
-Verdicts follow from numbers alone. For a difference with the published value p and Student's 95 % interval I of its
-mean: I contains p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: only the direction,
-or the opposite. A claim of no change (p = 0) is reproduced if I is within HUNDREDTH of 0.
-`sweeps.ablation.COMPARISONS` defines the two configurations of each claim.
+`rules` decides; `endotsr.studies.sweeps.ablation.COMPARISONS` defines the two configurations of each claim.
 """
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from endotsr.results.report.tables import markdown
-from endotsr.studies.sweeps.ablation import COMPARISONS, Contrast
-from endotsr.studies.sweeps.ablation_page import interval_text
-from pages.claims.power import least_difference
-from pages.claims.protocols import LEAST_PAIRS, protocol_rows
+from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS, Contrast
+from pages.claims.estimates import Estimate, Interval, averaged, contrast, runs_of
+from pages.claims.rules import increment_verdict, largest_verdict, level_verdict, no_change_verdict
 from pages.store.intervals import interval
-from pages.store.published import PUBLISHED
+from pages.store.published import MATCHED_LPIPS, MATCHED_PSNR, PRIOR, PUBLISHED
 
 NOT_YET = "Not measured yet."
-HUNDREDTH = 0.01  # dB
-SCOPE = ", mean over EndoNeRF"  # scope of the published gains of the steps
-FULL, SPLIT = "A+S+L", "every_eighth"
-LEVELS = (  # key, key of the published value, name, larger is better, unit of the last published digit
-    ("psnr_full", "psnr_full", "PSNR full", "{:.2f} dB", True, 0.01),
-    ("ssim_full", "ssim_full", "SSIM full", "{:.4f}", True, 0.001),
-    ("lpips", "lpips", "LPIPS, if its input is in [0, 1]", "{:.4f}", False, 0.001),
-    ("lpips_symmetric", "lpips", "LPIPS, if its input is in [-1, 1]", "{:.4f}", False, 0.001),
-)
-WHOLE = "all three"  # of `COMPARISONS`: the whole method against the base
-RANGES = (  # what is compared, metric, published range, format
-    ("PSNR full", "psnr_full", (0.31, 0.66), "{:+.2f} dB"),
-    ("LPIPS, if its input is in [0, 1]", "lpips", (-0.0096, -0.0035), "{:+.4f}"),
-    ("LPIPS, if its input is in [-1, 1]", "lpips_symmetric", (-0.0096, -0.0035), "{:+.4f}"),
-)
-STEPS = COMPARISONS[:3]  # of the paper's cumulative ablation
+FULL = "A+S+L"
+CLIPS = ("pulling", "cutting")
+HEADS = (
+    "the paper, in our words", "compared", "published", "mean (median)", "better in", "paired interval", "verdict",
+    "common spread", "verdict with it",
+)  # fmt: skip
+
+
+class Metric(NamedTuple):
+    """How a metric is shown."""
+
+    key: str
+    label: str
+    form: str  # of a level
+    signed: str  # of a difference
+    larger: bool  # is better
+
+
+METRICS = {
+    metric.key: metric
+    for metric in (
+        Metric("psnr_full", "PSNR", "{:.2f} dB", "{:+.3f} dB", True),
+        Metric("ssim_full", "SSIM", "{:.4f}", "{:+.4f}", True),
+        Metric("ssim_tissue", "SSIM of tissue", "{:.4f}", "{:+.4f}", True),
+        Metric("lpips", "LPIPS, input in [0, 1]", "{:.4f}", "{:+.4f}", False),
+        Metric("lpips_symmetric", "LPIPS, input in [-1, 1]", "{:.4f}", "{:+.4f}", False),
+    )
+}
+ROUNDED = {
+    "psnr_full": 0.005,
+    "ssim_tissue": 0.00005,
+    "lpips": 0.00005,
+    "lpips_symmetric": 0.00005,
+}  # half a last digit
+LEVELS = (("psnr_full", "psnr_full", 0.01), ("ssim_full", "ssim_full", 0.001), ("lpips", "lpips", 0.001),
+          ("lpips_symmetric", "lpips", 0.001))  # fmt: skip  # key, key of the published value, unit of its last digit
+COMPARED = ("psnr_full", "ssim_tissue", "lpips", "lpips_symmetric")  # of the steps
+MATCHED = {"psnr_full": MATCHED_PSNR, "lpips": MATCHED_LPIPS, "lpips_symmetric": MATCHED_LPIPS}
+STEPS = {"S": {"S": 1, "base": -1}, "A": {"A+S": 1, "S": -1}, "L": {"A+S+L": 1, "A+S": -1}}
+WHOLE = {FULL: 1, "base": -1}
 Record = Any  # content of a file of docs/results
 
 
-def verdicts(found: Record | None, half: list[Record | None], runs: list[Record]) -> str:
-    """Claim by claim: the compared configurations, the published value, verdict, number, interval."""
-    rows = [_level_row(found, runs, *level) for level in LEVELS]
-    rows += [_increment_row(found, comparison) for comparison in COMPARISONS if comparison.says]
-    rows += [_range_row(found, *claim) for claim in RANGES]
-    rows.append(_largest_row(found))
-    rows.append(
-        ["The other sequences of the paper", "-", "-", "not testable: their pictures are not at hand", "-", "-"]
-    )
-    rows += protocol_rows(half)
-    rows.append(_motion_row(found))
-    heads = (
-        "the paper, in our words", "compared", "published", "verdict on pulling", "measured", "95 % interval",
-        "seen with 80 %",
-    )  # fmt: skip
-    return markdown(heads, [row if len(row) == len(heads) else [*row, "-"] for row in rows])
+def verdicts(found: Record | None, clip: str) -> str:
+    """What the paper states about a clip, each claim with its number, intervals and verdict."""
+    if found is None:
+        return NOT_YET
+    rows = [_level_row(found, clip, *level) for level in LEVELS]
+    rows.append(_base_row(found, clip))
+    rows += [_increment_row([found], c, metric, clip) for c in COMPARISONS if c.says for metric in _metrics(c)]
+    rows += [_matched_row(found, metric) for metric in MATCHED]
+    rows += [_median_row(found, metric) for metric in MATCHED]
+    rows.append(_every_seed_row(found))
+    rows += [_largest_row([found], metric) for metric in COMPARED]
+    return markdown(HEADS, rows)
 
 
-def increment_verdict(
-    published: float, low: float | None, high: float | None, pairs: int, last: float | None = None
-) -> str:
-    """The verdict on a difference; see the module docstring.
-
-    last   other end of a published range, which the interval must then intersect
-    """
-    first, last = sorted((published, published if last is None else last))
-    if low is None or high is None or pairs < LEAST_PAIRS:
-        return f"not decided: {pairs} of {LEAST_PAIRS} seeds"
-    if published == 0.0:
-        if -HUNDREDTH <= low and high <= HUNDREDTH:
-            return "reproduced"
-        return "not decided: the interval is wider" if low < HUNDREDTH and high > -HUNDREDTH else "not reproduced"
-    holds, nothing = low <= last and first <= high, low <= 0.0 <= high
-    if holds:
-        return "not decided: the interval contains 0 too" if nothing else "reproduced"
-    if nothing:
-        return "not reproduced"
-    return "direction reproduced, size not" if (low > 0) == (published > 0) else "not reproduced: the opposite"
+def verdicts_of_both(found: Mapping[str, Record | None]) -> str:
+    """The steps and the largest of them in the mean of both clips, as the paper gives them."""
+    records = [found[clip] for clip in CLIPS]
+    if any(record is None for record in records):
+        missing = ", ".join(clip for clip in CLIPS if found[clip] is None)
+        return f"Not measured yet: {missing} is missing. The steps of the paper are means over both clips."
+    steps = [c for c in COMPARISONS if BOTH in c.published]
+    rows = [_increment_row(records, c, metric, BOTH) for c in steps for metric in _metrics(c)]
+    return markdown(HEADS, rows + [_largest_row(records, metric) for metric in COMPARED])
 
 
-def level_verdict(published: float, low: float | None, high: float | None, larger_is_better: bool, unit: float) -> str:
-    """The verdict on a mean: reproduced if its interval reaches a value that rounds to the published one, or a better.
-
-    unit   of the last published digit
-    """
-    if low is None or high is None:
-        return "not decided: one seed"
-    reached = high >= published - unit / 2 if larger_is_better else low <= published + unit / 2
-    return "reproduced" if reached else "not reproduced"
-
-
-def student(values: list[float]) -> tuple[float, float | None, float | None]:
+def student(values: list[float]) -> tuple[float, Interval]:
     """Mean and 95 % interval (Student) of values of several seeds; no interval for one."""
     mean, half = interval(values)
-    return (mean, None, None) if len(values) < 2 else (mean, mean - half, mean + half)
+    return mean, None if len(values) < 2 else (mean - half, mean + half)
 
 
-def full_runs(found: Record | None, runs: list[Record], key: str) -> list[float]:
-    """A metric of the runs of the whole method with the preset `paper`: of the ablation, else of recorded runs."""
-    if found is not None:
-        chosen = [r for r in found["rows"] if (r["configuration"], r["split"], r["preset"]) == (FULL, SPLIT, "paper")]
-        if values := [row[key] for row in chosen if row.get(key) is not None]:
-            return values
-    settings = [(run["run"]["settings"], run["held_out"]["mean"].get(key)) for run in runs]
-    return [v for s, v in settings if v is not None and s["preset"] == "paper" and s["sequence"]["split"] == SPLIT]
+def _metrics(of: Contrast) -> list[str]:
+    stated = {metric for values in of.published.values() for metric in values}
+    return [metric for metric in COMPARED if metric in stated] or ["psnr_full"]
 
 
-def _level_row(
-    found: Record | None, runs: list[Record], key: str, of: str, label: str, form: str, larger: bool, unit: float
-) -> list[str]:
-    published = PUBLISHED["pulling"][of]
-    claim = [label, FULL, f"{published:g}"]
-    values = full_runs(found, runs, key)
+def _terms(of: Contrast) -> dict[str, int]:
+    return {of.with_: 1, of.without: -1}
+
+
+def _estimated(records: list[Record], terms: Mapping[str, int], metric: str) -> Estimate | None:
+    found = [contrast(record, terms, metric) for record in records]
+    known = [estimate for estimate in found if estimate is not None]
+    if len(known) < len(records):
+        return None
+    return known[0] if len(known) == 1 else averaged(known)
+
+
+def between(limits: Interval, form: str) -> str:
+    """An interval as text."""
+    return "-" if limits is None else f"{form.format(limits[0])} to {form.format(limits[1])}".replace(" dB to", " to")
+
+
+def _wins(values: tuple[float, ...], larger: bool) -> int:
+    return sum((value > 0) == larger and value != 0 for value in values)
+
+
+def _cells(estimate: Estimate, metric: Metric) -> tuple[str, str, str, str]:
+    """Mean and median, improved seeds, and both intervals as text."""
+    count = len(estimate.values)
+    shown = f"{metric.signed.format(estimate.mean)} ({metric.signed.format(estimate.median).removesuffix(' dB')})"
+    improved = f"{_wins(estimate.values, metric.larger)} of {count}"
+    return shown, improved, between(estimate.paired, metric.signed), between(estimate.common, metric.signed)
+
+
+def _row(claim: list[str], estimate: Estimate | None, metric: Metric, verdict: Any) -> list[str]:
+    """A row with both intervals; `verdict` maps an interval and the number of seeds to words."""
+    if estimate is None:
+        return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
+    shown, improved, paired, common = _cells(estimate, metric)
+    count = len(estimate.values)
+    of_common = "-" if estimate.common is None else verdict(estimate.common, count)
+    return [*claim, shown, improved, paired, verdict(estimate.paired, count), common, of_common]
+
+
+def _level_row(found: Record, clip: str, key: str, of: str, unit: float) -> list[str]:
+    metric, published = METRICS[key], PUBLISHED[clip][of]
+    claim = [f"Level: {metric.label}", FULL, f"{published:g}{' dB' if 'dB' in metric.form else ''}"]
+    values = list(runs_of(found, FULL, key).values())
     if not values:
-        return [*claim, NOT_YET, "-", "-"]
-    mean, low, high = student(values)
-    shown = "-" if low is None or high is None else f"{form.format(low)} to {form.format(high)}"
-    measured = f"{form.format(mean)}, {len(values)} seed{'s' if len(values) > 1 else ''}"
-    return [*claim, level_verdict(published, low, high, larger, unit), measured, shown]
+        return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
+    mean, limits = student(values)
+    verdict = level_verdict(published, limits, metric.larger, unit)
+    return [*claim, metric.form.format(mean), f"{len(values)} seeds", between(limits, metric.form), verdict, "-", "-"]
 
 
-def _of(found: Record | None, claim: str, metric: str = "psnr_full") -> Record | None:
-    wanted = (claim, SPLIT, metric)
-    rows = found["increments"] if found is not None else []
-    return next((r for r in rows if (r["claim"], r["split"], r["metric"]) == wanted), None)
-
-
-def _increment_row(found: Record | None, comparison: Contrast) -> list[str]:
-    published, entry = comparison.published or 0.0, _of(found, comparison.claim)
-    claim = [
-        comparison.says,
-        f"{comparison.with_} - {comparison.without}",
-        f"{published:+.2f} dB{SCOPE if comparison in STEPS else ''}",
-    ]
-    if entry is None:
-        return [*claim, NOT_YET, "-", "-"]
-    verdict = increment_verdict(published, entry["student_low"], entry["student_high"], entry["pairs"])
-    least = least_difference(found, comparison.claim)
-    shown = interval_text(entry, "student", 3) + _unit(entry)
-    return [*claim, verdict, f"{entry['mean']:+.3f} dB", shown, "-" if least is None else f"{least:.2f} dB"]
-
-
-def _range_row(found: Record | None, label: str, metric: str, ends: tuple[float, float], form: str) -> list[str]:
-    """The whole method against the base with matched input, called SurgicalGS in the paper."""
-    claim = [
-        f"{label}, over SurgicalGS with matched input (our base)", f"{FULL} - base",
-        f"{form.format(ends[0])} to {form.format(ends[1])}, by sequence",
-    ]  # fmt: skip
-    entry, least = _of(found, WHOLE, metric), least_difference(found, WHOLE, metric)
-    if entry is None or least is None:
-        return [*claim, NOT_YET, "-", "-"]
-    low, high = entry["student_low"], entry["student_high"]
-    verdict = increment_verdict(ends[0], low, high, entry["pairs"], ends[1])
-    shown = "-" if low is None or high is None else f"{form.format(low)} to {form.format(high)}"
-    return [*claim, verdict, form.format(entry["mean"]), shown, form.format(least).lstrip("+")]
-
-
-def _unit(entry: Record) -> str:
-    return "" if entry["student_low"] is None else " dB"
-
-
-def _largest_row(found: Record | None) -> list[str]:
-    claim = ["Temporal appearance is the largest of the three steps", "the three steps above", "-"]
-    known = [entry for step in STEPS if (entry := _of(found, step.claim)) is not None]
-    if len(known) < len(STEPS):
-        return [*claim, NOT_YET, "-", "-"]
-    means = ", ".join(f"{e['claim'][0]} {e['mean']:+.3f}" for e in known) + " dB"
-    if min(e["pairs"] for e in known) < LEAST_PAIRS:
-        return [*claim, f"not decided: {min(e['pairs'] for e in known)} of {LEAST_PAIRS} seeds", means, "-"]
-    appearance = next(entry for entry in known if entry["claim"].startswith("A"))
-    others = max(entry["student_high"] for entry in known if entry is not appearance)
-    if appearance["student_low"] > others:
-        return [*claim, "reproduced", means, "-"]
-    largest = max(known, key=lambda e: e["mean"]) is appearance
-    return [*claim, "not decided: the intervals overlap" if largest else "not reproduced", means, "-"]
-
-
-def _motion_row(found: Record | None) -> list[str]:
-    """Not stated in the paper: whether the motion improves times between frames."""
-    claim = ["Ours: between the frames the motion is better than a cross-fade of the model's own renders",
-             f"{FULL} - cross-fade, tissue", "-"]  # fmt: skip
-    rows = [] if found is None else [r for r in found["rows"] if (r["configuration"], r["split"]) == (FULL, SPLIT)]
-    values = [
-        r["psnr_tissue"] - r["cross_fade_psnr_tissue"] for r in rows
-        if r.get("psnr_tissue") is not None and r.get("cross_fade_psnr_tissue") is not None
-    ]  # fmt: skip
+def _base_row(found: Record, clip: str) -> list[str]:
+    """The level of the base that follows from the paper: its level minus its gain with matched input."""
+    level, (least, most) = PUBLISHED[clip]["psnr_full"], MATCHED_PSNR
+    claim = ["Level: PSNR of the base, from the level and the gain with matched input", "base",
+             f"{level - most:.2f} to {level - least:.2f} dB"]  # fmt: skip
+    values = list(runs_of(found, "base", "psnr_full").values())
     if not values:
-        return [*claim, NOT_YET, "-", "-"]
-    mean, low, high = student(values)
-    if low is None or high is None:
-        return [*claim, "not decided: one seed", f"{mean:+.2f} dB", "-"]
-    verdict = "yes" if low > 0 else "no" if high < 0 else "not decided"
-    return [*claim, verdict, f"{mean:+.2f} dB", f"{low:+.2f} to {high:+.2f} dB"]
+        return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
+    mean, limits = student(values)
+    inside = level - most - 0.005 <= mean <= level - least + 0.005
+    verdict = "the mean lies inside" if inside else "the mean lies outside"
+    return [*claim, f"{mean:.2f} dB", f"{len(values)} seeds", between(limits, "{:.2f} dB"), verdict, "-", "-"]
+
+
+def _increment_row(records: list[Record], of: Contrast, key: str, clip: str) -> list[str]:
+    metric = METRICS[key]
+    estimate = _estimated(records, _terms(of), key)
+    compared = f"{of.with_} - {of.without}"
+    if not of.published:
+        stated = " and ".join(f"{value:+.3f}" for value in PRIOR) + " dB, one seed"
+        return _row([f"{of.says}", compared, stated], estimate, metric, no_change_verdict)
+    stated_for = clip if clip in of.published else BOTH
+    value = of.published[stated_for][key]
+    scope = ", mean of both clips" if stated_for == BOTH else ""
+    unit = "{:+.2f} dB" if key == "psnr_full" else "{:+.4f}"
+    claim = [f"{of.says}: {metric.label}", compared, f"{unit.format(value)}{scope}"]
+    first, last = value - ROUNDED[key], value + ROUNDED[key]
+    return _row(claim, estimate, metric, lambda limits, count: increment_verdict(first, limits, count, last))
+
+
+def _matched_claim(metric: Metric, words: str) -> list[str]:
+    form = "{:+.2f} dB" if metric.key == "psnr_full" else "{:+.4f}"
+    first, last = MATCHED[metric.key]
+    published = f"{form.format(first)} to {form.format(last)}, by sequence".replace(" dB to", " to")
+    return [f"{metric.label}, over SurgicalGS with matched input (our base){words}", f"{FULL} - base", published]
+
+
+def _matched_row(found: Record, key: str) -> list[str]:
+    metric, (first, last) = METRICS[key], MATCHED[key]
+    first, last = first - ROUNDED[key], last + ROUNDED[key]
+    return _row(
+        _matched_claim(metric, ""), contrast(found, WHOLE, key), metric,
+        lambda limits, count: increment_verdict(first, limits, count, last),
+    )  # fmt: skip
+
+
+def _median_row(found: Record, key: str) -> list[str]:
+    """By the statistic of the paper: the median over the seeds. No interval belongs to it."""
+    metric, (first, last) = METRICS[key], MATCHED[key]
+    claim = _matched_claim(metric, ", by the paper's statistic, the median")
+    estimate = contrast(found, WHOLE, key)
+    if estimate is None:
+        return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
+    inside = first - ROUNDED[key] <= estimate.median <= last + ROUNDED[key]
+    better = estimate.median > last if metric.larger else estimate.median < first
+    verdict = "inside the range" if inside else "better than the range" if better else "short of the range"
+    return [*claim, metric.signed.format(estimate.median), _cells(estimate, metric)[1], "-", verdict, "-", "-"]
+
+
+def _every_seed_row(found: Record) -> list[str]:
+    """The paper: PSNR and LPIPS improve over SurgicalGS with matched input in every seed."""
+    claim = ["PSNR and LPIPS improve in every seed with matched input", f"{FULL} - base", "in every seed"]
+    known = {key: contrast(found, WHOLE, key) for key in MATCHED}
+    counts = {key: (_wins(e.values, METRICS[key].larger), len(e.values)) for key, e in known.items() if e is not None}
+    if not counts:
+        return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
+    shown = ", ".join(f"{METRICS[key].label} {wins} of {seeds}" for key, (wins, seeds) in counts.items())
+    seeds = max(seeds for _, seeds in counts.values())
+    verdict = "holds" if all(wins == of for wins, of in counts.values()) else "does not hold"
+    return [*claim, "-", shown, "-", f"{verdict} in {seeds} seeds", "-", "-"]
+
+
+def _largest_row(records: list[Record], key: str) -> list[str]:
+    """Paired tests of the lead of A over each other step."""
+    metric = METRICS[key]
+    claim = [f"Temporal appearance is the largest of the three steps: {metric.label}", "A - S; A - L", "-"]
+    leads = [_estimated(records, lead("A", other), key) for other in ("S", "L")]
+    known = [estimate for estimate in leads if estimate is not None]
+    if len(known) < len(leads):
+        return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
+    count = min(len(estimate.values) for estimate in known)
+    cells = ["; ".join(of) for of in zip(*(_cells(estimate, metric) for estimate in known), strict=True)]
+    decide = lambda limits: largest_verdict(limits, count, metric.larger)
+    of_paired, of_common = decide([e.paired for e in known]), decide([e.common for e in known])
+    return [*claim, cells[0], cells[1], cells[2], of_paired, cells[3], of_common]
+
+
+def lead(step: str, other: str) -> dict[str, int]:
+    """The coefficients of one step minus those of another."""
+    terms = dict(STEPS[step])
+    for name, c in STEPS[other].items():
+        terms[name] = terms.get(name, 0) - c
+    return {name: c for name, c in terms.items() if c}

@@ -168,7 +168,7 @@ def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
     """Every generated part of the page by name; a missing measurement is marked."""
     makers = {
-        "answer": (lambda result: effects_parts.answer(result, found.get("real")), "train"),
+        "answer": (lambda result: effects_parts.answer(result, found.get("real"), found.get("bench")), "train"),
         "costs": (effects_parts.costs, "bench"),
         "detections": (effects_parts.detections, "detect"),
         "amplitudes": (effects_parts.amplitudes, "detect"),

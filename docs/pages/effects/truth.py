@@ -153,7 +153,20 @@ def table(result: dict[str, Any]) -> str:
         f"moves by {moved['motion_scene_units']:.2f} mm ({moved['motion_pixels']:.2f} px), and its light "
         f"changes by {moved['light_grey']:.1f} grey levels, because it moves under the lamp."
     )
-    return f"{first}\n\n{second}\n\n{note}"
+    return f"{first}\n\n{second}\n\n{note}\n\n{gains(result)}"
+
+
+def gains(result: dict[str, Any]) -> str:
+    """What A changes, paired by seed."""
+    of = {
+        name: shown([a["psnr"] - b["psnr"] for a, b in zip(scene["`paper`"], scene["`paper` without A"], strict=True)],
+                    2, "+")
+        for name, scene in result["scenes"].items()
+    }  # fmt: skip
+    return (
+        f"Paired by seed, A changes the held-out PSNR of `paper` by {of['light']} dB with light alone and by "
+        f"{of['motion']} dB with motion alone."
+    )
 
 
 def _means(rows: list[dict[str, float]], names: tuple[str, ...]) -> list[str]:

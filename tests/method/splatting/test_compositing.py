@@ -138,7 +138,7 @@ def test_hard_A1_clamped_alpha_is_the_maximum_with_zero_gradient(path, opacity):
 
 @pytest.mark.parametrize("opacity", [0.985, 0.992, 0.9999])
 def test_hard_A1_legacy_passes_the_gradient_through_the_clamp(opacity):
-    """The released code uses d alpha = opacity (1 - opacity) also beyond the clamp; below it nothing deviates."""
+    """The CUDA rasterisers use d alpha = opacity (1 - opacity) also beyond the clamp; below it nothing deviates."""
     scene = on_the_pixel([opacity, 0.6], np.tile(ONE_COLOUR[:, None], 2))
     plain = run(scene, PIXEL, PAPER, "definition", background=BACKGROUND, given=GIVEN)
     passing = run(scene, PIXEL, deviating(PAPER, pass_clamped_alpha=True), background=BACKGROUND, given=GIVEN)

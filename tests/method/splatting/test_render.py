@@ -222,7 +222,7 @@ def test_legacy_drop_depth_to_z_drops_exactly_the_share_of_z():
 
 
 def test_legacy_double_clamp_term_doubles_exactly_the_share_of_z_under_the_clamp():
-    """Exact: f x' / z^3 g_J02; released code: twice that; the same for y. Free centres do not deviate."""
+    """Exact: f x' / z^3 g_J02; CUDA rasterisers: twice that; the same for y. Free centres do not deviate."""
     scene, camera, seen = deviation_scene()
     plain = run(scene, camera, PAPER, "definition")[1]
     double = run(scene, camera, deviating(PAPER, double_clamp_term=True), "definition")[1]

@@ -1,6 +1,7 @@
 """`endotsr ablate` from the command line to its three files."""
 
 import json
+import shutil
 
 import pytest
 from tiny_sweep import rows_of
@@ -72,6 +73,28 @@ def test_collect_writes_the_finished_runs_and_trains_nothing(done, capsys):
     assert main([*more, "--out", str(done / "out"), "--collect"]) == 0
     assert "4 of 8 runs finished, 0 failed." in capsys.readouterr().out
     assert len(list((done / "out" / "runs").iterdir())) == 4
+
+
+@pytest.mark.parametrize(
+    "digest, said",
+    [("0" * 64, "simulated-every_eighth-A-seed0 and simulated-every_eighth-base-seed0 differ in arrays_sha256"),
+     (None, "metrics.json")],
+)  # fmt: skip
+def test_a_pair_with_different_input_or_without_its_hash_is_refused(done, tmp_path, capsys, digest, said):
+    """The files of the second run were changed after the first, or its record was made without hashes."""
+    out = shutil.copytree(done / "out", tmp_path / "out")
+    file = out / "runs" / "simulated-every_eighth-A-seed0" / "metrics.json"
+    metrics = json.loads(file.read_text())
+    assert set(metrics["run"]["input"]["arrays_sha256"]) >= {"images", "masks", "cameras", "times"}
+    if digest is None:
+        del metrics["run"]["input"]["arrays_sha256"]
+    else:
+        metrics["run"]["input"]["arrays_sha256"]["images"] = digest
+    file.write_text(json.dumps(metrics))
+    assert main([*WORDS, "--out", str(out), "--collect"]) == 2
+    error = capsys.readouterr().err
+    print(error)
+    assert said in error and error.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from scipy import stats
 from endotsr.errors import InputError
 from endotsr.results.report import style
 from endotsr.studies.sweeps.ablation import (
+    BOTH,
     COMPARISONS,
     CONFIGURATIONS,
     FIXED,
@@ -20,8 +21,15 @@ from endotsr.studies.sweeps.ablation import (
     increments,
     levels,
     model_of,
+    published_value,
 )
-from endotsr.studies.sweeps.ablation_page import FILES, ablation_record, interval_text, write_ablation
+from endotsr.studies.sweeps.ablation_page import (
+    FILES,
+    ablation_markdown,
+    ablation_record,
+    interval_text,
+    write_ablation,
+)
 from endotsr.studies.sweeps.spec import StartAt, spec_of
 
 
@@ -45,7 +53,7 @@ def test_a_difference_is_paired_by_seed():
     """The levels of the seeds are far apart, the differences are not."""
     rows = [row("S", s, 30.0 + 5 * s) for s in range(3)] + [row("A+S", s, 30.2 + 5 * s + 0.1 * s) for s in range(3)]
     found = next(f for f in increments(rows) if f.metric == "psnr_full")
-    assert found.comparison.claim == "A added to S" and found.comparison.published == 0.29
+    assert found.comparison.claim == "A added to S" and found.input_recorded
     assert found.estimate.mean == pytest.approx(0.3) and found.estimate.median == pytest.approx(0.3)
     assert 0.199 <= found.estimate.mean_low < 0.3 < found.estimate.mean_high <= 0.401
     assert [p.seed for p in found.pairs] == [0, 1, 2]
@@ -114,6 +122,29 @@ def test_runs_on_other_input_are_no_pair(key, value):
         increments([row("base", 0, 30.0), row("A", 0, 30.0, **{key: value})])
 
 
+@pytest.mark.parametrize("without", ["base", "A"])
+def test_a_run_of_which_the_input_is_not_recorded_is_refused_or_labelled(without):
+    """Two missing hashes are equal as values; they show nothing about the files."""
+    rows = [row("base", 0, 30.0), row("A", 0, 30.5)]
+    for r in rows:
+        if without == r["configuration"]:
+            del r["arrays_sha256"]
+    for missing in (rows, [row(c, 0, 30.0, arrays_sha256={}) for c in ("base", "A")]):
+        with pytest.raises(InputError, match="seed0: arrays_sha256, the hashes of its input, is not recorded"):
+            increments(missing)
+        assert not any(found.input_recorded for found in increments(missing, unrecorded=True))
+        assert "Input not recorded" in ablation_markdown(ablation_record(missing, [], unrecorded=True))
+    assert "Input not recorded" not in ablation_markdown(ablation_record([row("base", 0, 1.0), row("A", 0, 2.0)], []))
+
+
+def test_unrecorded_input_does_not_hide_another_difference():
+    rows = [row("base", 0, 30.0, arrays_sha256={}), row("A", 0, 30.5, arrays_sha256={}, iterations=31)]
+    with pytest.raises(InputError, match="differ in iterations"):
+        increments(rows, unrecorded=True)
+    with pytest.raises(InputError, match="differ in arrays_sha256"):
+        increments([row("base", 0, 30.0), row("A", 0, 30.5, arrays_sha256={"images": "x"})], unrecorded=True)
+
+
 def test_what_is_not_finished_is_no_pair():
     assert increments([row("base", 0, 30.0), open_row("A", 0), row("A", 1, 31.0)]) == []
 
@@ -128,10 +159,22 @@ def test_every_comparison_is_between_configurations_that_are_made():
 def test_the_steps_of_the_paper_lead_from_the_base_to_the_whole_method():
     """Each step begins where the one before ended; at a fixed count the paper begins with motion alone."""
     assert [(c.with_, c.without) for c in COMPARISONS[:3]] == [("S", "base"), ("A+S", "S"), ("A+S+L", "A+S")]
-    assert [c.published for c in COMPARISONS[:3]] == [0.04, 0.29, 0.12]
-    fixed = [(c.with_, c.without) for c in COMPARISONS if c.published == 0.25]
+    assert [c.published[BOTH]["psnr_full"] for c in COMPARISONS[:3]] == [0.04, 0.29, 0.12]
+    fixed = [(c.with_, c.without) for c in COMPARISONS if "pulling" in c.published]
     assert fixed == [(f"A+S+L{FIXED}", f"S{FIXED}")]
-    assert all((c.published is None) == (not c.says) for c in COMPARISONS)
+    assert all(c.says for c in COMPARISONS if c.published)
+
+
+def test_a_published_value_is_shown_for_the_clips_of_the_paper_alone():
+    step, fixed = COMPARISONS[0], COMPARISONS[3]
+    assert published_value(step, "psnr_full", ["endonerf_pulling"]) == 0.04
+    assert published_value(step, "psnr_full", ["endonerf_pulling", "cutting_tissues_twice"]) == 0.04
+    assert published_value(fixed, "psnr_full", ["endonerf_pulling"]) == 0.25
+    assert published_value(fixed, "lpips", ["endonerf_cutting"]) == -0.0024
+    assert published_value(fixed, "psnr_full", ["endonerf_pulling", "endonerf_cutting"]) is None
+    assert published_value(step, "psnr_full", ["simulated"]) is None
+    assert published_value(step, "psnr_full", ["endonerf_pulling", "simulated"]) is None
+    assert published_value(COMPARISONS[5], "psnr_full", ["endonerf_pulling"]) is None
 
 
 def test_comparisons_differ_in_what_they_claim_and_nothing_else(tmp_path):
@@ -149,7 +192,10 @@ def test_comparisons_differ_in_what_they_claim_and_nothing_else(tmp_path):
 
 
 def test_the_files_hold_what_was_measured(tmp_path):
-    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "S") for s in range(3)]
+    rows = [
+        row(name, s, 30.0 + s + 0.25 * (name != "base"), "endonerf_pulling")
+        for name in ("base", "S") for s in range(3)
+    ]  # fmt: skip
     record = write_ablation(tmp_path, [*rows, open_row("A", 0)], ["endotsr", "ablate"])
     assert json.loads((tmp_path / FILES[0]).read_text()) == json.loads(json.dumps(record))
     assert record["runs"] == {"planned": 7, "finished": 6, "failed": []}
@@ -168,7 +214,10 @@ def test_without_a_pair_there_is_no_picture(tmp_path):
 def test_the_picture_has_a_mark_for_every_mean_pair_and_published_value(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(style, "save", lambda figure, path: drawn.append(figure))
-    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "S", "A+S") for s in range(3)]
+    rows = [
+        row(name, s, 30.0 + s + 0.25 * (name != "base"), "endonerf_pulling")
+        for name in ("base", "S", "A+S") for s in range(3)
+    ]  # fmt: skip
     write_ablation(tmp_path, rows, [])
     (axes,) = drawn[0].axes
     marks = {line.get_label(): line.get_xydata() for line in axes.get_lines()}

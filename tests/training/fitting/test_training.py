@@ -323,7 +323,7 @@ def test_every_step_but_those_after_density_control_finds_its_offsets_taken(trai
     assert_same(run(sequence, config)[0], state)
 
 
-# --- the rule of the released code ---
+# --- the rule of Deform3DGS ---
 
 
 def test_legacy_skip_leaves_out_the_step_on_densify_iterations(finished, sequence, monkeypatch):

@@ -1,7 +1,7 @@
 """The flexible deformation model (FDM), equation (B1): ten curves over time per Gaussian.
 
     psi_c(t) = sum_j weight_cj basis(t; centre_cj, width_cj),     S = width^2 + 1e-4
-    quartic:   basis = exp(-u^2),  u = (t - centre)^2 / S         (what the released code computes)
+    quartic:   basis = exp(-u^2),  u = (t - centre)^2 / S         (what Deform3DGS computes)
     gaussian:  basis = exp(-u),    u = (t - centre)^2 / (2 S)     (the textbook form)
 
 Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the log-scale, all before activation (by

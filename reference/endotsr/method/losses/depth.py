@@ -37,7 +37,7 @@ def depth_target(prior_depth: FloatArray, mask: BoolArray) -> DepthTarget:
 
     prior_depth  (H, W)  scene units; 0, negative, NaN and Inf all mean "no depth" (D4)
     mask         (H, W)  bool, True = tissue
-    The largest prior is the maximum over the whole image, instruments included, as in the released code.
+    The largest prior is the maximum over the whole image, instruments included, as in SurgicalGS.
     """
     check_mask(mask)
     prior_depth = check_plane("prior_depth", prior_depth, mask.shape)

@@ -69,7 +69,7 @@ def _boxes(
             radius = math.ceil(three * math.sqrt(middle + math.sqrt(max(tenth, middle * middle - determinant[i]))))
             tile = real(LEGACY_TILE)
             limit_x, limit_y = right + tile, bottom + tile
-            # the released code truncates toward zero, in integer-pixel coordinates (mean - 1/2)
+            # the CUDA rasterisers truncate toward zero, in integer-pixel coordinates (mean - 1/2)
             x0 = tile * math.floor(min(max((x - half - radius) / tile, zero), limit_x))
             x1 = tile * math.floor(min(max((x - half + radius + tile - one) / tile, zero), limit_x)) - one
             y0 = tile * math.floor(min(max((y - half - radius) / tile, zero), limit_y))

@@ -27,7 +27,7 @@ from endotsr.method.splatting.projection import (
 from endotsr.method.splatting.records import gather_footprint_gradients, log_opacity, pack_records
 from endotsr.method.splatting.settings import RasterSettings
 
-CONIC_EPSILON = 1e-7  # of the released code, added to det^2; used by the deviation `conic_epsilon` only
+CONIC_EPSILON = 1e-7  # of the CUDA rasterisers, added to det^2; used by the deviation `conic_epsilon` only
 
 Compositor = Literal["auto", "definition", "blocks"]
 

@@ -3,12 +3,15 @@
 In: rows of a sweep. Out: one `Increment` per comparison, split and metric: configuration `with_` minus configuration
 `without`, on the same frames, with the same seed and all other settings equal (matched input). Sequences have equal
 weights, regardless of their number of seeds. The intervals cover other seeds on these sequences, but not other
-sequences. Student's interval has a coverage of 95 % for any number of seeds, if the differences are normal. The
-bootstrap reaches 95 % only with many seeds: with three, its interval is at most the range of the differences and misses
-the true value in 25 % of all cases.
+sequences. Two runs are a pair only if the SHA-256 of their pictures, masks and depth are equal. Runs of which a hash is
+not recorded are refused, or paired with a label that says so.
+
+Student's interval has a coverage of 95 % for any number of seeds, if the differences are normal. The bootstrap reaches
+95 % only with many seeds: with three, its interval is at most the range of the differences and misses the true value in
+25 % of all cases.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Required, cast
 
 import numpy as np
@@ -55,30 +58,52 @@ def ablation_spec(
     return {"sequences": list(sequences), "seeds": list(range(seeds)), "configurations": made, **keys}
 
 
+Metrics = Mapping[str, float]  # metric -> value
+BOTH = "EndoNeRF"  # key of a mean over both clips, among values by clip
+CLIPS = {  # clip of the paper -> names of its folder
+    "pulling": ("endonerf_pulling", "pulling_soft_tissues"),
+    "cutting": ("endonerf_cutting", "cutting_tissues_twice"),
+}
+
+
 class Contrast(NamedTuple):
-    """The gain of `with_` over `without`. A comparison from the paper has a published value; the others are ours."""
+    """The gain of `with_` over `without`. A comparison without `says` is not in the paper but ours."""
 
     claim: str
     with_: str
     without: str
-    published: float | None = None  # PSNR full, dB
     says: str = ""  # the paper's claim in our words
+    published: Mapping[str, Metrics] = {}  # clip, or BOTH -> metric -> difference as printed; PSNR in dB
 
 
-# The paper adds S to the base, A to S, and L to both; at a fixed count it adds A and L to S.
+# The paper adds S to the base, A to S, and L to both; at a fixed count it adds A and L to S. Its steps are means over
+# the EndoNeRF clips (SSIM on tissue); its gain at a fixed count is printed for each clip.
 COMPARISONS = (
-    Contrast("S", "S", "base", 0.04, "Spectral motion improves on the base"),
-    Contrast("A added to S", "A+S", "S", 0.29, "Temporal appearance improves on spectral motion alone"),
-    Contrast("L added to A and S", "A+S+L", "A+S", 0.12, "Laplacian detail improves on both residuals"),
     Contrast(
-        "A and L added to S, fixed count", f"A+S+L{FIXED}", f"S{FIXED}", 0.25,
+        "S", "S", "base", "Spectral motion improves on the base",
+        {BOTH: {"psnr_full": 0.04, "ssim_tissue": 0.0003, "lpips": -0.0007, "lpips_symmetric": -0.0007}},
+    ),
+    Contrast(
+        "A added to S", "A+S", "S", "Temporal appearance improves on spectral motion alone",
+        {BOTH: {"psnr_full": 0.29, "ssim_tissue": 0.0023, "lpips": -0.0022, "lpips_symmetric": -0.0022}},
+    ),
+    Contrast(
+        "L added to A and S", "A+S+L", "A+S", "Laplacian detail improves on both residuals",
+        {BOTH: {"psnr_full": 0.12, "ssim_tissue": 0.0006, "lpips": -0.0009, "lpips_symmetric": -0.0009}},
+    ),
+    Contrast(
+        "A and L added to S, fixed count", f"A+S+L{FIXED}", f"S{FIXED}",
         "With a fixed number of Gaussians, appearance and detail improve on motion alone",
+        {
+            "pulling": {"psnr_full": 0.25, "lpips": -0.0028, "lpips_symmetric": -0.0028},
+            "cutting": {"psnr_full": 0.52, "lpips": -0.0024, "lpips_symmetric": -0.0024},
+        },
     ),
-    Contrast("Matérn prior", "S", NO_PRIOR, 0.0, "The Matérn prior changes PSNR by less than 0.01 dB"),
     Contrast(
-        "Matérn prior, fixed representation", f"S{FIXED}", f"{NO_PRIOR}{FIXED}", 0.0,
-        "The same with a fixed representation",
+        "Matérn prior, fixed representation", f"S{FIXED}", f"{NO_PRIOR}{FIXED}",
+        "At a fixed representation the Matérn prior changes PSNR by less than 0.01 dB",
     ),
+    Contrast("Matérn prior", "S", NO_PRIOR),
     Contrast("A alone", "A", "base"),
     Contrast("L alone", "L", "base"),
     Contrast("S added to A", "A+S", "A"),
@@ -125,46 +150,75 @@ class Increment(NamedTuple):
     metric: str
     estimate: Estimate
     pairs: list[RunPair]
+    input_recorded: bool  # the hashes of the input of every run are known, and equal within each pair
 
 
-def increments(rows: Iterable[RunRow]) -> list[Increment]:
+def increments(rows: Iterable[RunRow], unrecorded: bool = False) -> list[Increment]:
     """Every comparison with finished pairs.
 
-    rows     of results.json
-    Raises:  InputError if the two runs of a pair have different inputs.
+    rows        of results.json
+    unrecorded  also pair runs of which the hashes of the input are not recorded; the increment says so
+    Raises:     InputError if the two runs of a pair have different inputs, or if an input is not recorded.
     """
+    rows = list(rows)
     finished = [row for row in rows if row["status"] == FINISHED]
     found = []
     for split in dict.fromkeys(row["split"] for row in finished):
         for comparison in COMPARISONS:
             for metric in METRICS:
-                pairs = paired(finished, comparison, split, metric)
+                pairs = paired(finished, comparison, split, metric, unrecorded)
                 if pairs:
-                    found.append(Increment(comparison, split, metric, estimate(pairs), pairs))
+                    known = all(map(input_recorded, matched_rows(finished, comparison, split)))
+                    found.append(Increment(comparison, split, metric, estimate(pairs), pairs, known))
     return found
 
 
-def paired(rows: list[RunRow], comparison: Contrast, split: str, metric: str) -> list[RunPair]:
-    """The differences of all runs that have a partner and a value of the metric."""
+def paired(
+    rows: list[RunRow], comparison: Contrast, split: str, metric: str, unrecorded: bool = False
+) -> list[RunPair]:
+    """The differences of all runs that have a partner and a value of the metric; see `increments`."""
+    runs = matched_rows(rows, comparison, split)
+    pairs = []
+    for a, b in zip(runs[::2], runs[1::2], strict=True):
+        _refuse_other_input(a, b, unrecorded)
+        if (gained := a.get(metric)) is not None and (base := b.get(metric)) is not None:
+            pairs.append(RunPair(a["sequence"], a["seed"], gained - base))
+    return pairs
+
+
+def matched_rows(rows: list[RunRow], comparison: Contrast, split: str) -> list[RunRow]:
+    """The runs with and without in turn, for every sequence and seed that has both."""
     with_, without = (
         {(row["sequence"], row["seed"]): row for row in rows if row["split"] == split and row["configuration"] == name}
         for name in (comparison.with_, comparison.without)
     )
-    pairs = []
-    for key in with_:
-        if key not in without:
-            continue
-        a, b = with_[key], without[key]
-        _refuse_other_input(a, b)
-        if (gained := a.get(metric)) is not None and (base := b.get(metric)) is not None:
-            pairs.append(RunPair(*key, gained - base))
-    return pairs
+    return [row for key in with_ if key in without for row in (with_[key], without[key])]
 
 
-def _refuse_other_input(a: RunRow, b: RunRow) -> None:
+def input_recorded(row: RunRow) -> bool:
+    """Whether the hashes of pictures, masks and depth are among the values of a run."""
+    return bool(row.get("arrays_sha256"))
+
+
+def _refuse_other_input(a: RunRow, b: RunRow, unrecorded: bool) -> None:
+    for row in (a, b):
+        if not (unrecorded or input_recorded(row)):
+            raise InputError(f"{row['name']}: arrays_sha256, the hashes of its input, is not recorded; train it again")
     for key in MATCHED:
-        if a.get(key) != b.get(key):
-            raise InputError(f"{a['name']} and {b['name']}: differ in {key}; allowed: runs on the same input")
+        known = key != "arrays_sha256" or (input_recorded(a) and input_recorded(b))
+        if known and a.get(key) != b.get(key):
+            raise InputError(f"{a['name']} and {b['name']} differ in {key}; use runs on the same input as a pair")
+
+
+def published_value(comparison: Contrast, metric: str, sequences: Iterable[str]) -> float | None:
+    """The published difference for these sequences: that of the clip, else of the mean over the clips of the paper.
+
+    sequences   names of the folders; None for a sequence that is not a clip of the paper
+    """
+    clips = {next((clip for clip, names in CLIPS.items() if name in names), "") for name in sequences}
+    keys = [*clips, BOTH] if len(clips) == 1 else [BOTH]
+    known = [comparison.published[key] for key in keys if key in comparison.published and "" not in clips]
+    return known[0].get(metric) if known else None
 
 
 def estimate(pairs: list[RunPair], seed: int = 0) -> Estimate:

@@ -8,28 +8,35 @@ from typing import Any, TypedDict, cast
 
 from endotsr.results.report import style
 from endotsr.results.report.tables import fixed, markdown
-from endotsr.studies.sweeps.ablation import Increment, Level, increments, levels
+from endotsr.studies.sweeps.ablation import Increment, Level, increments, levels, published_value
 from endotsr.studies.sweeps.execute import FAILED, FINISHED
 from endotsr.studies.sweeps.results import RunRow
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import MachinePart, machine, now, versions
 from endotsr.untrusted.writing import replace_text
 
-FORMAT = 1  # of ablation.json; raised when a key changes its name or meaning
+FORMAT = 2  # of ablation.json; raised when a key changes its name or meaning
 FILES = ("ablation.json", "ablation.md", "ablation.png")
 ROW_KEYS = (
     "name", "sequence", "split", "configuration", "seed", "iterations", "gaussians", "seconds", "psnr_full",
     "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric", "training_psnr_full", "training_psnr_tissue",
     "cross_fade_psnr_full", "cross_fade_psnr_tissue", "preset", "width", "height", "threads", "baselines", "measures",
-    "arrays_sha256",
+    "arrays_sha256", "per_frame",
 )  # fmt: skip
-SHOWN = (("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("lpips", "LPIPS", 4))
+UNRECORDED = (
+    "Input not recorded: these runs are paired by sequence and seed; no hash shows that they read the same files."
+)
+SHOWN = (  # metric, label, digits
+    ("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("ssim_tissue", "SSIM tissue", 4),
+    ("lpips", "LPIPS", 4),
+)  # fmt: skip
 
 
 IncrementRow = TypedDict(
     "IncrementRow",
     {
-        "claim": str, "with": str, "without": str, "published": float | None, "split": str, "metric": str,
+        "claim": str, "with": str, "without": str, "in_paper": bool, "published": float | None, "input_recorded": bool,
+        "split": str, "metric": str,
         "mean": float, "student_low": float | None, "student_high": float | None, "mean_low": float | None,
         "mean_high": float | None, "median": float, "median_low": float | None, "median_high": float | None,
         "pairs": int, "sequences": int, "of": list[dict[str, Any]],
@@ -52,8 +59,11 @@ class AblationRecord(TypedDict):
     rows: list[RunRow]
 
 
-def ablation_record(rows: list[RunRow], command: list[str]) -> AblationRecord:
-    """The content of ablation.json. Raises InputError if the two runs of a pair have different inputs."""
+def ablation_record(rows: list[RunRow], command: list[str], unrecorded: bool = False) -> AblationRecord:
+    """The content of ablation.json; `unrecorded` as in `increments`.
+
+    Raises InputError if the two runs of a pair have different inputs.
+    """
     return {
         "format": FORMAT,
         "date": now(),
@@ -66,7 +76,7 @@ def ablation_record(rows: list[RunRow], command: list[str]) -> AblationRecord:
             "failed": [row["name"] for row in rows if row["status"] == FAILED],
         },
         "levels": levels(rows),
-        "increments": [_increment(found) for found in increments(rows)],
+        "increments": [_increment(found) for found in increments(rows, unrecorded)],
         "rows": [_kept(row) for row in rows if row["status"] == FINISHED],
     }
 
@@ -77,7 +87,9 @@ def _kept(row: RunRow) -> RunRow:
 
 def _increment(found: Increment) -> IncrementRow:
     c = found.comparison
-    about = {"claim": c.claim, "with": c.with_, "without": c.without, "published": c.published}
+    stated = published_value(c, found.metric, {pair.sequence for pair in found.pairs})
+    about = {"claim": c.claim, "with": c.with_, "without": c.without, "in_paper": bool(c.says), "published": stated}
+    about |= {"input_recorded": found.input_recorded}
     numbers = {**found.estimate._asdict(), "of": [pair._asdict() for pair in found.pairs]}
     return cast(IncrementRow, about | {"split": found.split, "metric": found.metric} | numbers)
 
@@ -96,6 +108,8 @@ def ablation_markdown(record: AblationRecord) -> str:
     """Means of the configurations and differences with intervals, one section per split."""
     runs = record["runs"]
     parts = [f"{runs['finished']} of {runs['planned']} runs finished, {len(runs['failed'])} failed."]
+    if not all(found["input_recorded"] for found in record["increments"]):
+        parts.append(UNRECORDED)
     for split in dict.fromkeys(level["split"] for level in record["levels"]):
         parts += [f"Held out: {split}", level_table(record, split)]
         if any(found["split"] == split for found in record["increments"]):
@@ -123,12 +137,11 @@ def increment_table(record: AblationRecord, split: str) -> str:
         if found["split"] != split or digits is None:
             continue
         label = next(head for key, head, _ in SHOWN if key == found["metric"])
-        stated = found["published"] if found["metric"] == "psnr_full" else None
         rows.append([
             name_of(found), label, fixed(found["mean"], digits, "+"),
             *(interval_text(found, of, digits) for of in ("student", "mean")),
-            fixed(found["median"], digits, "+"), interval_text(found, "median", digits), fixed(stated, digits, "+"),
-            f"{found['pairs']} on {found['sequences']}",
+            fixed(found["median"], digits, "+"), interval_text(found, "median", digits),
+            fixed(found["published"], digits, "+"), f"{found['pairs']} on {found['sequences']}",
         ])  # fmt: skip
     heads = ("difference", "metric", "mean", "95 % interval", "bootstrap", "median", "bootstrap", "published", "pairs")
     return markdown(heads, rows)
@@ -136,7 +149,7 @@ def increment_table(record: AblationRecord, split: str) -> str:
 
 def name_of(found: IncrementRow) -> str:
     """The name of a difference, marked if it is not from the paper."""
-    return found["claim"] + ("" if found["published"] is not None else " (ours)")
+    return found["claim"] + ("" if found["in_paper"] else " (ours)")
 
 
 def interval_text(found: IncrementRow, of: str, digits: int) -> str:

@@ -1,6 +1,6 @@
 """The cost of a training, estimated from the settings and the size of the sequence.
 
-    work(N, P, u) = (0.1 + 0.4 P / (640 512) + 0.5 N / 60 000) (0.65 + 0.35 min(u / 0.35, 1))
+    work(N, P, u) = (0.1 + 0.4 P / (640 * 512) + 0.5 N / 60 000) (0.65 + 0.35 min(u / 0.35, 1))
 
 is the work of an iteration with N Gaussians and P pixels at the fraction u of the run. Its unit is a late iteration of
 the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing. The

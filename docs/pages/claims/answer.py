@@ -1,0 +1,98 @@
+"""The answer of docs/claims.md in one paragraph, for README.md and the head of docs/paper.md.
+
+Every number comes from a record; a clip that is not measured is named as such.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pages.claims.estimates import contrast, runs_of
+from pages.claims.verdicts import CLIPS, FULL, STEPS, WHOLE, student
+from pages.store.intervals import shown
+from pages.store.marks import read_json
+from pages.store.published import MATCHED_PSNR, PUBLISHED
+
+TRUTH, BASELINES = "effects_truth.json", "{clip}_paper_seed0.json"
+METHOD, WITHOUT_A = "`paper`", "`paper` without A"
+Record = Any  # content of a file of docs/results
+
+
+def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record | None], right_eye: str) -> str:
+    """What of the paper is reproduced, by how much, what is not, and what beats both models.
+
+    right_eye   mean and interval of the gain on the right camera at held-out times as text, or ""
+    """
+    known = [clip for clip in CLIPS if contrast(found[clip], WHOLE, "psnr_full") is not None]
+    missing = [clip for clip in CLIPS if clip not in known]
+    parts = [part for clip in known for part in (components(found[clip], clip), level(folder, found[clip], clip))]
+    parts.append(splits(found, half))
+    if right_eye:
+        parts.append(f"On the right camera at held-out times (half size) the components change PSNR by {right_eye}.")
+    parts.append(truth(read_json(folder / TRUTH, "python docs/make.py effects.truth")))
+    parts += [f"The ablation on EndoNeRF {clip} is not finished, so nothing is said of it." for clip in missing]
+    return " ".join(part for part in parts if part)
+
+
+def components(found: Record, clip: str) -> str:
+    """The gain of all three components over the base, and of the step of A."""
+    whole, step = contrast(found, WHOLE, "psnr_full"), contrast(found, STEPS["A"], "psnr_full")
+    least, most = MATCHED_PSNR
+    text = (
+        f"On EndoNeRF {clip} the three components together raise the PSNR of their base by {whole.mean:.2f} dB (median "
+        f"of {len(whole.values)} seeds {whole.median:.2f} dB; published medians {least} to {most} dB)"
+        if whole is not None
+        else ""
+    )
+    return f"{text}; the step of A is {step.mean:+.2f} dB of it (published +0.29 dB)." if step else f"{text}."
+
+
+def level(folder: Path, found: Record, clip: str) -> str:
+    """The level against the published one, and the two predictions without a model."""
+    published = PUBLISHED[clip]["psnr_full"] or 0.0
+    values = list(runs_of(found, FULL, "psnr_full").values())
+    mean, limits = student(values)
+    verdict = "is not decided" if limits is None else "is not reached" if limits[1] < published else "is reached"
+    text = f"The published level, {published:.2f} dB, {verdict}: {shown(values, 2)} dB."
+    of = baselines(folder, found, clip)
+    if of is None:
+        return text
+    blend, flow = of
+    both = "Both lose" if max(published, mean) < min(blend, flow) else "For comparison, both stand"
+    return f"{text} {both} to the mean of the two neighbouring frames ({blend:.2f} dB) and to flow ({flow:.2f} dB)."
+
+
+def baselines(folder: Path, found: Record, clip: str) -> tuple[float, float] | None:
+    """PSNR of the whole image of blend and flow: of a recorded run, else of the ablation."""
+    path = folder / BASELINES.format(clip=clip)
+    rows = read_json(path, "python docs/make.py full_size.record")["baselines"] if path.exists() else {}
+    rows = rows or next((row["baselines"] for row in found["rows"] if row.get("baselines")), {})
+    values = [rows.get(name, {}).get("mean", {}).get("psnr_full") for name in ("two_neighbours", "flow_interpolation")]
+    return None if None in values else (values[0], values[1])
+
+
+def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str:
+    """In how many of the measured splits the whole method is below the blend, on tissue."""
+    groups: dict[tuple[str, str, int], list[Record]] = {}
+    for record in (*found.values(), *half):
+        for row in [] if record is None else record["rows"]:
+            if row["configuration"] == FULL and row.get("baselines"):
+                groups.setdefault((row["sequence"], row["split"], row["width"]), []).append(row)
+    below = 0
+    for rows in groups.values():
+        blend = rows[0]["baselines"]["two_neighbours"]["mean"]["psnr_tissue"]
+        below += sum(row["psnr_tissue"] for row in rows) / len(rows) < blend
+    if not groups:
+        return ""
+    return f"The reproduction is below the blend in {below} of the {len(groups)} choices of held-out frames measured."
+
+
+def truth(found: Record) -> str:
+    """What A does to the held-out PSNR where the light alone, or the motion alone, changes."""
+    gains = {
+        name: [a["psnr"] - b["psnr"] for a, b in zip(scene[METHOD], scene[WITHOUT_A], strict=True)]
+        for name, scene in found["scenes"].items()
+    }
+    light, motion = (shown(gains[name], 2, "+") for name in ("light", "motion"))
+    where = "On simulated clips with a known truth, A changes the held-out PSNR by"
+    return f"{where} {light} dB where only the light changes and by {motion} dB where only the tissue moves."

@@ -1,0 +1,56 @@
+"""Which mask folder the published metrics use: docs/results/mask_folders.json, and a table of the rulings.
+
+    python docs/make.py claims.mask_folders PULLING CUTTING   measure both EndoNeRF clips and write the table
+    python docs/make.py claims.mask_folders                   write the table
+
+If both images are zeroed where a mask excludes, the squared error is averaged over all pixels instead of over the
+tissue. The PSNR of the whole image is then -10 log10(fraction of tissue) above that of the tissue, whatever the model.
+The paper prints one of the two in each of two tables.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from pages.store.marks import read_json, write_marked
+from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
+
+DOCS = Path(__file__).parents[2]
+PAGE, RECORD = DOCS / "specification" / "rulings.md", DOCS / "results" / "mask_folders.json"
+FOLDERS, WHITE = ("masks", "gt_masks"), 128
+CLIPS = ("pulling", "cutting")
+
+
+def offset(folder: Path) -> float:
+    """Mean over the held-out frames of PSNR of the whole image minus PSNR of the tissue, dB."""
+    from PIL import Image
+
+    files = sorted(folder.glob("*.png"))
+    held_out = files[1::8]
+    excluded = [np.mean(np.asarray(Image.open(file).convert("L")) >= WHITE) for file in held_out]
+    return float(np.mean([-10.0 * np.log10(1.0 - fraction) for fraction in excluded]))
+
+
+def table(found: dict) -> str:
+    """Predicted difference of both folders, and the published one."""
+    stated = np.mean([PUBLISHED[clip]["psnr_full"] for clip in CLIPS]) - MEANS_ON_TISSUE["A+S+L"][0]
+    rows = [
+        [f"`{name}`", *(f"{found[name][clip]:.3f}" for clip in CLIPS), f"{np.mean(list(found[name].values())):.3f}"]
+        for name in FOLDERS
+    ]
+    rows.append(["as published, mean of the whole image minus mean of the tissue", "-", "-", f"{stated:.2f}"])
+    return markdown(("masks", *(f"{clip}, dB" for clip in CLIPS), "mean, dB"), rows)
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    if len(words) == len(CLIPS):
+        clips = dict(zip(CLIPS, map(Path, words), strict=True))
+        write_json(RECORD, {name: {clip: offset(of / name) for clip, of in clips.items()} for name in FOLDERS})
+    elif words:
+        sys.exit(__doc__)
+    found = read_json(RECORD, "python docs/make.py claims.mask_folders")
+    write_marked(PAGE, {"folders": table(found)}, "masks")

@@ -1,0 +1,96 @@
+"""What single sentences of the documentation say, checked; tests/docs/statements.toml names the sentences."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pages.full_size import page as full_size
+from pages.full_size import text as full_size_text
+from pages.hard_cases.page import rounded_up
+from pages.store.marks import read_json
+
+from endotsr.clips.sequences.between import flows_between, frame_between
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import PAPER, with_iterations
+from endotsr.training.fitting.state import new_training, training_constants
+from endotsr.training.fitting.trainer import training_step
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    """Nine frames with an instrument, and the same with noise on every excluded pixel."""
+    made = simulate(SimulatorSettings(frames=9, width=48, height=40)).sequence
+    noise = np.random.default_rng(0).integers(0, 256, made.images.shape, dtype=np.uint8)
+    other = np.where(made.masks[:, None], made.images, noise)
+    assert 0 < np.mean(~made.masks) < 0.9 and not np.array_equal(other, made.images)
+    return made, dataclasses.replace(made, images=other)
+
+
+def trained(sequence, iterations: int = 40):
+    config = with_iterations(PAPER, iterations)
+    constants, state = training_constants(sequence, config), new_training(sequence, config)
+    while state.iteration < iterations:
+        training_step(state, constants)
+    return state.gaussians
+
+
+def test_paper_reads_no_colour_that_a_mask_excludes(sequence):
+    """Bitwise the same scene after all losses, A, S, L and a densification, whatever lies under the masks."""
+    found, again = (trained(one) for one in sequence)
+    for name, array in found._asdict().items():
+        np.testing.assert_array_equal(array, again._asdict()[name], err_msg=name)
+
+
+def test_the_targets_of_sharp_depend_on_excluded_pixels_through_the_flow(sequence):
+    found, again = (frame_between(one, 0, 2, 0.5, flows_between(one, 0, 2)) for one in sequence)
+    both = found.mask & again.mask
+    assert np.abs(found.image - again.image)[:, both].max() > 1 / 255
+
+
+def test_the_digits_of_the_slope_of_tanh():
+    """1 - tanh², from a correctly rounded tanh: 0 from 13 ln 2 in float32; no digit from 8.9 and 18.9."""
+    x = np.arange(8.0, 11.0, 1e-3, dtype=np.float32)
+    rounded = np.array([np.float32(math.tanh(float(v))) for v in x])
+    slope = np.float32(1) - rounded * rounded
+    assert x[np.argmax(slope == 0)] == pytest.approx(13 * math.log(2), abs=2e-3) and not slope[x > 9.02].any()
+    true = 1 / np.cosh(x.astype(float)) ** 2
+    assert x[np.argmax(np.abs(slope - true) >= true / 2)] == pytest.approx(8.9, abs=0.05)
+    wide = np.arange(17.0, 20.0, 1e-3)
+    true = 1 / np.cosh(wide) ** 2
+    assert wide[np.argmax(np.abs(1 - np.tanh(wide) ** 2 - true) >= true / 2)] == pytest.approx(18.9, abs=0.05)
+
+
+def test_the_target_between_frames_against_the_moved_pair():
+    """Farther from the held-out frames for single frames, closer for blocks."""
+    rows = json.loads((RESULTS / "targets.json").read_text(encoding="utf-8"))["splits"]
+    closer = {split: row["target"] > row["moved"] for split, row in rows.items()}
+    assert not closer.pop("every eighth frame") and closer and all(closer.values())
+
+
+def test_the_bound_of_the_hard_cases_is_not_below_the_worst():
+    cases = json.loads((RESULTS / "hard_cases.json").read_text(encoding="utf-8"))["cases"]
+    worst = max(float(row["float32"]["ours_error"]) for row in cases)
+    assert worst <= float(rounded_up(worst)) <= 1.1 * worst
+    assert [rounded_up(value) for value in (2.38e-7, 2e-7, 0.031)] == ["2.4e-07", "2.0e-07", "3.1e-02"]
+
+
+def test_the_first_sentences_of_the_page_at_full_size():
+    """Simulated: `paper` and `quick` above the blend, `paper` below the blend without its noise; flow above all."""
+    made = full_size_text.fragments(read_json(RESULTS / "full_size" / "runs.json", full_size.COMMAND))
+    noise = [line.strip("| ").split(" | ") for line in made["noise"].splitlines() if line.startswith("| `")]
+    assert all(float(model) < float(blend) for _, _, model, blend, _, _ in noise)
+    ahead = {name.split(",")[0]: float(bare) < float(model) for name, _, model, _, bare, _ in noise[::-1]}
+    assert ahead == {"`paper`": True, "`quick`": False}
+    rows = [line.strip("| ").split(" | ") for line in made["table"].splitlines() if "every eighth" in line]
+    for row in rows:
+        models, flow = [float(cell) for cell in row[2:5] if cell != "-"], float(row[7])
+        assert max(models) < flow
+    recorded = next(row for row in rows if row[0] == "recorded")
+    paper, sharp, blend = (float(recorded[k]) for k in (2, 4, 6))
+    assert paper < blend < sharp
