@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,16 @@ from endotsr.config import PAPER, with_iterations
 from endotsr.training.fitting.state import new_training, training_constants
 from endotsr.training.fitting.trainer import training_step
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results"
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "docs" / "results"
+PLACES = (
+    "README.md",
+    "docs/*.md",
+    "docs/guides/*.md",
+    "docs/specification/*.md",
+    "notebooks/*.py",
+    "reference/**/*.py",
+)
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +104,10 @@ def test_the_first_sentences_of_the_page_at_full_size():
     recorded = next(row for row in rows if row[0] == "recorded")
     paper, sharp, blend = (float(recorded[k]) for k in (2, 4, 6))
     assert paper < blend < sharp
+
+
+def test_every_released_program_is_named():
+    """ "The released code" names nothing that a reader can look up."""
+    words = re.compile(r"\b(?:the|a) released (?:code|program|implementation)\b", re.IGNORECASE)
+    files = [f for pattern in PLACES for f in ROOT.glob(pattern)]
+    assert [f.name for f in files if words.search(f.read_text(encoding="utf-8"))] == []

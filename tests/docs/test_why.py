@@ -35,7 +35,7 @@ def test_the_gain_of_a_on_the_real_clip():
 def test_the_gain_of_the_residuals_in_a_short_training():
     change = float(row(block("tradeoff", "tradeoff:training").split("**simulated**")[0], "no residuals")[2])
     assert f"a model without residuals is {-change:.2f} dB worse" in WORDS
-    assert "721 iterations" in WORDS and "stretched to 721 iterations" in block("tradeoff", "tradeoff:training")
+    assert "721 iterations" in WORDS and "scaled to 721 iterations" in block("tradeoff", "tradeoff:training")
 
 
 def test_false_motion_is_the_same_with_and_without_a():

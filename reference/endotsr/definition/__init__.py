@@ -14,7 +14,7 @@ functions accept complex input: branches compare real parts.
     masked_l1 (B6)  masked_ssim (B7)  depth (B8)  smoothness (B9)  adam, schedules (B10)  density_control (B11)
     initialisation (B12)  exposure (B13)  pose (B16)  metrics (M1), (M2)
 
-`legacy` has the four deviations of the released program; the other files are the equations alone.
+`legacy` has the four deviations of the CUDA rasterisers; the other files are the equations alone.
 (B14) and (B15) start from an optical flow, and LPIPS (M3) needs a trained network; they are not in this room.
 
 `view` is one iteration and `train` a whole training. `python -m endotsr.definition` trains a small scene.

@@ -11,7 +11,7 @@ DeformationGrads = namedtuple("DeformationGrads", "d_fdm_weight d_fdm_centre d_f
 def bell(centre, width, t, basis):
     """Delta, Sigma and the basis value, (10, B, N) each; a value below 2^-60 is 0.
 
-    Ruling "FDM basis": the released program squares Delta^2 / Sigma where a Gaussian would halve it. The quartic bell
+    Ruling "FDM basis": Deform3DGS squares Delta^2 / Sigma where a Gaussian would halve it. The quartic bell
     is flatter at its centre and ends sooner, so that a basis acts on a shorter stretch of time.
     """
     delta = t - centre
