@@ -52,16 +52,11 @@ B, N = 17, 4
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-<<<<<<< HEAD
-# `quartic` is the form that the released code of Deform3DGS computes: the exponent is the square of a square, where a
+# `quartic` is the form that Deform3DGS computes: the exponent is the square of a square, where a
 # Gaussian would halve it. It does not say why. The effect is a bell that is flatter at its centre and ends sooner: it
 # falls below a thousandth at $\Delta=1.62\sqrt\Sigma$, and the Gaussian at $3.72\sqrt\Sigma$. Each basis then acts on a short
 # stretch of time of its own. `gaussian` is the textbook form. The two give 0.0183 and 0.3679 at $\Delta=0.02$,
 # $\sigma=0.01$.
-=======
-# `quartic` is the form that Deform3DGS computes: the exponent is the square of a square. `gaussian` is the
-# textbook form. The two differ strongly: they give 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
->>>>>>> 3fef1b2d (Released programs have names; the table of statements)
 #
 # <!-- definition: endotsr.definition.deformation.bell -->
 # ```python
