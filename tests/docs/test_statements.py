@@ -11,7 +11,8 @@ ROOT = Path(__file__).parents[2]
 TABLE = tomllib.loads((Path(__file__).parent / "statements.toml").read_text(encoding="utf-8"))["statement"]
 REVIEWS = {"claims": 15, "book": 29}  # statements of each
 KINDS = {"record", "run", "bound", "hedge", "derivation", "source", "wording", "removed"}
-TEXTS = ("README.md", "CONTRIBUTING.md", "docs/*.md", "docs/guides/*.md", "docs/specification/*.md", "docs/results/*.md", "notebooks/*.py",
+TEXTS = ("README.md", "CONTRIBUTING.md", "docs/*.md", "docs/guides/*.md",
+         "docs/specification/*.md", "docs/results/*.md", "notebooks/*.py",
          "notebooks/*.md", "reference/endotsr/**/*.py", "docs/pages/**/*.py", "docs/_static/*.js")  # fmt: skip
 
 
