@@ -177,8 +177,8 @@ def training(name: str, result: dict[str, Any]) -> str:
     m = result["machine"]
     head = (
         f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "
-        f"`{result['preset']}` with its schedule scaled to {result['iterations']} iterations, measured {result['date'][:10]} on "
-        f"{result['threads']} threads of {m['processor']} ({m['cores']} cores)."
+        f"`{result['preset']}` with its schedule scaled to {result['iterations']} iterations, measured "
+        f"{result['date'][:10]} on {result['threads']} threads of {m['processor']} ({m['cores']} cores)."
     )
     left = [f"{name}: {reason}" for name, reason in result["left_out"].items()]
     picture = f"![Held-out PSNR against minutes of training](results/tradeoff_training_{name}.svg)"
