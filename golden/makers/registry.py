@@ -21,9 +21,9 @@ from makers.wrong import WrongPort, wrong_ports
 
 FAMILIES = (
     "reading", "dictionary", "appearance", "motion", "matern", "laplacian", "calibration", "deformation", "adam",
-    "masked_l1", "masked_ssim", "depth", "smoothness", "exposure", "pose", "covariance", "projection", "harmonics",
-    "composite", "composite_limits", "render", "schedule", "density", "initialisation", "scene", "objective",
-    "training", "other_settings", "extremes",
+    "masked_l1", "masked_ssim", "depth", "smoothness", "exposure", "pose", "registration", "covariance", "projection",
+    "harmonics", "composite", "composite_limits", "render", "schedule", "density", "initialisation", "scene",
+    "objective", "training", "other_settings", "extremes",
 )  # fmt: skip
 
 
@@ -208,6 +208,14 @@ JUDGED: dict[str, dict[str, Judged]] = {
         "d_translation": Judged(2, "loss per scene", oracle="pose_oracle.gradients"),
         "d_rotation_vector": Judged(2, "loss per rad", oracle="pose_oracle.gradients"),
         "d_offset": Judged(2, "loss per scene", oracle="pose_oracle.gradients"),
+    },
+    "registration": {
+        "residual": Judged(1, "unit of the picture", oracle="registration.registration_forward"),
+        "seen": Judged(1, scale="exact", oracle="registration.registration_forward"),
+        "d_rotation": Judged(2, "loss", oracle="registration.registration_reverse"),
+        "d_translation": Judged(2, "loss per scene unit", oracle="registration.registration_reverse"),
+        "d_points": Judged(2, "loss per scene unit", oracle="registration.registration_reverse"),
+        "d_reference": Judged(2, "loss per unit of the picture", oracle="registration.registration_reverse"),
     },
     "objective": {
         "colour_image": Judged(3, "display", oracle="render.render_forward"),

@@ -134,7 +134,7 @@ def test_a_name_is_registered_once(monkeypatch, other, message):
 def test_the_checks_are_the_variants_in_the_order_of_the_specification():
     assert list(all_pairs()) == [variant.name for stage in STAGES.values() for variant in stage.variants]
     labels = [pair.equation for pair in all_pairs().values()]
-    order = ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10)), "B13", "B16", "6"]
+    order = ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10)), "B13", "B16", "B19", "6"]
     assert list(dict.fromkeys(labels)) == order
 
 

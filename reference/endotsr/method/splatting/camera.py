@@ -24,6 +24,13 @@ class Camera(NamedTuple):
     height: int
 
 
+class CameraPose(NamedTuple):
+    """x' = rotation @ x + translation, in OpenCV axes: from the world, or from another camera, to a camera."""
+
+    rotation: FloatArray  # (3, 3)
+    translation: FloatArray  # (3,) scene units
+
+
 class CameraGrads(NamedTuple):
     """Derivative of a loss with respect to the camera pose; the entries of the rotation matrix are independent."""
 

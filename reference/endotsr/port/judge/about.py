@@ -8,7 +8,7 @@ PAGES = {
     "5": "05_laplacian", "6": "06_objective", "7": "07_calibration", "B1": "b01_deformation", "B2": "b02_covariance",
     "B3": "b03_projection", "B4": "b04_harmonics", "B5": "b05_compositing", "B6": "b06_masked_l1",
     "B7": "b07_masked_ssim", "B8": "b08_depth", "B9": "b09_smoothness", "B10": "b10_adam", "B11": "b11_density",
-    "B12": "b12_initialisation", "B13": "b13_exposure", "B16": "b16_pose",
+    "B12": "b12_initialisation", "B13": "b13_exposure", "B16": "b16_pose", "B19": "b19_registration",
 }  # fmt: skip
 """Equation -> its page in docs/specification."""
 

@@ -5,8 +5,8 @@ import importlib
 from endotsr.port.stages.stage import Stage
 
 STAGE_MODULES = (
-    "spectral", "laplacian", "deformation", "projection", "compositing", "losses", "exposure", "pose", "scene",
-    "optimiser",
+    "spectral", "laplacian", "deformation", "projection", "compositing", "losses", "exposure", "pose",
+    "registration", "scene", "optimiser",
 )  # fmt: skip
 
 

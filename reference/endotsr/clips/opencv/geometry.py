@@ -1,0 +1,111 @@
+"""Local contrast, growing and shrinking of masks, the pose of points, and matches of features.
+
+Inputs and outputs are NumPy arrays in this project's conventions: image positions are in pixels with the centre of the
+first pixel at (0.5, 0.5), poses map the axes of the points to the axes of the camera. Every function is deterministic.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv.library import cv2_library
+from endotsr.method.kernels.arrays import Array, BoolArray, FloatArray
+from endotsr.method.splatting.camera import Camera
+
+CONTRAST, CELLS = 2.0, (8, 8)  # limit and grid of the adaptive histogram
+DRAWS, FAR, CONFIDENCE = 200, 2.0, 0.999  # of the consensus: samples, pixels, probability
+MOST_FEATURES, FAINT = 3000, 0.01  # of a picture, and the least contrast of one
+DISTINCT = 0.8  # distance to the best match over the distance to the second best
+
+
+class Consensus(NamedTuple):
+    """A pose that some of the points agree with."""
+
+    rotation: FloatArray  # (3, 3)
+    translation: FloatArray  # (3,)
+    agree: NDArray[np.intp]  # indices of the points
+
+
+class Features(NamedTuple):
+    """Scale-invariant features of a picture."""
+
+    place: FloatArray  # (F, 2) pixels
+    descriptor: NDArray[np.float32]  # (F, 128)
+
+
+def grey_of(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Luminance (H, W) of a planar RGB picture (3, H, W)."""
+    cv2 = cv2_library()
+    return cv2.cvtColor(np.ascontiguousarray(image.transpose(1, 2, 0)), cv2.COLOR_RGB2GRAY)
+
+
+def equalised(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The picture (H, W) with its histogram equalised in cells, with limited contrast (CLAHE)."""
+    return cv2_library().createCLAHE(CONTRAST, CELLS).apply(np.ascontiguousarray(grey))
+
+
+def grown(mask: BoolArray, margin: int) -> BoolArray:
+    """The mask (H, W) grown by `margin` pixels, in squares."""
+    return cv2_library().dilate(mask.astype(np.uint8), np.ones((2 * margin + 1,) * 2, np.uint8)) > 0
+
+
+def shrunk(mask: BoolArray, margin: int) -> BoolArray:
+    """The mask (H, W) without the pixels within `margin` of a pixel outside it or of the edge of the picture."""
+    cv2 = cv2_library()
+    square = np.ones((2 * margin + 1,) * 2, np.uint8)
+    return cv2.erode(mask.astype(np.uint8), square, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
+
+
+def halved_blurred(plane: Array) -> Array:
+    """The next level of a Gaussian pyramid: blurred and every second pixel, (ceil(H/2), ceil(W/2))."""
+    return cv2_library().pyrDown(np.ascontiguousarray(plane))
+
+
+def pose_by_consensus(
+    points: FloatArray, pixels: FloatArray, camera: Camera, start: tuple[FloatArray, FloatArray]
+) -> Consensus | None:
+    """The pose under which most points project near their pixels, by random samples (RANSAC); None without one.
+
+    points   (3, M) scene units, M >= 4
+    pixels   (2, M) in the picture of `camera`, whose intrinsics are used
+    start    rotation and translation with which the search begins
+    """
+    cv2 = cv2_library()
+    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
+    turn, shift = cv2.Rodrigues(start[0])[0], np.array(start[1], np.float64).reshape(3, 1)
+    x, u = np.ascontiguousarray(points.T), np.ascontiguousarray(pixels.T)
+    try:
+        found, turn, shift, agree = cv2.solvePnPRansac(x, u, matrix, None, turn, shift, True, DRAWS, FAR, CONFIDENCE)
+    except cv2.error:  # degenerate points
+        return None
+    if not found or agree is None or not (np.isfinite(turn).all() and np.isfinite(shift).all()):
+        return None
+    return Consensus(cv2.Rodrigues(turn)[0], shift.ravel(), agree.ravel().astype(np.intp))
+
+
+def features_of(grey: NDArray[np.uint8], mask: BoolArray) -> Features:
+    """Features (SIFT) of a picture (H, W) inside a mask (H, W)."""
+    cv2 = cv2_library()
+    detector = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=FAINT)
+    points, found = detector.detectAndCompute(grey, mask.astype(np.uint8))
+    if not points or found is None:
+        return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
+    return Features(np.array([point.pt for point in points]) + 0.5, np.asarray(found, np.float32))
+
+
+def matched_features(source: Features, target: Features) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Indices of features of two pictures that match one another best and distinctly."""
+    cv2, none = cv2_library(), np.zeros(0, np.intp)
+    if len(source.place) < 2 or len(target.place) < 2:
+        return none, none
+    matcher = cv2.BFMatcher(cv2.NORM_L2)
+    there = matcher.knnMatch(source.descriptor, target.descriptor, 2)
+    back = {match.queryIdx: match.trainIdx for match in matcher.match(target.descriptor, source.descriptor)}
+    kept = [
+        (first.queryIdx, first.trainIdx)
+        for first, second in there
+        if first.distance < DISTINCT * second.distance and back.get(first.trainIdx) == first.queryIdx
+    ]
+    pairs = np.array(kept, np.intp).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]

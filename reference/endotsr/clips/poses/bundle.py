@@ -1,0 +1,195 @@
+"""Direct bundle adjustment: all poses at once from the residuals (B19) of pairs of frames, with depth held fixed.
+
+In: poses near the solution, and the levels of a pyramid from coarse to fine. Out: the refined poses. A step is taken
+only if the cost falls. Every pair has its own robust scale, held fixed while steps are tried. The first pose is held
+fixed: a common motion of all cameras is unobservable. The normal equations are banded, so time is linear in the
+number of frames.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.poses.levels import Level
+from endotsr.clips.poses.pair_kernels import COST, RIGHT, SEEN, SUMS, WEIGHT, scale_kernel, sums_kernel
+from endotsr.clips.poses.views import between
+from endotsr.method.equations.pose import pose_forward
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.kernels.threads import parallel_for
+from endotsr.method.splatting.camera import CameraPose
+
+GAPS = (1, 4, 16)  # frames between the two of a pair
+LEAST_OVERLAP, LEAST_SEEN = 0.3, 80  # share and number of the points of a pair that the target frame shows
+FLOOR = 0.05  # least robust scale, local standard deviations
+SCALES, STEPS = 2, 3  # estimates of the scales at each level, and steps tried after each
+DAMPING, SOFTER, HARDER = 1e-4, 0.3, 10.0  # of the normal equations: at first, after a success, after a failure
+ENOUGH = 2e-5  # rad, and share of the depth: a shorter step ends a level
+LARGEST = 0.1  # the same units: longest step
+
+
+class Fit(NamedTuple):
+    """How well the pairs of one level fit."""
+
+    scale: float  # median robust standard deviation, local standard deviations of the picture
+    share: float  # of the points, weighted as they agree
+    pairs: int
+    steps: int  # accepted
+
+
+class Bundle(NamedTuple):
+    """Refined poses, and the fit before and after, at the last level."""
+
+    poses: list[CameraPose]
+    before: Fit
+    after: Fit
+
+
+def pairs_of(count: int, gaps: tuple[int, ...] = GAPS) -> NDArray[np.intp]:
+    """(P, 2) source and target: pairs with these gaps, in both directions. Wide gaps begin at every second frame."""
+    found = []
+    for gap in gaps:
+        for i in range(0, count - gap, max(1, gap // 2)):
+            found += [(i, i + gap), (i + gap, i)]
+    return np.array(found, np.intp).reshape(-1, 2)
+
+
+def adjusted(
+    levels: list[Level], poses: list[CameraPose], depth: float, on_step: Callable[[], None] = lambda: None
+) -> Bundle:
+    """The poses that minimise the residuals of all pairs.
+
+    levels    from coarse to fine
+    poses     one per frame, near the solution
+    depth     typical depth, scene units: the unit of a translation
+    on_step   called after every tried step
+
+    Edges:    without a pair that overlaps, the poses are returned unchanged.
+    """
+    pairs = pairs_of(len(poses))
+    before = after = fit_of(levels[-1], pairs, poses)
+    for level in levels:
+        taken = 0
+        for _ in range(SCALES):
+            kept, scale = _scales(level, pairs, poses)
+            if not len(kept):
+                break
+            poses, count = _descend(level, kept, scale, poses, depth, on_step)
+            taken += count
+        after = fit_of(level, pairs, poses)._replace(steps=taken)
+    return Bundle(poses, before, after)
+
+
+def fit_of(level: Level, pairs: NDArray[np.intp], poses: list[CameraPose]) -> Fit:
+    """The fit of poses at a level."""
+    kept, scale = _scales(level, pairs, poses)
+    if not len(kept):
+        return Fit(float("nan"), float("nan"), 0, 0)
+    sums = _pair_sums(level, kept, scale, poses)
+    return Fit(float(np.median(scale)), float(sums[:, WEIGHT].sum() / sums[:, SEEN].sum()), len(kept), 0)
+
+
+def _descend(
+    level: Level, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose], depth: float,
+    on_step: Callable[[], None],
+) -> tuple[list[CameraPose], int]:  # fmt: skip
+    """Levenberg-Marquardt steps with fixed scales; and the number that were accepted."""
+    sums, damping, taken = _pair_sums(level, pairs, scale, poses), DAMPING, 0
+    for _ in range(STEPS):
+        step = _step(sums, pairs, poses, depth, damping)
+        trial = [_moved(pose, part) for pose, part in zip(poses, step)]
+        tried = _pair_sums(level, pairs, scale, trial)
+        on_step()
+        if tried[:, COST].sum() < sums[:, COST].sum():
+            poses, sums, damping, taken = trial, tried, damping * SOFTER, taken + 1
+        else:
+            damping *= HARDER
+        if np.abs(step / np.array([1, 1, 1, depth, depth, depth])).max() < ENOUGH:
+            break
+    return poses, taken
+
+
+def _moved(pose: CameraPose, step: FloatArray) -> CameraPose:
+    rotation, translation, _ = pose_forward(*pose, step[:3], step[3:])
+    return CameraPose(rotation, translation)
+
+
+def _relative(pairs: NDArray[np.intp], poses: list[CameraPose]) -> FloatArray:
+    """(P, 3, 4): the pose of every target relative to its source."""
+    found = np.empty((len(pairs), 3, 4))
+    for k, (source, target) in enumerate(pairs):
+        found[k, :, :3], found[k, :, 3] = between(poses, source, target)
+    return found
+
+
+def _scales(level: Level, pairs: NDArray[np.intp], poses: list[CameraPose]) -> tuple[NDArray[np.intp], FloatArray]:
+    """The pairs that overlap, and their robust scales."""
+    scale, seen = np.empty(len(pairs)), np.empty(len(pairs), np.intp)
+    parallel_for(scale_kernel, len(pairs), level, pairs, _relative(pairs, poses), FLOOR, scale, seen)
+    points = np.diff(level.first)[pairs[:, 0]]
+    kept = (seen >= LEAST_SEEN) & (seen >= LEAST_OVERLAP * points)
+    return pairs[kept], scale[kept]
+
+
+def _pair_sums(level: Level, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose]) -> FloatArray:
+    out = np.empty((len(pairs), SUMS))
+    parallel_for(sums_kernel, len(pairs), level, pairs, _relative(pairs, poses), scale, out)
+    return out
+
+
+def _step(
+    sums: FloatArray, pairs: NDArray[np.intp], poses: list[CameraPose], depth: float, damping: float
+) -> FloatArray:  # fmt: skip
+    """(n, 6) rotation vectors and offsets; those of the first frame are 0."""
+    from scipy.linalg import solveh_banded
+
+    unit = np.array([1, 1, 1, depth, depth, depth])
+    band, right = _normal_equations(sums, pairs, poses, unit)
+    band[:, :6], right[:6] = 0.0, 0.0  # the first frame stays
+    diagonal = band[0]
+    band[0] = diagonal * (1 + damping) + np.where(diagonal > 0, 1e-3, 1.0)
+    step = -solveh_banded(band, right, lower=True).reshape(len(poses), 6)
+    longest = np.abs(step).max()
+    return step * min(1.0, LARGEST / longest if longest > 0 else 1.0) * unit
+
+
+def _normal_equations(
+    sums: FloatArray, pairs: NDArray[np.intp], poses: list[CameraPose], unit: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The lower band of the matrix (6 (gap + 1), 6 n), and the right side (6 n)."""
+    gap, count = int(np.abs(pairs[:, 0] - pairs[:, 1]).max()), len(poses)
+    band, right = np.zeros((6 * (gap + 1), 6 * count)), np.zeros((count, 6))
+    upper = np.triu_indices(6)
+
+    def add(i: int, j: int, block: FloatArray) -> None:
+        """Add a block whose row is frame i and whose column is frame j <= i."""
+        row, column = 6 * i + np.arange(6)[:, None], 6 * j + np.arange(6)[None, :]
+        below = row >= column
+        band[(row - column)[below], np.broadcast_to(column, (6, 6))[below]] += block[below]
+
+    for (source, target), part in zip(pairs, sums):
+        matrix = np.zeros((6, 6))
+        matrix[upper] = part[:RIGHT]
+        matrix = (matrix + np.triu(matrix, 1).T) * unit[:, None] * unit
+        moved = adjoint(between(poses, source, target)) * unit / unit[:, None]
+        mixed = matrix @ moved
+        g = part[RIGHT:COST] * unit
+        add(target, target, matrix)
+        add(source, source, moved.T @ mixed)
+        add(target, source, -mixed) if target > source else add(source, target, -mixed.T)
+        right[target] += g
+        right[source] -= moved.T @ g
+    return band, right.ravel()
+
+
+def adjoint(pose: CameraPose) -> FloatArray:
+    """(6, 6): the change of a relative pose by a change (omega, tau) of its source, in target axes.
+
+    For small changes, T Exp(xi) T^-1 = Exp(adjoint(T) xi).
+    """
+    r, (x, y, z) = pose
+    found = np.zeros((6, 6))
+    found[:3, :3] = found[3:, 3:] = r
+    found[3:, :3] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ r
+    return found

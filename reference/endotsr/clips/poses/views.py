@@ -1,0 +1,81 @@
+"""The frames of a clip as the registration uses them: pictures, tissue, depth and intrinsics."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.geometry import grown, shrunk
+from endotsr.method.kernels.arrays import BoolArray
+from endotsr.method.splatting.camera import Camera, CameraPose, scale_camera
+
+WIDEST = 320  # columns of the pictures whose flow is computed
+BRIGHT, SATURATED, DARK = 200, 253, 12  # grey levels: a highlight has all channels over, or one at; a dark pixel, none
+HALO = 2  # pixels around a highlight
+MARGIN = 3  # pixels of tissue that a usable pixel has on every side
+
+
+IDENTITY = CameraPose(np.eye(3), np.zeros(3))
+
+
+class Views(NamedTuple):
+    """n frames of H x W pixels with one set of intrinsics."""
+
+    images: NDArray[np.uint8]  # (n, 3, H, W) display RGB
+    tissue: BoolArray  # (n, H, W)
+    depth: NDArray[np.float32]  # (n, H, W) scene units; 0, negative or not finite = no depth
+    camera: Camera  # intrinsics; its pose is not used
+
+    @property
+    def count(self) -> int:
+        """Number of frames n."""
+        return len(self.images)
+
+
+def compose(after: CameraPose, before: CameraPose) -> CameraPose:
+    """The pose that applies `before`, then `after`."""
+    return CameraPose(after.rotation @ before.rotation, after.rotation @ before.translation + after.translation)
+
+
+def inverse(pose: CameraPose) -> CameraPose:
+    """The opposite pose."""
+    return CameraPose(pose.rotation.T, -pose.rotation.T @ pose.translation)
+
+
+def between(poses: list[CameraPose], source: int, target: int) -> CameraPose:
+    """The pose of the target camera relative to the source camera."""
+    return compose(poses[target], inverse(poses[source]))
+
+
+def known_depth(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The depth, with 0 where it is negative or not finite."""
+    return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))
+
+
+def usable_pixels(image: NDArray[np.uint8], tissue: BoolArray) -> BoolArray:
+    """Tissue that shows texture: without highlights and dark pixels, and without a margin. (3, H, W) to (H, W)."""
+    largest, smallest = image.max(axis=0), image.min(axis=0)
+    highlight = grown((smallest > BRIGHT) | (largest >= SATURATED), HALO)
+    return shrunk(tissue & ~highlight & (largest >= DARK), MARGIN)
+
+
+def small_views(views: Views, widest: int = WIDEST) -> Views:
+    """The frames averaged over squares of pixels to at most `widest` columns; the same frames if they are narrower.
+
+    A square is tissue if all its pixels are, and has the depth of one of its central pixels.
+    """
+    height, width = views.tissue.shape[1:]
+    side = -(-width // widest)
+    if side == 1:
+        return views
+    rows, columns = height // side, width // side
+    cut = (slice(0, rows * side), slice(0, columns * side))
+    images = np.empty((views.count, 3, rows, columns), np.uint8)
+    for k, image in enumerate(views.images):
+        picture = np.ascontiguousarray(image[:, *cut].transpose(1, 2, 0))
+        images[k] = area_resize(picture, columns, rows).transpose(2, 0, 1)
+    whole = views.tissue[:, *cut].reshape(-1, rows, side, columns, side).all(axis=(2, 4))
+    depth = views.depth[:, side // 2 : rows * side : side, side // 2 : columns * side : side]
+    camera = scale_camera(views.camera._replace(width=columns * side, height=rows * side), columns, rows)
+    return Views(images, whole, depth, camera)
