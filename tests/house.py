@@ -21,7 +21,7 @@ STOREYS: dict[str, tuple[str, ...]] = {
     "config": (),
     "definition": (),
     "method": ("kernels", "equations", "losses", "splatting"),
-    "clips": ("opencv", "sequences", "simulator", "effects"),
+    "clips": ("opencv", "poses", "sequences", "simulator", "effects"),
     "training": ("scene", "fitting", "runs"),
     "results": ("evaluation", "report", "export", "views"),
     "port": ("stages", "gradcheck", "judge", "contract", "reference", "search"),

@@ -94,6 +94,12 @@ UNDIFFERENTIATED = {
         "none: windows are an option of training that is not part of the paper",
         "none: the guide to recordings shows one",
     ),
+    "b19b": Undifferentiated(
+        ("endotsr.clips.poses.chain.chained", "endotsr.clips.poses.bundle.adjusted"),
+        "it comes before training",
+        "tests/clips/poses/test_bundle.py",
+        "none: poses are an estimate, and a port takes those of the clip",
+    ),
     "m1": Undifferentiated(
         ("endotsr.results.evaluation.metrics.psnr", "endotsr.results.evaluation.metrics.psnr_tissue"),
         "a metric is only reported",

@@ -23,7 +23,16 @@ TYPE_CHECKING = False  # as in `typing`, whose import would be the heaviest part
 if TYPE_CHECKING:
     from typing import Any
 
-    from endotsr.api import Run, StopTraining, inspect, load_sequence, make_config, open_run, train
+    from endotsr.api import (
+        Run,
+        StopTraining,
+        estimate_poses,
+        inspect,
+        load_sequence,
+        make_config,
+        open_run,
+        train,
+    )
     from endotsr.clips.sequences.sequence import Sequence
     from endotsr.config import Config
     from endotsr.errors import CalibrationError, InputError
@@ -42,6 +51,7 @@ __all__ = [
     "Sequence",
     "StopTraining",
     "__version__",
+    "estimate_poses",
     "inspect",
     "load_sequence",
     "make_config",
@@ -58,6 +68,7 @@ _MODULES = {
     "Run": "endotsr.api",
     "Sequence": "endotsr.clips.sequences.sequence",
     "StopTraining": "endotsr.api",
+    "estimate_poses": "endotsr.api",
     "inspect": "endotsr.api",
     "load_sequence": "endotsr.api",
     "make_config": "endotsr.api",

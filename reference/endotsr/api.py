@@ -206,6 +206,23 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
     return inspection_record(found) | {"plan": plan_record(make_plan(found, PAPER if config is None else config))}
 
 
+def estimate_poses(sequence: Sequence) -> Sequence:
+    """The sequence with a camera for each frame, estimated from its pictures, masks and depth, as `endotsr poses`.
+
+    The camera of the first frame stays as it is. A note names the frames whose pose is interpolated. Motion that the
+    whole tissue has in common, as in breathing, is part of the estimated motion.
+
+    Raises: InputError for a single frame, without depth, if too few points match, or if more than 8 frames in a row
+            have no pose.
+    """
+    from endotsr.clips.sequences.make_poses import estimate_poses as estimated
+
+    found = estimated(sequence)
+    interpolated = sorted(found.bridged + found.held)
+    note = "poses: estimated from pictures and depth" + (f"; interpolated: {interpolated}" if interpolated else "")
+    return replace(sequence, cameras=found.cameras, static_camera=False, notes=[*sequence.notes, note])
+
+
 def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | WindowedRun":
     """A run at its latest checkpoint, from a folder of a command or of `Run.save`.
 

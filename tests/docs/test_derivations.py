@@ -15,13 +15,15 @@ OPTIONS = (
     "training/fitting/coarse_start",
     "studies/windows/scene",
     "studies/windows/carry",
+    "clips/poses/bundle",
+    "clips/poses/pair_kernels",
 )
 FILES = [*sorted((SOURCE / "definition").glob("*.py")), *(SOURCE / f"{name}.py" for name in OPTIONS)]
 DEFINITION = "\n".join(file.read_text("utf-8") for file in FILES)
 NOTEBOOKS = {int(f.stem[:2]): f.read_text("utf-8") for f in sorted((ROOT / "notebooks").glob("*.py"))}
 STEP = re.compile(r"^# \*\*\((\d+)\.(\d+)\)", re.MULTILINE)
 CITATION = re.compile(r"\((\d+)\.(\d+)\)")
-DERIVED = [*range(1, 14), *range(18, 22)]
+DERIVED = [*range(1, 14), *range(18, 23)]
 NO_LINE = {
     (2, 2): "says what follows from (2.1)",
     (2, 4): "of the kernel alone: the definition divides by the square of the hyperbolic cosine",
@@ -43,6 +45,7 @@ NO_LINE = {
     (20, 2): "says what follows from (20.1)",
     (21, 2): "says what follows from (21.1)",
     (21, 3): "says what the blend does to independent errors",
+    (22, 7): "says what no picture tells",
 }
 
 

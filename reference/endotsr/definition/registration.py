@@ -11,8 +11,8 @@ RegistrationGrads = namedtuple("RegistrationGrads", "d_rotation d_translation d_
 def keys(s):
     """Keys' kernel k(s) with a = -1/2, and its slope k'(s)."""
     r, sign = np.abs(s), np.sign(s)
-    inner, outer = 1 - 2.5 * r**2 + 1.5 * r**3, 2 - 4 * r + 2.5 * r**2 - 0.5 * r**3
-    slopes = -5 * r + 4.5 * r**2, -4 + 5 * r - 1.5 * r**2
+    inner, outer = 1 - 2.5 * r**2 + 1.5 * r**3, 2 - 4 * r + 2.5 * r**2 - 0.5 * r**3  # (22.1)
+    slopes = -5 * r + 4.5 * r**2, -4 + 5 * r - 1.5 * r**2  # (22.2)
     return np.where(r < 1, inner, np.where(r < 2, outer, 0)), sign * np.where(r < 1, slopes[0], (r < 2) * slopes[1])
 
 
@@ -28,11 +28,11 @@ def registration_forward(rotation, translation, points, reference, picture, came
         np.einsum("mj,ji,mi->m", b, picture, a) for b, a in ((down, across), (down, across_slope), (down_slope, across))
     )
     slope = np.array([slope_u * camera.fx / safe, slope_v * camera.fy / safe])
-    slope = seen * np.array([*slope, -(slope * [x, y]).sum(axis=0) / safe])
+    slope = seen * np.array([*slope, -(slope * [x, y]).sum(axis=0) / safe])  # (22.3)
     return np.where(seen, value - reference, 0), RegistrationSaved(rotation, points, slope, seen)
 
 
 def registration_reverse(d_residual, saved):
     """Reverse of (B19)."""
-    g = saved.slope * d_residual
+    g = saved.slope * d_residual  # (22.4)
     return RegistrationGrads(g @ saved.points.T, g.sum(axis=1), saved.rotation.T @ g, -d_residual * saved.seen)

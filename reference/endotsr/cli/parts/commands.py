@@ -5,6 +5,7 @@ COMMANDS = {
     "prepare": "convert a video, pictures or another layout to a folder for `train`",
     "depth": "compute depth from stereo pairs, or import it from another program",
     "masks": "propose instrument masks for a clip without masks, with an overlay for inspection",
+    "poses": "estimate the poses of a moving scope, from the pictures and depth of a clip",
     "check": "list all faults of a sequence, with remedies",
     "train": "train on a sequence folder, or continue a run",
     "simulate": "write a simulated sequence with exact ground truth for `train`",

@@ -56,7 +56,7 @@ def pairs_of(count: int, gaps: tuple[int, ...] = GAPS) -> NDArray[np.intp]:
 
 
 def adjusted(
-    levels: list[Level], poses: list[CameraPose], depth: float, on_step: Callable[[], None] = lambda: None
+    levels: list[Level], poses: list[CameraPose], depth: float, on_step: Callable[[], object] = lambda: None
 ) -> Bundle:
     """The poses that minimise the residuals of all pairs.
 
@@ -92,7 +92,7 @@ def fit_of(level: Level, pairs: NDArray[np.intp], poses: list[CameraPose]) -> Fi
 
 def _descend(
     level: Level, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose], depth: float,
-    on_step: Callable[[], None],
+    on_step: Callable[[], object],
 ) -> tuple[list[CameraPose], int]:  # fmt: skip
     """Levenberg-Marquardt steps with fixed scales; and the number that were accepted."""
     sums, damping, taken = _pair_sums(level, pairs, scale, poses), DAMPING, 0
@@ -191,5 +191,5 @@ def adjoint(pose: CameraPose) -> FloatArray:
     r, (x, y, z) = pose
     found = np.zeros((6, 6))
     found[:3, :3] = found[3:, 3:] = r
-    found[3:, :3] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ r
+    found[3:, :3] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ r  # (22.6)
     return found

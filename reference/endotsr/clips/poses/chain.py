@@ -19,7 +19,6 @@ from endotsr.method.splatting.camera import CameraPose
 KEEP_AGREEING, KEEP_FOUND = 0.75, 0.5  # shares of the matches, and of the usable points, below which a keyframe goes
 USE_AGREEING, USE_FOUND = 0.6, 0.35  # below which a match with the keyframe is not used
 LONGEST_GAP = 8  # frames without a pose in a row that are bridged
-OnFrame = Callable[[int, int], None]
 
 
 class Link(NamedTuple):
@@ -33,10 +32,12 @@ class Link(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """A pose and a link for each frame; None where there is none. The first frame with a pose has no link."""
+    """A pose and a link for each frame done; None where there is none. The first frame with a pose has no link."""
 
     poses: list[CameraPose | None]
     links: list[Link | None]
+    key: int  # keyframe
+    last: int  # last frame with a pose
 
     @property
     def without(self) -> list[int]:
@@ -44,42 +45,52 @@ class Chain(NamedTuple):
         return [k for k, pose in enumerate(self.poses) if pose is None]
 
 
-def chained(matcher: Matcher, on_frame: OnFrame = lambda i, n: None) -> Chain:
+def chained(
+    matcher: Matcher, on_frame: Callable[[Chain], object] = lambda chain: None, begun: Chain | None = None
+) -> Chain:
     """Register every frame.
 
-    on_frame  called with (frames done, frames in all)
+    on_frame  called with the chain after each frame
+    begun     the chain of an interrupted call, which continues
 
     Raises:  InputError if no two frames can be registered, or if more than `LONGEST_GAP` frames in a row have no pose
              between frames that have one.
     """
-    count = matcher.views.count
-    poses: list[CameraPose | None] = [None] * count
-    links: list[Link | None] = [None] * count
+    chain = begun or _beginning(matcher)
+    first = next(k for k, pose in enumerate(chain.poses) if pose is not None)
+    while (j := len(chain.poses)) < matcher.count:
+        chain = _lengthened(matcher, chain, j)
+        on_frame(chain)
+    if matcher.count > 1 and chain.last == first:
+        raise InputError(f"frame {first}: no later frame has {LEAST} points in common with it")
+    return chain
+
+
+def _beginning(matcher: Matcher) -> Chain:
     first = _first_frame(matcher)
-    poses[first], key, last = IDENTITY, first, first
-    for j in range(first + 1, count):
-        found = _registered(matcher, poses, key, last, j)
-        if found is not None:
-            source, matches, done = found
-            start = poses[source]
-            assert start is not None
-            _refuse_gap(last, j)
-            poses[j] = compose(done.pose, start)
-            still = float(np.median(matches.flow))
-            links[j] = Link(source, matches.count, done.share, float(np.median(done.distance)), still)
-            if source != key or done.share < KEEP_AGREEING or matches.count < KEEP_FOUND * matches.usable:
-                key = j
-            last = j
-        on_frame(j + 1, count)
-    if count > 1 and last == first:
-        raise InputError(f"frames {first} and {first + 1}: fewer than {LEAST} points match, nor in any later frame")
-    return Chain(poses, links)
+    return Chain([*[None] * first, IDENTITY], [None] * (first + 1), first, first)
+
+
+def _lengthened(matcher: Matcher, chain: Chain, j: int) -> Chain:
+    """The chain with frame j."""
+    found = _registered(matcher, chain, j)
+    if found is None:
+        return chain._replace(poses=[*chain.poses, None], links=[*chain.links, None])
+    source, matches, done = found
+    start = chain.poses[source]
+    assert start is not None
+    _refuse_gap(chain.last, j)
+    still = float(np.median(matches.flow))
+    link = Link(source, matches.count, done.share, float(np.median(done.distance)), still)
+    holds = source == chain.key and done.share >= KEEP_AGREEING and matches.count >= KEEP_FOUND * matches.usable
+    pose = compose(done.pose, start)
+    return Chain([*chain.poses, pose], [*chain.links, link], chain.key if holds else j, j)
 
 
 def _first_frame(matcher: Matcher) -> int:
     """The first frame with enough usable pixels that have depth. Raises InputError without one."""
-    for k, (usable, depth) in enumerate(zip(matcher.usable, matcher.views.depth)):
-        if (usable & (depth > 0)).sum() >= LEAST:
+    for k in range(matcher.count):
+        if matcher.seen_points(k) >= LEAST:
             return k
     raise InputError(
         "no frame has usable tissue with depth; a highlight, a dark pixel and a mask's edge are not usable"
@@ -94,11 +105,9 @@ def _refuse_gap(last: int, j: int) -> None:
         )
 
 
-def _registered(
-    matcher: Matcher, poses: list[CameraPose | None], key: int, last: int, j: int
-) -> tuple[int, Matches, Resection] | None:
+def _registered(matcher: Matcher, chain: Chain, j: int) -> tuple[int, Matches, Resection] | None:
     """The source, the matches and the resection of frame j; None if it cannot be registered."""
-    known = [pose if pose is not None else IDENTITY for pose in poses]
+    known, key, last = [pose or IDENTITY for pose in chain.poses], chain.key, chain.last
     for source in dict.fromkeys((key, last)):
         matches = matcher.by_flow(source, j)
         done = resection(matches, matcher.camera, between(known, source, last))

@@ -1,20 +1,22 @@
 """Points of one frame found again in another: dense flow there and back, on a grid of usable pixels with depth.
 
-In: `Views` of moderate width. Out: `Matches`. Pictures are equalised once; flow is computed on demand.
+In: `ViewFrame`s of moderate width, read on demand. Out: `Matches`. A frame is prepared once.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.clips.opencv import dense_flow, sample_bilinear
 from endotsr.clips.opencv.geometry import Features, equalised, features_of, grey_of, matched_features
-from endotsr.clips.poses.views import Views, known_depth, usable_pixels
+from endotsr.clips.poses.views import ViewFrame, Views, known_depth, usable_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
-from endotsr.method.splatting.camera import backproject
+from endotsr.method.splatting.camera import Camera, backproject
 
 POINTS, LEAST_STEP = 600, 4  # number of grid points of a picture, and their least distance in pixels
-RETURN, RETURN_SHARE = 1.0, 0.03  # accepted error of flow there and back: pixels, and share of the flow
+RETURN, RETURN_FRACTION = 1.0, 0.03  # accepted error of flow there and back: pixels, and fraction of the flow
 
 
 class Matches(NamedTuple):
@@ -36,29 +38,42 @@ class Matches(NamedTuple):
         return np.hypot(*(self.target - self.source))
 
 
-class Matcher:
-    """Matches between any two frames."""
+class _Prepared(NamedTuple):
+    """A frame, ready to be matched."""
 
-    def __init__(self, views: Views) -> None:
-        self.views, self.camera = views, views.camera._replace(rotation=np.eye(3), translation=np.zeros(3))
-        self.usable = [usable_pixels(image, tissue) for image, tissue in zip(views.images, views.tissue)]
-        self._plain = [grey_of(image) for image in views.images]
-        self._grey = [equalised(grey) for grey in self._plain]
+    plain: NDArray[np.uint8]  # (H, W) luminance
+    grey: NDArray[np.uint8]  # (H, W) the same, equalised
+    usable: BoolArray  # (H, W)
+    depth: NDArray[np.float32]  # (H, W) 0 = none
+
+
+class Matcher:
+    """Matches between any two of `count` frames.
+
+    read     frame number -> the frame
+    camera   intrinsics of all frames
+    """
+
+    def __init__(self, read: Callable[[int], ViewFrame], count: int, camera: Camera) -> None:
+        self.count, self.camera = count, camera._replace(rotation=np.eye(3), translation=np.zeros(3))
+        self._read = read
+        self._frames: dict[int, _Prepared] = {}
         self._features: dict[int, Features] = {}
-        height, width = views.tissue.shape[1:]
-        step = max(LEAST_STEP, round((height * width / POINTS) ** 0.5))
-        grid = np.mgrid[step // 2 : height : step, step // 2 : width : step]
+        step = max(LEAST_STEP, round((camera.height * camera.width / POINTS) ** 0.5))
+        grid = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
         self._row, self._column = grid.reshape(2, -1)
 
     def by_flow(self, source: int, target: int) -> Matches:
         """Grid points of the source frame that flow finds in the target frame, and back again."""
-        column, row, depth = self._grid_points(source)
-        there = dense_flow(self._grey[source], self._grey[target])
-        back = dense_flow(self._grey[target], self._grey[source])
+        one, other = self._frame(source), self._frame(target)
+        depth = one.depth[self._row, self._column].astype(np.float64)
+        known = one.usable[self._row, self._column] & (depth > 0)
+        column, row, depth = self._column[known], self._row[known], depth[known]
+        there, back = dense_flow(one.grey, other.grey), dense_flow(other.grey, one.grey)
         flow = there[:, row, column].astype(np.float64)
         x, y = column + flow[0], row + flow[1]
         error = np.hypot(*(flow + sample_bilinear(back, x, y)))
-        kept = (error < RETURN + RETURN_SHARE * np.hypot(*flow)) & _marked(self.usable[target], x, y)
+        kept = (error < RETURN + RETURN_FRACTION * np.hypot(*flow)) & _marked(other.usable, x, y)
         points = backproject(self.camera, column[kept], row[kept], depth[kept])
         source_place, target_place = np.stack([column, row])[:, kept] + 0.5, np.stack([x, y])[:, kept] + 0.5
         return Matches(points, source_place, target_place, column.size)
@@ -69,21 +84,34 @@ class Matcher:
         here, there = matched_features(one, other)
         place = one.place[here].T
         column, row = np.floor(place).astype(np.intp)
-        depth = known_depth(self.views.depth[source])[row, column].astype(np.float64)
+        depth = self._frame(source).depth[row, column].astype(np.float64)
         kept = depth > 0
         points = backproject(self.camera, *(place[:, kept] - 0.5), depth[kept])
         return Matches(points, place[:, kept], other.place[there[kept]].T, len(one.place))
 
-    def _grid_points(self, frame: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Columns, rows and depth of the usable grid points of a frame."""
-        depth = known_depth(self.views.depth[frame])[self._row, self._column].astype(np.float64)
-        kept = self.usable[frame][self._row, self._column] & (depth > 0)
-        return self._column[kept], self._row[kept], depth[kept]
+    def seen_points(self, frame: int) -> int:
+        """Number of usable pixels of a frame that have depth."""
+        one = self._frame(frame)
+        return int((one.usable & (one.depth > 0)).sum())
 
-    def _features_of(self, frame: int) -> Features:
-        if frame not in self._features:
-            self._features[frame] = features_of(self._plain[frame], self.usable[frame])
-        return self._features[frame]
+    def _frame(self, number: int) -> _Prepared:
+        if number not in self._frames:
+            frame = self._read(number)
+            plain = grey_of(frame.image)
+            usable = usable_pixels(frame.image, frame.tissue)
+            self._frames[number] = _Prepared(plain, equalised(plain), usable, known_depth(frame.depth))
+        return self._frames[number]
+
+    def _features_of(self, number: int) -> Features:
+        if number not in self._features:
+            one = self._frame(number)
+            self._features[number] = features_of(one.plain, one.usable)
+        return self._features[number]
+
+
+def matcher_of(views: Views) -> Matcher:
+    """Matches between the frames of a clip in memory."""
+    return Matcher(views.frame, views.count, views.camera)
 
 
 def _marked(mask: BoolArray, x: FloatArray, y: FloatArray) -> BoolArray:

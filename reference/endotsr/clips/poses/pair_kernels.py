@@ -64,7 +64,7 @@ def _sums(first, stop, level, pairs, poses, scale, out):
             total[COST] += TUKEY**2 / 6 * (1 - rest**3)
             total[WEIGHT] += weight
             total[SEEN] += 1
-            row[0], row[1], row[2] = y * g2 - z * g1, z * g0 - x * g2, x * g1 - y * g0
+            row[0], row[1], row[2] = y * g2 - z * g1, z * g0 - x * g2, x * g1 - y * g0  # (22.5)
             row[3], row[4], row[5] = g0, g1, g2
             weight /= scale[pair] ** 2
             entry = 0

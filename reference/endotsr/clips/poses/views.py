@@ -32,6 +32,10 @@ class Views(NamedTuple):
         """Number of frames n."""
         return len(self.images)
 
+    def frame(self, number: int) -> "ViewFrame":
+        """One frame."""
+        return ViewFrame(self.images[number], self.tissue[number], self.depth[number])
+
 
 def compose(after: CameraPose, before: CameraPose) -> CameraPose:
     """The pose that applies `before`, then `after`."""
@@ -60,22 +64,44 @@ def usable_pixels(image: NDArray[np.uint8], tissue: BoolArray) -> BoolArray:
     return shrunk(tissue & ~highlight & (largest >= DARK), MARGIN)
 
 
-def small_views(views: Views, widest: int = WIDEST) -> Views:
-    """The frames averaged over squares of pixels to at most `widest` columns; the same frames if they are narrower.
+class ViewFrame(NamedTuple):
+    """One frame of H x W pixels."""
 
-    A square is tissue if all its pixels are, and has the depth of one of its central pixels.
-    """
-    height, width = views.tissue.shape[1:]
-    side = -(-width // widest)
+    image: NDArray[np.uint8]  # (3, H, W)
+    tissue: BoolArray  # (H, W)
+    depth: NDArray[np.float32]  # (H, W)
+
+    def reduced(self, side: int) -> "ViewFrame":
+        """The frame averaged over squares of pixels; rows and columns that fill no square are cut off.
+
+        A square is tissue if all its pixels are, and has the depth of one of its central pixels.
+        """
+        if side == 1:
+            return self
+        rows, columns = (size // side for size in self.tissue.shape)
+        height, width = rows * side, columns * side
+        picture = np.ascontiguousarray(self.image[:, :height, :width].transpose(1, 2, 0))
+        image = np.ascontiguousarray(area_resize(picture, columns, rows).transpose(2, 0, 1))
+        tissue = self.tissue[:height, :width].reshape(rows, side, columns, side).all(axis=(1, 3))
+        return ViewFrame(image, tissue, self.depth[side // 2 : height : side, side // 2 : width : side])
+
+
+def side_of(width: int, widest: int = WIDEST) -> int:
+    """Side of the squares that reduce a picture to at most `widest` columns."""
+    return -(-width // widest)
+
+
+def reduced_camera(camera: Camera, side: int) -> Camera:
+    """The camera of pictures reduced by `ViewFrame.reduced`."""
+    rows, columns = camera.height // side, camera.width // side
+    return scale_camera(camera._replace(width=columns * side, height=rows * side), columns, rows)
+
+
+def small_views(views: Views) -> Views:
+    """The frames reduced to at most `WIDEST` columns; the same frames if they are narrower."""
+    side = side_of(views.camera.width)
     if side == 1:
         return views
-    rows, columns = height // side, width // side
-    cut = (slice(0, rows * side), slice(0, columns * side))
-    images = np.empty((views.count, 3, rows, columns), np.uint8)
-    for k, image in enumerate(views.images):
-        picture = np.ascontiguousarray(image[:, *cut].transpose(1, 2, 0))
-        images[k] = area_resize(picture, columns, rows).transpose(2, 0, 1)
-    whole = views.tissue[:, *cut].reshape(-1, rows, side, columns, side).all(axis=(2, 4))
-    depth = views.depth[:, side // 2 : rows * side : side, side // 2 : columns * side : side]
-    camera = scale_camera(views.camera._replace(width=columns * side, height=rows * side), columns, rows)
-    return Views(images, whole, depth, camera)
+    frames = [views.frame(k).reduced(side) for k in range(views.count)]
+    images, tissue, depth = (np.stack(planes) for planes in zip(*frames))
+    return Views(images, tissue, depth, reduced_camera(views.camera, side))

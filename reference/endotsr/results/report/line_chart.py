@@ -26,11 +26,14 @@ class ChartCurve(NamedTuple):
     y: list[float]
 
 
-def chart_svg(title: str, curves: list[ChartCurve], end: float, *, logarithmic: bool = False) -> str:
+def chart_svg(
+    title: str, curves: list[ChartCurve], end: float, *, logarithmic: bool = False, unit: str = "iteration"
+) -> str:
     """The chart; "" if no curve has a finite value (on a logarithmic axis: a positive one).
 
     end           upper end of the horizontal axis, which begins at 0
     logarithmic   use a logarithmic vertical axis
+    unit          what the horizontal axis counts
     """
     shown = [(curve.name, points) for curve in curves if (points := _points(curve, logarithmic)).size]
     if not shown:
@@ -51,7 +54,7 @@ def chart_svg(title: str, curves: list[ChartCurve], end: float, *, logarithmic: 
             f'<text x="{LEFT + 170 * number}" y="14" fill="{colour}">{text(name)}</text>'
         )
     parts.append(f'<text x="{LEFT}" y="{HEIGHT - 8}">0</text>')
-    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 8}" text-anchor="end">iteration {end:.0f}</text>')
+    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 8}" text-anchor="end">{unit} {end:.0f}</text>')
     return (
         f'<svg viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}" role="img" aria-label="{text(title)}" fill="var(--soft)"'
         f' font-size="13">{"".join(parts)}</svg>'

@@ -1,0 +1,236 @@
+"""`endotsr poses`: camera poses of a clip with depth, recorded in its `sequence.toml`.
+
+In: a folder in the common format, or a `Sequence` in memory. Out: one pose for each frame, with frames named whose pose
+is interpolated. An interrupted call leaves its frames in `poses.partial.json`, and the next one continues there.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import msgspec
+import numpy as np
+
+from endotsr.clips.poses.chain import Chain, Link
+from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, Estimate, estimated, movement_of
+from endotsr.clips.poses.matches import Matcher
+from endotsr.clips.poses.movement import Movement, Pair
+from endotsr.clips.poses.views import Views
+from endotsr.clips.sequences.clip import Clip, scene_factor
+from endotsr.clips.sequences.common import cameras_of, list_contents, open_common
+from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, sequence_text
+from endotsr.clips.sequences.trajectory import filled
+from endotsr.config import Section
+from endotsr.errors import InputError
+from endotsr.method.splatting.camera import Camera, CameraPose
+from endotsr.untrusted.json import read_json, typed
+from endotsr.untrusted.writing import replace_text
+
+PARTIAL = "poses.partial.json"
+KEEP_EVERY = 16  # frames between two writes of the partial result
+ORIGIN = "estimated by endotsr poses from pictures and depth"
+Row = Annotated[list[float], msgspec.Meta(min_length=12, max_length=12)]
+
+
+class EstimatedPoses(NamedTuple):
+    """Cameras of every frame, and the estimate."""
+
+    cameras: list[Camera]  # n
+    bridged: list[int]  # frames whose pose is interpolated between others
+    held: list[int]  # frames before the first or after the last pose, which have its pose
+    estimate: Estimate
+
+
+class PoseReport(NamedTuple):
+    """What `enter_poses` found."""
+
+    written: bool
+    movement: Movement
+    found: EstimatedPoses | None  # None: the clip is left as it is
+    unit: str
+
+
+class _Partial(Section, frozen=True, kw_only=True):
+    """The chain of an interrupted call; lists have one entry for each frame done."""
+
+    clip: str  # hash of the files
+    poses: list[Row | None]
+    links: list[tuple[int, int, float, float, float] | None]
+    key: int
+    last: int
+
+
+class Watch(NamedTuple):
+    """What is told of the work while it goes on."""
+
+    begin: Callable[[int], object] = lambda steps: None
+    step: Callable[[], object] = lambda: None
+
+
+SILENT = Watch()
+
+
+def estimate_poses(sequence: Sequence, watch: Watch = SILENT) -> EstimatedPoses:
+    """The cameras of a sequence, from its pictures, masks and depth. The first one keeps its pose.
+
+    watch     called with the number of steps, and after each
+
+    Raises:   InputError for one frame, no depth, frames that do not match, or too long a gap.
+    """
+    views = Views(sequence.images, sequence.masks, sequence.depth, sequence.cameras[0])
+    watch.begin(sequence.count - 1 + ADJUSTMENTS)
+    found = estimated(views, on_frame=lambda chain: watch.step(), on_step=watch.step)
+    return _with_cameras(found, sequence.cameras[0])
+
+
+def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch: Watch = SILENT) -> PoseReport:
+    """Estimate the poses of a folder in the common format and record them.
+
+    replace   whether existing poses may be replaced
+    force     whether poses are written even if the scope seems to be still
+
+    Raises:   InputError, leaving the folder unchanged but for the partial result.
+    """
+    contents = list_contents(folder, poses=False)
+    if contents.file.poses and not replace:
+        raise InputError(f"{folder}: has poses already ({contents.file.poses.origin}); --replace estimates new ones")
+    if not contents.depth:
+        raise InputError(f"{folder}: no depth, and poses are estimated from it; run endotsr depth {folder} first")
+    if any(contents.file.camera.distortion):
+        raise InputError(
+            f"{folder}: the pictures are distorted; endotsr prepare {folder} --out FOLDER straightens them"
+        )
+    camera = cameras_of(contents._replace(poses=None))[0]
+    views, unit = views_of(open_common(folder), camera), contents.file.unit_in_words
+    if views.count < 2:
+        raise InputError(f"{folder}: one frame: there is no motion to estimate")
+    known = movement_of(views)
+    if known[2].answer == "still" and not force:
+        return PoseReport(False, known[2], None, unit)
+    found = _resumed(folder, views, known, watch)
+    factor = scene_factor(contents.file.unit)
+    rows = [np.column_stack([c.rotation, c.translation / factor]).ravel().tolist() for c in found.cameras]
+    entry = PoseEntry(origin=ORIGIN, bridged=sorted(found.bridged + found.held), matrices=rows)
+    replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(contents.file, poses=entry)))
+    (folder / PARTIAL).unlink(missing_ok=True)
+    return PoseReport(True, known[2], found, unit)
+
+
+def views_of(clip: Clip, camera: Camera) -> Views:
+    """All frames of a clip in memory. Raises InputError for a file that cannot be read."""
+    frames = list(range(clip.count))
+    size = (clip.count, camera.height, camera.width)
+    images, tissue = np.empty((clip.count, 3, *size[1:]), np.uint8), np.ones(size, bool)
+    depth = np.zeros(size, np.float32)
+    for k, pair in zip(frames, clip.pictures(frames)):
+        images[k] = pair.left.transpose(2, 0, 1)
+        if clip.masks is not None and (mask := clip.masks(k)) is not None:
+            tissue[k] = mask
+        if clip.depth is not None and (plane := clip.depth(k)) is not None:
+            depth[k] = plane
+    return Views(images, tissue, depth, camera)
+
+
+def _resumed(folder: Path, views: Views, known: tuple[Matcher, list[Pair], Movement], watch: Watch) -> EstimatedPoses:
+    """Estimate, beginning with the partial result of this clip, and keep one on the way."""
+    mark, latest = _mark(views), [_read_partial(folder / PARTIAL, _mark(views))]
+    watch.begin(views.count - 1 + ADJUSTMENTS)
+    for _ in range(len(latest[0].poses) - 1 if latest[0] else 0):
+        watch.step()
+
+    def on_frame(chain: Chain) -> None:
+        latest[0] = chain
+        if len(chain.poses) % KEEP_EVERY == 0:
+            _write_partial(folder / PARTIAL, mark, chain)
+        watch.step()
+
+    try:
+        found = estimated(views, on_frame=on_frame, on_step=watch.step, begun=latest[0], known=known)
+    except KeyboardInterrupt:
+        if latest[0] is not None:
+            _write_partial(folder / PARTIAL, mark, latest[0])
+        raise KeyboardInterrupt(f"the same command continues from {folder / PARTIAL}") from None
+    return _with_cameras(found, views.camera)
+
+
+def _with_cameras(found: Estimate, first: Camera) -> EstimatedPoses:
+    """A camera for each frame: gaps are interpolated, and both ends are held."""
+    known = [k for k, pose in enumerate(found.poses) if pose is not None]
+    held = [k for k in found.without if k < known[0] or k > known[-1]]
+    poses = filled(found.poses)
+    cameras = [
+        first._replace(
+            rotation=pose.rotation @ first.rotation,
+            translation=pose.rotation @ first.translation + pose.translation,
+        )
+        for pose in poses
+    ]
+    return EstimatedPoses(cameras, [k for k in found.without if k not in held], held, found)
+
+
+def _mark(views: Views) -> str:
+    """SHA-256 of everything that the poses depend on."""
+    found = hashlib.sha256(repr(views.camera[2:]).encode())
+    for plane in (views.images, views.tissue, views.depth):
+        found.update(np.ascontiguousarray(plane))
+    return found.hexdigest()
+
+
+def _read_partial(path: Path, mark: str) -> Chain | None:
+    """The chain of an interrupted call on the same clip; None without one, or if the file is of no use."""
+    if not path.is_file():
+        return None
+    try:
+        kept = typed(read_json(path), _Partial, path)
+    except InputError:
+        return None
+    ends = (kept.key, kept.last, next((k for k, pose in enumerate(kept.poses) if pose), -1))
+    whole = len(kept.poses) == len(kept.links) and all(0 <= k < len(kept.poses) and kept.poses[k] for k in ends)
+    if kept.clip != mark or not whole:
+        return None
+    poses = [None if row is None else _pose_of(row) for row in kept.poses]
+    return Chain(poses, [None if link is None else Link(*link) for link in kept.links], kept.key, kept.last)
+
+
+def _pose_of(row: list[float]) -> CameraPose:
+    matrix = np.array(row, np.float64).reshape(3, 4)
+    return CameraPose(np.ascontiguousarray(matrix[:, :3]), np.ascontiguousarray(matrix[:, 3]))
+
+
+def _write_partial(path: Path, mark: str, chain: Chain) -> None:
+    rows = [None if pose is None else np.column_stack(pose).ravel().tolist() for pose in chain.poses]
+    kept = {"clip": mark, "poses": rows, "links": chain.links, "key": chain.key, "last": chain.last}
+    replace_text(path, json.dumps(kept) + "\n")
+
+
+def lines_of(report: PoseReport, folder: Path) -> list[str]:
+    """What is said of a report, in sentences."""
+    lines = [report.movement.sentence]
+    found = report.found
+    if found is None:
+        return [*lines, f"{folder}: still: left as it is; --force estimates poses all the same"]
+    if report.movement.answer == "unclear":
+        lines.append("warning: if the scope is still, these poses are motion of the tissue; then do not use them")
+    e, unit = found.estimate, report.unit
+    lines.append(
+        f"path {e.path:.4g} {unit}; {e.share:.0%} of the matches agree; the poses leave {e.left:.2f} pixels of the"
+        f" {e.still:.2f} that the picture moves"
+    )
+    if found.bridged:
+        lines.append(f"bridged, the pose is interpolated: {_named(found.bridged)}")
+    if found.held:
+        lines.append(f"before the first or after the last pose, which is held: {_named(found.held)}")
+    lines.append(
+        f"beside the rigid motion, tissue moves by {e.own:.2g} {unit} (median, over {APART} frames); what the whole"
+        " tissue does in common, as in breathing, no method can tell from motion of the scope: it is in the path"
+    )
+    return lines
+
+
+def _named(frames: list[int]) -> str:
+    word = "frame" if len(frames) == 1 else f"{len(frames)} frames"
+    return f"{word} {shortened([str(k) for k in frames])}"

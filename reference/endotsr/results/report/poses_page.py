@@ -1,0 +1,68 @@
+"""The poses that `endotsr poses` estimated, as one self-contained page."""
+
+import numpy as np
+
+from endotsr.clips.sequences.make_poses import EstimatedPoses, PoseReport
+from endotsr.method.splatting.camera import camera_centre, degrees_between
+from endotsr.results.report import parts
+from endotsr.results.report.line_chart import ChartCurve, chart_svg
+
+
+def poses_page(name: str, report: PoseReport, lines: list[str]) -> str:
+    """The page as text: the sentences of the command, the path, and the quality of every frame."""
+    head = f"{name}: {'poses are written' if report.written else 'no poses are written'}"
+    said = "".join(f"<p>{parts.text(line)}</p>" for line in lines)
+    body = [f'<p class="eyebrow">endotsr poses</p><h1>{parts.text(head)}</h1>', parts.section("Result", said)]
+    if report.found is not None:
+        body += [
+            parts.section("Path", _path(report.found, report.unit)),
+            parts.section("Frames", _frames(report.found)),
+        ]
+        body.append(parts.section("Residual", _residual(report.found)))
+    return parts.page(f"endotsr poses: {name}", "\n".join(part for part in body if part))
+
+
+def _path(found: EstimatedPoses, unit: str) -> str:
+    """Position and turn of the scope against the first frame."""
+    first, frames = found.cameras[0], [float(k) for k in range(len(found.cameras))]
+    centres = np.array([first.rotation @ camera_centre(c) + first.translation for c in found.cameras])
+    curves = [ChartCurve(f"{axis}, {unit}", frames, centres[:, k].tolist()) for k, axis in enumerate("xyz")]
+    turns = [degrees_between(camera.rotation, first.rotation) for camera in found.cameras]
+    charts = [
+        parts.figure("position of the scope, axes of the first frame", _chart("position", curves)),
+        parts.figure("angle to the first frame", _chart("angle", [ChartCurve("degrees", frames, turns)])),
+    ]
+    return f'<div class="charts">{"".join(charts)}</div>'
+
+
+def _frames(found: EstimatedPoses) -> str:
+    """Matches of every frame, and the frames that were bridged."""
+    links = [(float(k), link) for k, link in enumerate(found.estimate.links) if link is not None]
+    frames = [k for k, _ in links]
+    agreeing = ChartCurve("percent of the matches", frames, [100 * link.share for _, link in links])
+    left = ChartCurve("pixels left", frames, [link.left for _, link in links])
+    flow = ChartCurve("pixels of flow", frames, [link.still for _, link in links])
+    charts = parts.figure("matches that agree with one rigid motion", _chart("agreeing", [agreeing]))
+    charts += parts.figure("first registration, against its source frame", _chart("left", [left, flow]))
+    named = [("bridged", found.bridged), ("before the first or after the last pose", found.held)]
+    rows = parts.definitions((text, ", ".join(map(str, frames)) or "none") for text, frames in named)
+    return f'<div class="charts">{charts}</div>{rows}'
+
+
+def _residual(found: EstimatedPoses) -> str:
+    """The direct residual before and after the bundle adjustment."""
+    e = found.estimate
+    return parts.definitions(
+        [
+            ("robust scale of the residuals (B19) before", parts.cell(e.before.scale)),
+            ("after", f"{parts.cell(e.after.scale)} local standard deviations"),
+            ("agreeing points, before", parts.cell(e.before.share)),
+            ("after", parts.cell(e.after.share)),
+            ("pairs of frames", parts.cell(e.after.pairs)),
+            ("pixels that the poses leave", f"{parts.cell(e.left)} of {parts.cell(e.still)}"),
+        ]
+    )
+
+
+def _chart(title: str, curves: list[ChartCurve]) -> str:
+    return chart_svg(title, curves, max((curve.x[-1] for curve in curves if curve.x), default=1.0), unit="frame")
