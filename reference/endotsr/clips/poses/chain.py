@@ -61,6 +61,7 @@ def chained(
     while (j := len(chain.poses)) < matcher.count:
         chain = _lengthened(matcher, chain, j)
         on_frame(chain)
+    _refuse_gap(chain.last, matcher.count, matcher.count)
     if matcher.count > 1 and chain.last == first:
         raise InputError(f"frame {first}: no later frame has {LEAST} points in common with it")
     return chain
@@ -79,7 +80,7 @@ def _lengthened(matcher: Matcher, chain: Chain, j: int) -> Chain:
     source, matches, done = found
     start = chain.poses[source]
     assert start is not None
-    _refuse_gap(chain.last, j)
+    _refuse_gap(chain.last, j, matcher.count)
     still = float(np.median(matches.flow))
     link = Link(source, matches.count, done.share, float(np.median(done.distance)), still)
     holds = source == chain.key and done.share >= KEEP_AGREEING and matches.count >= KEEP_FOUND * matches.usable
@@ -97,11 +98,11 @@ def _first_frame(matcher: Matcher) -> int:
     )
 
 
-def _refuse_gap(last: int, j: int) -> None:
+def _refuse_gap(last: int, j: int, count: int) -> None:
     if j - last - 1 > LONGEST_GAP:
         raise InputError(
             f"frames {last + 1} to {j - 1} cannot be registered: {j - last - 1} in a row, and {LONGEST_GAP} are bridged"
-            f" at most; cut the clip there: endotsr prepare --frames :{last + 1} and --frames {j}:"
+            f" at most; cut the clip there: endotsr prepare --frames :{last + 1}" + f" and --frames {j}:" * (j < count)
         )
 
 

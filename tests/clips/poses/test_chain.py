@@ -1,0 +1,97 @@
+"""First poses by flow and resection, and what happens where frames show too little."""
+
+import numpy as np
+import pytest
+from moving_clip import centres, moving_views, path_error
+
+from endotsr.clips.poses.chain import LONGEST_GAP, chained
+from endotsr.clips.poses.estimate import estimated
+from endotsr.clips.poses.matches import matcher_of
+from endotsr.clips.poses.views import Views
+from endotsr.errors import InputError
+
+VIEWS, TRUE = moving_views()
+
+
+def with_mask(frames):
+    """The clip with these frames masked whole."""
+    tissue = VIEWS.tissue.copy()
+    tissue[frames] = False
+    return VIEWS._replace(tissue=tissue)
+
+
+def test_the_path_is_found():
+    found = estimated(VIEWS)
+    assert found.without == [] and found.moves.answer == "moving"
+    assert path_error(found.poses, TRUE) < 0.15
+    assert found.left < 0.25 * found.still and found.share > 0.9
+    length = np.linalg.norm(np.diff(centres(TRUE), axis=0), axis=1).sum()
+    assert found.path == pytest.approx(length, rel=0.03)
+
+
+def test_masked_frames_are_bridged_and_the_track_is_picked_up():
+    found = estimated(with_mask([5, 6, 7]))
+    assert found.without == [5, 6, 7]
+    kept = [k for k in range(VIEWS.count) if k not in found.without]
+    assert path_error([found.poses[k] for k in kept], [TRUE[k] for k in kept]) < 0.2
+
+
+def test_the_first_frames_may_be_masked():
+    found = chained(matcher_of(with_mask([0, 1])))
+    assert found.without == [0, 1] and found.last == VIEWS.count - 1
+
+
+def test_a_gap_that_is_too_long_is_refused_with_its_frames():
+    assert VIEWS.count > LONGEST_GAP + 3
+    with pytest.raises(
+        InputError, match=r"frames 2 to 10 cannot be registered: 9 in a row.*--frames :2 and --frames 11:"
+    ):
+        chained(matcher_of(with_mask(range(2, 11))))
+
+
+@pytest.mark.parametrize("cut", [7, 4])
+def test_what_follows_a_cut_has_no_pose(cut):
+    """Noise after the cut; many frames are refused."""
+    images = VIEWS.images.copy()
+    images[cut:] = np.random.default_rng(0).integers(0, 255, images[cut:].shape, dtype=np.uint8)
+    matcher = matcher_of(VIEWS._replace(images=images))
+    if VIEWS.count - cut > LONGEST_GAP:
+        with pytest.raises(InputError, match="frames 4 to 13 cannot be registered: 10 in a row"):
+            chained(matcher)
+    else:
+        assert chained(matcher).without == list(range(cut, VIEWS.count))
+
+
+def test_identical_frames_have_one_pose():
+    order = [0, 1, 1, 2]
+    found = chained(matcher_of(Views(*(plane[order] for plane in VIEWS[:3]), VIEWS.camera)))
+    np.testing.assert_allclose(found.poses[1].translation, found.poses[2].translation, atol=1e-3)
+
+
+def test_two_frames_are_enough_and_one_is_refused():
+    assert len(estimated(Views(*(plane[:2] for plane in VIEWS[:3]), VIEWS.camera)).poses) == 2
+    with pytest.raises(InputError, match="one frame: there is no motion"):
+        estimated(Views(*(plane[:1] for plane in VIEWS[:3]), VIEWS.camera))
+
+
+def test_depth_that_is_not_finite_is_no_depth():
+    depth = VIEWS.depth.copy()
+    depth[:, ::2] = np.nan
+    depth[:, 1, :] = -5
+    assert chained(matcher_of(VIEWS._replace(depth=depth))).without == []
+    with pytest.raises(InputError, match="no frame has depth"):
+        estimated(VIEWS._replace(depth=np.full_like(depth, np.nan)))
+
+
+def test_without_usable_tissue_nothing_is_estimated():
+    with pytest.raises(InputError, match="no frame has usable tissue with depth"):
+        chained(matcher_of(with_mask(range(VIEWS.count))))
+
+
+def test_a_chain_continues_where_it_was():
+    matcher, kept = matcher_of(VIEWS), []
+    whole = chained(matcher, kept.append)
+    again = chained(matcher, begun=kept[5])
+    assert len(kept[5].poses) == 7
+    for one, other in zip(whole.poses, again.poses, strict=True):
+        np.testing.assert_array_equal(one.translation, other.translation)

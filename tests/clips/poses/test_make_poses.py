@@ -1,0 +1,121 @@
+"""`endotsr poses`: what it writes, what it refuses, and that an interrupted call continues."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_clip import moving_sequence, moving_views, path_error, still_views
+
+import endotsr
+from endotsr.cli.main import main
+from endotsr.clips.opencv import write_png
+from endotsr.clips.sequences import make_poses
+from endotsr.clips.sequences.make_poses import PARTIAL, Watch, enter_poses
+from endotsr.clips.sequences.sequence_file import CameraEntry, DepthEntry, SequenceFile, write_sequence_file
+from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
+
+TRUE = moving_views()[1]
+
+
+def written(folder, views, depth=True):
+    """A folder in the common format without poses."""
+    for name in ("images", *(["depth"] if depth else [])):
+        (folder / name).mkdir(parents=True)
+    for k in range(views.count):
+        write_png(folder / "images" / f"{k:06d}.png", np.ascontiguousarray(views.images[k].transpose(1, 2, 0)))
+        if depth:
+            write_png(folder / "depth" / f"{k:06d}.png", np.rint(100 * views.depth[k]).astype(np.uint16))
+    c = views.camera
+    entry = CameraEntry(width=c.width, height=c.height, fx=c.fx, fy=c.fy, cx=c.cx, cy=c.cy)
+    stated = DepthEntry(scale=0.01) if depth else None
+    write_sequence_file(
+        SequenceFile(format="endotsr-sequence-1", frames=views.count, camera=entry, depth=stated), folder
+    )
+    return folder
+
+
+@pytest.fixture
+def clip(tmp_path):
+    return written(tmp_path / "clip", moving_views()[0])
+
+
+def poses_of(folder):
+    found = endotsr.load_sequence(folder, allow_tissue_fraction=True)
+    return [CameraPose(camera.rotation, camera.translation) for camera in found.cameras]
+
+
+def test_the_command_writes_poses_with_their_origin(clip, capsys):
+    page, data = clip.parent / "page.html", clip.parent / "poses.json"
+    assert main(["poses", str(clip), "--html", str(page), "--json", str(data)]) == 0
+    said = capsys.readouterr().out
+    assert "the scope moves" in said and "no method can tell" in said and "% of the matches agree" in said
+    assert path_error(poses_of(clip), TRUE) < 0.15
+    assert 'origin = "estimated by endotsr poses' in (clip / "sequence.toml").read_text("utf-8")
+    found = json.loads(data.read_text("utf-8"))
+    assert found["written"] and found["bridged"] == [] and len(found["poses"]) == len(TRUE)
+    assert "position of the scope" in page.read_text("utf-8") and not (clip / PARTIAL).exists()
+    assert main(["poses", str(clip)]) == 2 and "has poses already (estimated by" in capsys.readouterr().err
+    assert main(["poses", str(clip), "--replace"]) == 0
+
+
+def test_the_python_interface_gives_the_same_poses(clip):
+    """But for the depth, of which a training reads the percentiles 0.1 to 99.8."""
+    sequence = endotsr.load_sequence(clip, allow_tissue_fraction=True)
+    found = endotsr.estimate_poses(sequence)
+    enter_poses(clip)
+    for camera, pose in zip(found.cameras, poses_of(clip), strict=True):
+        np.testing.assert_allclose(camera.translation, pose.translation, atol=0.05)
+    assert not found.static_camera and "poses: estimated" in found.notes[-1]
+
+
+def test_the_first_camera_keeps_its_pose():
+    given = moving_sequence()
+    turned = [camera._replace(translation=camera.translation + 5) for camera in given.cameras]
+    found = endotsr.estimate_poses(replace(given, cameras=turned))
+    np.testing.assert_array_equal(found.cameras[0].translation, turned[0].translation)
+
+
+def test_a_still_scope_is_left_as_it_is(tmp_path, capsys):
+    folder = written(tmp_path / "still", still_views())
+    before = (folder / "sequence.toml").read_bytes()
+    assert main(["poses", str(folder), "--json", str(tmp_path / "a.json")]) == 1
+    assert "still: left as it is" in capsys.readouterr().out
+    assert (folder / "sequence.toml").read_bytes() == before
+    assert json.loads((tmp_path / "a.json").read_text())["movement"]["answer"] == "still"
+
+
+def test_without_depth_it_says_what_to_run(tmp_path):
+    folder = written(tmp_path / "bare", moving_views()[0], depth=False)
+    with pytest.raises(InputError, match="no depth, and poses are estimated from it; run endotsr depth"):
+        enter_poses(folder)
+
+
+@pytest.mark.parametrize("after", [1, 9])
+def test_an_interrupted_call_continues_with_the_same_result(clip, monkeypatch, after):
+    monkeypatch.setattr(make_poses, "KEEP_EVERY", 4)
+    steps = [0]
+
+    def stop():
+        steps[0] += 1
+        if steps[0] == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="the same command continues"):
+        enter_poses(clip, watch=Watch(step=stop))
+    assert (clip / PARTIAL).is_file() and "poses" not in (clip / "sequence.toml").read_text()
+    begun = len(json.loads((clip / PARTIAL).read_text())["poses"])
+    assert begun == after + 1
+    calls = []
+    found = enter_poses(clip, watch=Watch(step=lambda: calls.append(1))).found
+    whole = enter_poses(clip, replace=True).found
+    for one, other in zip(found.cameras, whole.cameras, strict=True):
+        np.testing.assert_array_equal(one.translation, other.translation)
+    assert not (clip / PARTIAL).exists()
+
+
+@pytest.mark.parametrize("text", ["{", '{"clip": "x"}', '{"clip": 1, "poses": [], "links": [], "key": 0, "last": 0}'])
+def test_a_damaged_partial_result_is_not_used(clip, text):
+    (clip / PARTIAL).write_text(text)
+    assert enter_poses(clip).written
