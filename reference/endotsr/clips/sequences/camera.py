@@ -10,6 +10,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
@@ -52,13 +53,6 @@ class StereoCalibration(NamedTuple):
     right: Intrinsics
     rotation: FloatArray  # (3, 3)
     translation: FloatArray  # (3,) millimetres
-
-
-class CameraPose(NamedTuple):
-    """World-to-camera, OpenCV axes: x_camera = rotation @ x_world + translation."""
-
-    rotation: FloatArray  # (3, 3)
-    translation: FloatArray  # (3,) in the unit of the clip
 
 
 def pose_of(

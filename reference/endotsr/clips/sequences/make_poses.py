@@ -18,12 +18,12 @@ from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, Estimate, estimated
 from endotsr.clips.poses.matches import Matcher
 from endotsr.clips.poses.movement import Movement, Pair
 from endotsr.clips.poses.views import Views
-from endotsr.clips.sequences.clip import Clip, scene_factor
-from endotsr.clips.sequences.common import cameras_of, list_contents, open_common
+from endotsr.clips.sequences.camera import scene_factor
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, sequence_text
 from endotsr.clips.sequences.trajectory import filled
+from endotsr.clips.sequences.view_frames import views_of
 from endotsr.config import Section
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose
@@ -112,27 +112,12 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
     if known[2].answer == "still" and not force:
         return PoseReport(False, known[2], None, unit)
     found = _resumed(folder, views, known, watch)
-    factor = scene_factor(contents.file.unit)
+    factor = scene_factor(file.unit)
     rows = [np.column_stack([c.rotation, c.translation / factor]).ravel().tolist() for c in found.cameras]
     entry = PoseEntry(origin=ORIGIN, bridged=sorted(found.bridged + found.held), matrices=rows)
-    replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(contents.file, poses=entry)))
+    replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(file, poses=entry)))
     (folder / PARTIAL).unlink(missing_ok=True)
     return PoseReport(True, known[2], found, unit)
-
-
-def views_of(clip: Clip, camera: Camera) -> Views:
-    """All frames of a clip in memory. Raises InputError for a file that cannot be read."""
-    frames = list(range(clip.count))
-    size = (clip.count, camera.height, camera.width)
-    images, tissue = np.empty((clip.count, 3, *size[1:]), np.uint8), np.ones(size, bool)
-    depth = np.zeros(size, np.float32)
-    for k, pair in zip(frames, clip.pictures(frames)):
-        images[k] = pair.left.transpose(2, 0, 1)
-        if clip.masks is not None and (mask := clip.masks(k)) is not None:
-            tissue[k] = mask
-        if clip.depth is not None and (plane := clip.depth(k)) is not None:
-            depth[k] = plane
-    return Views(images, tissue, depth, camera)
 
 
 def _resumed(folder: Path, views: Views, known: tuple[Matcher, list[Pair], Movement], watch: Watch) -> EstimatedPoses:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics
+from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
@@ -23,6 +24,7 @@ from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
 from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.points import depth_from_points
 from endotsr.clips.sequences.sequence_file import (
     DEPTH,
@@ -83,7 +85,16 @@ def prepare(
     with new_folder(Path(out), FILE_NAME if replace else "") as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
+        notes += _checked_poses(folder, found)
     return found, notes
+
+
+def _checked_poses(folder: Path, found: SequenceFile) -> list[str]:
+    """Notes on poses that the pictures contradict. Raises InputError where another reading of them is right."""
+    if found.poses is None or found.depth is None or found.frames < 2:
+        return []
+    clip = describe_prepared(folder)
+    return notes_of(agreement_findings(agreement_of(clip, clip.cameras(range(clip.count))), "poses"))
 
 
 def _poses_and_masks(

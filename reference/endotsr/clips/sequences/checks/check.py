@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
 from endotsr.clips.sequences.checks.depth import (
@@ -127,7 +128,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
     if size:
         facts |= {"width": size[1], "height": size[0]}
         if not any(fault.code == "cameras" for fault in clip.faults):
-            _check_cameras(clip, run, size)
+            facts |= _check_cameras(clip, run, size)
         facts["cost"] = _cost(clip, size, config, run)._asdict()
     return Checked(str(path), worst_first(run.findings), facts, run.pictures)
 
@@ -147,16 +148,20 @@ def _stated(clip: Clip) -> list[Finding]:
     return found
 
 
-def _check_cameras(clip: Clip, run: _Pass, size: Size) -> None:
-    """Findings on the intrinsics and the poses of all frames."""
+def _check_cameras(clip: Clip, run: _Pass, size: Size) -> dict[str, str]:
+    """Findings on the intrinsics and the poses of all frames. Returns whether the poses explain the pictures."""
     camera, where = clip.intrinsics, clip.stated_in
     if camera and (camera.height, camera.width) != size:
         what = f"{where}: states {camera.width}x{camera.height}, the pictures have {size[1]}x{size[0]}"
         run.findings.append(finding("cameras", where, what))
-        return
+        return {}
     cameras = run.tried(lambda: clip.cameras(range(clip.count)), "cameras", where)
-    if cameras:
-        run.findings += camera_findings(cameras, usual_depth(run.depth), str(where))
+    if not cameras:
+        return {}
+    run.findings += camera_findings(cameras, usual_depth(run.depth), str(where))
+    poses = agreement_of(clip, cameras)
+    run.findings += agreement_findings(poses, str(where))
+    return {} if poses is None else {"poses": poses.sentence}
 
 
 def _read_frames(clip: Clip, run: _Pass) -> Size | None:

@@ -17,7 +17,7 @@ SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
 
 
 class Kind(NamedTuple):
-    """One kind of finding. `endotsr train` also refuses what is a refusal here."""
+    """One kind of finding. `endotsr train` also refuses what is a refusal here, but for `pose-convention`."""
 
     level: Level
     why: str
@@ -122,6 +122,12 @@ KINDS: dict[str, Kind] = {
                       "check axes and direction of the trajectory"),
     "pose-unit": Kind("warning", "poses and depth may be in different units, such as metres and millimetres",
                       "state the unit: prepare --trajectory-unit"),
+    "pose-convention": Kind("refusal", "with the poses as they were read, training fits another path",
+                            "read or write the poses as named"),
+    "pose-mismatch": Kind("warning", "every frame pulls the scene to another place",
+                          "check poses, depth, intrinsics and times; endotsr poses --replace estimates poses"),
+    "pose-doubtful": Kind("note", "poses or depth are inaccurate, or the tissue moves as much as the scope",
+                          "compare with endotsr poses, or fit the poses (model.pose_correction = true)"),
     "far-from-origin": Kind("note", "float32 is too coarse there", "none needed: the world is moved"),
     # cost
     "disk": Kind("refusal", REFUSED, SMALLER),
