@@ -4,6 +4,7 @@ In: a folder in the common format, or a `Sequence` in memory. Out: one pose for 
 is interpolated. An interrupted call leaves its frames in `poses.partial.json`, and the next one continues there.
 """
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Callable
@@ -20,8 +21,9 @@ from endotsr.clips.poses.movement import Movement, Pair
 from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences.camera import scene_factor
 from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, sequence_text
+from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.trajectory import filled
 from endotsr.clips.sequences.view_frames import views_of
 from endotsr.config import Section
@@ -95,17 +97,14 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
 
     Raises:   InputError, leaving the folder unchanged but for the partial result.
     """
-    contents = list_contents(folder, poses=False)
-    if contents.file.poses and not replace:
-        raise InputError(f"{folder}: has poses already ({contents.file.poses.origin}); --replace estimates new ones")
-    if not contents.depth:
+    file, clip = read_sequence_file(folder), describe_prepared(folder)
+    if file.poses and not replace:
+        raise InputError(f"{folder}: has poses already ({file.poses.origin}); --replace estimates new ones")
+    if clip.depth is None:
         raise InputError(f"{folder}: no depth, and poses are estimated from it; run endotsr depth {folder} first")
-    if any(contents.file.camera.distortion):
-        raise InputError(
-            f"{folder}: the pictures are distorted; endotsr prepare {folder} --out FOLDER straightens them"
-        )
-    camera = cameras_of(contents._replace(poses=None))[0]
-    views, unit = views_of(open_common(folder), camera), contents.file.unit_in_words
+    if any(file.camera.distortion):
+        raise InputError(f"{folder}: the pictures are distorted; endotsr prepare {folder} --out NEW straightens them")
+    views, unit = views_of(clip, dataclasses.replace(clip, poses=None).cameras([0])[0]), clip.unit_in_words
     if views.count < 2:
         raise InputError(f"{folder}: one frame: there is no motion to estimate")
     known = movement_of(views)
