@@ -20,8 +20,6 @@
 # on the page {doc}`/specification/b19_registration` and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
-import inspect
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -89,10 +87,34 @@ assert medians[1] < 0.5 * medians[0]
 # **(22.1) The kernel.** $k$ is cubic on $|s|<1$ and on $1\le|s|<2$. It is 1 at 0 and 0 at every other whole number, so
 # the sum passes through the pixels; its values and its slopes agree at 1 and at 2, so the slope of the sum is
 # continuous. These conditions leave one number free, $a=k'(1)$ from the right. $a=-\tfrac12$ reproduces parabolas.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.keys))
-print(inspect.getsource(definition.registration_forward))
+#
+# <!-- definition: endotsr.definition.registration.keys -->
+# ```python
+# def keys(s):
+#     """Keys' kernel k(s) with a = -1/2, and its slope k'(s)."""
+#     r, sign = np.abs(s), np.sign(s)
+#     inner, outer = 1 - 2.5 * r**2 + 1.5 * r**3, 2 - 4 * r + 2.5 * r**2 - 0.5 * r**3  # (22.1)
+#     slopes = -5 * r + 4.5 * r**2, -4 + 5 * r - 1.5 * r**2  # (22.2)
+#     return np.where(r < 1, inner, np.where(r < 2, outer, 0)), sign * np.where(r < 1, slopes[0], (r < 2) * slopes[1])
+# ```
+#
+# <!-- definition: endotsr.definition.registration.registration_forward -->
+# ```python
+# def registration_forward(rotation, translation, points, reference, picture, camera):
+#     """Equation (B19): residuals (M,) = I(pi(W x + d)) - reference of points (3, M) that the picture (H, W) shows."""
+#     x, y, z = rotation @ points + translation[:, None]
+#     safe, (height, width) = np.where(z > 0, z, 1), picture.shape
+#     u, v = camera.fx * x / safe + camera.cx - 0.5, camera.fy * y / safe + camera.cy - 0.5
+#     seen = (z > 0) & (u >= 1) & (u < width - 2) & (v >= 1) & (v < height - 2)
+#     across, across_slope = keys(np.where(seen, u, 1)[:, None] - np.arange(width))
+#     down, down_slope = keys(np.where(seen, v, 1)[:, None] - np.arange(height))
+#     value, slope_u, slope_v = (
+#         np.einsum("mj,ji,mi->m", b, picture, a) for b, a in ((down, across), (down, across_slope), (down_slope, across))
+#     )
+#     slope = np.array([slope_u * camera.fx / safe, slope_v * camera.fy / safe])
+#     slope = seen * np.array([*slope, -(slope * [x, y]).sum(axis=0) / safe])  # (22.3)
+#     return np.where(seen, value - reference, 0), RegistrationSaved(rotation, points, slope, seen)
+# ```
 
 # %%
 wavy = np.fromfunction(lambda j, i: 0.3 * i**2 - 0.2 * i * j + j, (7, 9))
@@ -124,10 +146,28 @@ for u, v in ((3.3, 2.7), (4.0, 3.0), (5.9, 3.5)):
 # $T\,\mathrm{Exp}(\xi)^{-1}=\mathrm{Exp}(-\mathrm{Ad}_T\,\xi)\,T$ to first order, with
 # $\mathrm{Ad}_T=\begin{pmatrix}W&0\\ [\mathbf d]_\times W&W\end{pmatrix}$. One system of six numbers for each pair, about
 # $T$, therefore serves both frames.
-
-# %% tags=["transcription"]
-print(inspect.getsource(definition.registration_reverse))
-print(inspect.getsource(adjoint))
+#
+# <!-- definition: endotsr.definition.registration.registration_reverse -->
+# ```python
+# def registration_reverse(d_residual, saved):
+#     """Reverse of (B19)."""
+#     g = saved.slope * d_residual  # (22.4)
+#     return RegistrationGrads(g @ saved.points.T, g.sum(axis=1), saved.rotation.T @ g, -d_residual * saved.seen)
+# ```
+#
+# <!-- definition: endotsr.clips.poses.bundle.adjoint -->
+# ```python
+# def adjoint(pose: CameraPose) -> FloatArray:
+#     """(6, 6): the change of a relative pose by a change (omega, tau) of its source, in target axes.
+#
+#     For small changes, T Exp(xi) T^-1 = Exp(adjoint(T) xi).
+#     """
+#     r, (x, y, z) = pose
+#     found = np.zeros((6, 6))
+#     found[:3, :3] = found[3:, 3:] = r
+#     found[3:, :3] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ r  # (22.6)
+#     return found
+# ```
 
 # %%
 residual, saved = registration_forward(*relative, points, reference, picture, camera)

@@ -218,7 +218,7 @@ def estimate_poses(sequence: Sequence) -> Sequence:
     from endotsr.clips.sequences.make_poses import estimate_poses as estimated
 
     found = estimated(sequence)
-    interpolated = sorted(found.bridged + found.held)
+    interpolated = sorted(found.interpolated + found.held)
     note = "poses: estimated from pictures and depth" + (f"; interpolated: {interpolated}" if interpolated else "")
     return replace(sequence, cameras=found.cameras, static_camera=False, notes=[*sequence.notes, note])
 

@@ -17,7 +17,7 @@ class PosesOptions:
     """Estimate one camera pose per frame, for a clip of a moving scope without a trajectory.
 
     SEQUENCE is a folder from `endotsr prepare` with depth. The poses are added to its sequence.toml, where their origin
-    is stated. Frames that show too little are bridged, and named. A scope that seems to be still is left as it is.
+    is stated. Frames that show too little are interpolated, and named. A scope that seems to be still is left as it is.
     Motion of the whole tissue, as in breathing, cannot be told from motion of the scope. An interrupted command
     continues where it was. Exit code 1: the scope seems to be still, nothing written.
     """
@@ -38,12 +38,12 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(PosesOptions, words, "poses")
     from endotsr.cli.parts.progress import StepBar
-    from endotsr.clips.sequences.make_poses import Watch, enter_poses, lines_of
+    from endotsr.clips.sequences.make_poses import PoseProgress, enter_poses, lines_of
     from endotsr.results.report.poses_page import poses_page
     from endotsr.untrusted.writing import replace_text
 
     with StepBar("poses") as bar:
-        report = enter_poses(options.sequence, options.replace, options.force, Watch(bar.begin, bar.step))
+        report = enter_poses(options.sequence, options.replace, options.force, PoseProgress(bar.begin, bar.step))
     for line in lines_of(report, options.sequence):
         print(line)
     if report.written:
@@ -64,7 +64,7 @@ def _write(options: PosesOptions, report: "PoseReport") -> None:
     found, e = report.found, report.found.estimate
     write_result(
         options.json, sequence=options.sequence, written=True, movement=said, unit=report.unit, path=e.path,
-        agreeing=e.share, pixels_left=e.left, pixels_without_motion=e.still, tissue_motion=e.own,
-        residual_before=e.before.scale, residual_after=e.after.scale, bridged=found.bridged, held=found.held,
+        agreeing=e.agreeing, pixels_left=e.left, pixels_without_motion=e.still, tissue_motion=e.own,
+        residual_before=e.before.scale, residual_after=e.after.scale, interpolated=found.interpolated, held=found.held,
         poses=[{"rotation": c.rotation.tolist(), "translation": c.translation.tolist()} for c in found.cameras],
     )  # fmt: skip

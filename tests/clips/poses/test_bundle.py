@@ -33,12 +33,12 @@ def test_disturbed_poses_come_back(scene):
     found = adjusted(levels, start, DEPTH)
     assert path_error(start, true) > 0.4
     assert path_error(found.poses, true) < 0.12
-    assert found.after.scale < 0.5 * found.before.scale and found.after.share > 0.8
+    assert found.after.scale < 0.5 * found.before.scale and found.after.agreeing > 0.8
 
 
 def test_a_step_that_does_not_lower_the_cost_is_not_taken(scene, monkeypatch):
     levels, _, start = scene
-    monkeypatch.setattr(bundle, "_step", lambda sums, pairs, poses, depth, damping: np.full((len(poses), 6), 0.5))
+    monkeypatch.setattr(bundle, "solved_step", lambda sums, pairs, poses, depth, damping: np.full((len(poses), 6), 0.5))
     found = adjusted(levels, start, DEPTH)
     assert found.after.steps == 0
     for one, other in zip(found.poses, start, strict=True):
@@ -61,10 +61,10 @@ def test_the_normal_equations_are_the_derivative_of_the_cost(scene):
     """The right side against differences of the cost, for both frames of a pair."""
     levels, _, start = scene
     pairs = np.array([[2, 4]], np.intp)
-    kept, scale = bundle._scales(levels[1], pairs, start)
+    kept, scale = bundle.pair_scales(levels[1], pairs, start)
     unit = np.array([1, 1, 1, DEPTH, DEPTH, DEPTH])
-    sums = bundle._pair_sums(levels[1], kept, scale, start)
-    _, right = bundle._normal_equations(sums, kept, start, unit)
+    sums = bundle.pair_sums(levels[1], kept, scale, start)
+    _, right = bundle.normal_equations(sums, kept, start, unit)
     assert sums.shape == (1, 30) and RIGHT == 21
     for frame in (2, 4):
         for k in range(6):
@@ -73,7 +73,7 @@ def test_the_normal_equations_are_the_derivative_of_the_cost(scene):
                 step = sign * 1e-6 * unit * (np.arange(6) == k)
                 poses = list(start)
                 poses[frame] = CameraPose(*pose_forward(*start[frame], step[:3], step[3:])[:2])
-                costs.append(bundle._pair_sums(levels[1], kept, scale, poses)[0, COST])
+                costs.append(bundle.pair_sums(levels[1], kept, scale, poses)[0, COST])
             np.testing.assert_allclose((costs[0] - costs[1]) / 2e-6, right[6 * frame + k], rtol=2e-3, atol=0.5)
 
 

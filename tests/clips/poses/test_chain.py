@@ -24,7 +24,7 @@ def test_the_path_is_found():
     found = estimated(VIEWS)
     assert found.without == [] and found.moves.answer == "moving"
     assert path_error(found.poses, TRUE) < 0.15
-    assert found.left < 0.25 * found.still and found.share > 0.9
+    assert found.left < 0.25 * found.still and found.agreeing > 0.9
     length = np.linalg.norm(np.diff(centres(TRUE), axis=0), axis=1).sum()
     assert found.path == pytest.approx(length, rel=0.03)
 

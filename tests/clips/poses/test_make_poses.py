@@ -11,7 +11,7 @@ import endotsr
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
 from endotsr.clips.sequences import make_poses
-from endotsr.clips.sequences.make_poses import PARTIAL, Watch, enter_poses
+from endotsr.clips.sequences.make_poses import PARTIAL, PoseProgress, enter_poses
 from endotsr.clips.sequences.sequence_file import CameraEntry, DepthEntry, SequenceFile, write_sequence_file
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
@@ -54,7 +54,7 @@ def test_the_command_writes_poses_with_their_origin(clip, capsys):
     assert path_error(poses_of(clip), TRUE) < 0.15
     assert 'origin = "estimated by endotsr poses' in (clip / "sequence.toml").read_text("utf-8")
     found = json.loads(data.read_text("utf-8"))
-    assert found["written"] and found["bridged"] == [] and len(found["poses"]) == len(TRUE)
+    assert found["written"] and found["interpolated"] == [] and len(found["poses"]) == len(TRUE)
     assert "position of the scope" in page.read_text("utf-8") and not (clip / PARTIAL).exists()
     assert main(["poses", str(clip)]) == 2 and "has poses already (estimated by" in capsys.readouterr().err
     assert main(["poses", str(clip), "--replace"]) == 0
@@ -103,12 +103,12 @@ def test_an_interrupted_call_continues_with_the_same_result(clip, monkeypatch, a
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt, match="the same command continues"):
-        enter_poses(clip, watch=Watch(step=stop))
+        enter_poses(clip, watch=PoseProgress(step=stop))
     assert (clip / PARTIAL).is_file() and "poses" not in (clip / "sequence.toml").read_text()
     begun = len(json.loads((clip / PARTIAL).read_text())["poses"])
     assert begun == after + 1
     calls = []
-    found = enter_poses(clip, watch=Watch(step=lambda: calls.append(1))).found
+    found = enter_poses(clip, watch=PoseProgress(step=lambda: calls.append(1))).found
     whole = enter_poses(clip, replace=True).found
     for one, other in zip(found.cameras, whole.cameras, strict=True):
         np.testing.assert_array_equal(one.translation, other.translation)

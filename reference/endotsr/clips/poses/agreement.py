@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from endotsr.clips.poses.matches import Matcher
-from endotsr.clips.poses.movement import LEAST_FLOW, LEAST_PAIRS, Pair, pairs_that_move
+from endotsr.clips.poses.movement import LEAST_FLOW, LEAST_PAIRS, FramePair, pairs_that_move
 from endotsr.clips.poses.readings import readings
 from endotsr.clips.poses.resection import left_over
 from endotsr.clips.poses.views import between
@@ -54,7 +54,7 @@ class Agreement(NamedTuple):
         }[self.verdict]
 
 
-def agreement(matcher: Matcher, poses: list[CameraPose], pairs: list[Pair] | None = None) -> Agreement:
+def agreement(matcher: Matcher, poses: list[CameraPose], pairs: list[FramePair] | None = None) -> Agreement:
     """Hold poses against the pictures.
 
     poses   one per frame, world to camera
@@ -88,7 +88,7 @@ def _verdict(found: Agreement, wins: float) -> Verdict:
     return "doubtful" if found.given > max(OF_STILL * found.still, DOUBTFUL * found.best + SLACK) else "fits"
 
 
-def left_by(matcher: Matcher, pairs: list[Pair], poses: list[CameraPose]) -> FloatArray:
+def left_by(matcher: Matcher, pairs: list[FramePair], poses: list[CameraPose]) -> FloatArray:
     """(pairs,) median distance in pixels between measured flow and that of the poses."""
     found = []
     for pair in pairs:

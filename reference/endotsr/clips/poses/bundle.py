@@ -12,8 +12,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.poses.levels import Level
-from endotsr.clips.poses.pair_kernels import COST, RIGHT, SEEN, SUMS, WEIGHT, scale_kernel, sums_kernel
+from endotsr.clips.poses.pair_kernels import (
+    COST,
+    RIGHT,
+    SEEN,
+    SUMS,
+    WEIGHT,
+    PyramidLevel,
+    scale_kernel,
+    sums_kernel,
+)
 from endotsr.clips.poses.views import between
 from endotsr.method.equations.pose import pose_forward
 from endotsr.method.kernels.arrays import FloatArray
@@ -21,19 +29,19 @@ from endotsr.method.kernels.threads import parallel_for
 from endotsr.method.splatting.camera import CameraPose
 
 GAPS = (1, 4, 16)  # frames between the two of a pair
-LEAST_OVERLAP, LEAST_SEEN = 0.3, 80  # share and number of the points of a pair that the target frame shows
+LEAST_OVERLAP, LEAST_SEEN = 0.3, 80  # fraction and number of the points of a pair that the target frame shows
 FLOOR = 0.05  # least robust scale, local standard deviations
 SCALES, STEPS = 2, 3  # estimates of the scales at each level, and steps tried after each
 DAMPING, SOFTER, HARDER = 1e-4, 0.3, 10.0  # of the normal equations: at first, after a success, after a failure
-ENOUGH = 2e-5  # rad, and share of the depth: a shorter step ends a level
+ENOUGH = 2e-5  # rad, and fraction of the depth: a shorter step ends a level
 LARGEST = 0.1  # the same units: longest step
 
 
-class Fit(NamedTuple):
+class PairFit(NamedTuple):
     """How well the pairs of one level fit."""
 
     scale: float  # median robust standard deviation, local standard deviations of the picture
-    share: float  # of the points, weighted as they agree
+    agreeing: float  # of the points, weighted as they agree
     pairs: int
     steps: int  # accepted
 
@@ -42,8 +50,8 @@ class Bundle(NamedTuple):
     """Refined poses, and the fit before and after, at the last level."""
 
     poses: list[CameraPose]
-    before: Fit
-    after: Fit
+    before: PairFit
+    after: PairFit
 
 
 def pairs_of(count: int, gaps: tuple[int, ...] = GAPS) -> NDArray[np.intp]:
@@ -56,7 +64,7 @@ def pairs_of(count: int, gaps: tuple[int, ...] = GAPS) -> NDArray[np.intp]:
 
 
 def adjusted(
-    levels: list[Level], poses: list[CameraPose], depth: float, on_step: Callable[[], object] = lambda: None
+    levels: list[PyramidLevel], poses: list[CameraPose], depth: float, on_step: Callable[[], object] = lambda: None
 ) -> Bundle:
     """The poses that minimise the residuals of all pairs.
 
@@ -72,7 +80,7 @@ def adjusted(
     for level in levels:
         taken = 0
         for _ in range(SCALES):
-            kept, scale = _scales(level, pairs, poses)
+            kept, scale = pair_scales(level, pairs, poses)
             if not len(kept):
                 break
             poses, count = _descend(level, kept, scale, poses, depth, on_step)
@@ -81,25 +89,25 @@ def adjusted(
     return Bundle(poses, before, after)
 
 
-def fit_of(level: Level, pairs: NDArray[np.intp], poses: list[CameraPose]) -> Fit:
+def fit_of(level: PyramidLevel, pairs: NDArray[np.intp], poses: list[CameraPose]) -> PairFit:
     """The fit of poses at a level."""
-    kept, scale = _scales(level, pairs, poses)
+    kept, scale = pair_scales(level, pairs, poses)
     if not len(kept):
-        return Fit(float("nan"), float("nan"), 0, 0)
-    sums = _pair_sums(level, kept, scale, poses)
-    return Fit(float(np.median(scale)), float(sums[:, WEIGHT].sum() / sums[:, SEEN].sum()), len(kept), 0)
+        return PairFit(float("nan"), float("nan"), 0, 0)
+    sums = pair_sums(level, kept, scale, poses)
+    return PairFit(float(np.median(scale)), float(sums[:, WEIGHT].sum() / sums[:, SEEN].sum()), len(kept), 0)
 
 
 def _descend(
-    level: Level, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose], depth: float,
+    level: PyramidLevel, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose], depth: float,
     on_step: Callable[[], object],
 ) -> tuple[list[CameraPose], int]:  # fmt: skip
     """Levenberg-Marquardt steps with fixed scales; and the number that were accepted."""
-    sums, damping, taken = _pair_sums(level, pairs, scale, poses), DAMPING, 0
+    sums, damping, taken = pair_sums(level, pairs, scale, poses), DAMPING, 0
     for _ in range(STEPS):
-        step = _step(sums, pairs, poses, depth, damping)
+        step = solved_step(sums, pairs, poses, depth, damping)
         trial = [_moved(pose, part) for pose, part in zip(poses, step)]
-        tried = _pair_sums(level, pairs, scale, trial)
+        tried = pair_sums(level, pairs, scale, trial)
         on_step()
         if tried[:, COST].sum() < sums[:, COST].sum():
             poses, sums, damping, taken = trial, tried, damping * SOFTER, taken + 1
@@ -123,7 +131,9 @@ def _relative(pairs: NDArray[np.intp], poses: list[CameraPose]) -> FloatArray:
     return found
 
 
-def _scales(level: Level, pairs: NDArray[np.intp], poses: list[CameraPose]) -> tuple[NDArray[np.intp], FloatArray]:
+def pair_scales(
+    level: PyramidLevel, pairs: NDArray[np.intp], poses: list[CameraPose]
+) -> tuple[NDArray[np.intp], FloatArray]:
     """The pairs that overlap, and their robust scales."""
     scale, seen = np.empty(len(pairs)), np.empty(len(pairs), np.intp)
     parallel_for(scale_kernel, len(pairs), level, pairs, _relative(pairs, poses), FLOOR, scale, seen)
@@ -132,41 +142,41 @@ def _scales(level: Level, pairs: NDArray[np.intp], poses: list[CameraPose]) -> t
     return pairs[kept], scale[kept]
 
 
-def _pair_sums(level: Level, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose]) -> FloatArray:
+def pair_sums(level: PyramidLevel, pairs: NDArray[np.intp], scale: FloatArray, poses: list[CameraPose]) -> FloatArray:
     out = np.empty((len(pairs), SUMS))
     parallel_for(sums_kernel, len(pairs), level, pairs, _relative(pairs, poses), scale, out)
     return out
 
 
-def _step(
+def solved_step(
     sums: FloatArray, pairs: NDArray[np.intp], poses: list[CameraPose], depth: float, damping: float
 ) -> FloatArray:  # fmt: skip
     """(n, 6) rotation vectors and offsets; those of the first frame are 0."""
     from scipy.linalg import solveh_banded
 
     unit = np.array([1, 1, 1, depth, depth, depth])
-    band, right = _normal_equations(sums, pairs, poses, unit)
-    band[:, :6], right[:6] = 0.0, 0.0  # the first frame stays
-    diagonal = band[0]
-    band[0] = diagonal * (1 + damping) + np.where(diagonal > 0, 1e-3, 1.0)
-    step = -solveh_banded(band, right, lower=True).reshape(len(poses), 6)
+    lower, right = normal_equations(sums, pairs, poses, unit)
+    lower[:, :6], right[:6] = 0.0, 0.0  # the first frame stays
+    diagonal = lower[0]
+    lower[0] = diagonal * (1 + damping) + np.where(diagonal > 0, 1e-3, 1.0)
+    step = -solveh_banded(lower, right, lower=True).reshape(len(poses), 6)
     longest = np.abs(step).max()
     return step * min(1.0, LARGEST / longest if longest > 0 else 1.0) * unit
 
 
-def _normal_equations(
+def normal_equations(
     sums: FloatArray, pairs: NDArray[np.intp], poses: list[CameraPose], unit: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """The lower band of the matrix (6 (gap + 1), 6 n), and the right side (6 n)."""
     gap, count = int(np.abs(pairs[:, 0] - pairs[:, 1]).max()), len(poses)
-    band, right = np.zeros((6 * (gap + 1), 6 * count)), np.zeros((count, 6))
+    lower, right = np.zeros((6 * (gap + 1), 6 * count)), np.zeros((count, 6))
     upper = np.triu_indices(6)
 
     def add(i: int, j: int, block: FloatArray) -> None:
         """Add a block whose row is frame i and whose column is frame j <= i."""
         row, column = 6 * i + np.arange(6)[:, None], 6 * j + np.arange(6)[None, :]
         below = row >= column
-        band[(row - column)[below], np.broadcast_to(column, (6, 6))[below]] += block[below]
+        lower[(row - column)[below], np.broadcast_to(column, (6, 6))[below]] += block[below]
 
     for (source, target), part in zip(pairs, sums):
         matrix = np.zeros((6, 6))
@@ -180,7 +190,7 @@ def _normal_equations(
         add(target, source, -mixed) if target > source else add(source, target, -mixed.T)
         right[target] += g
         right[source] -= moved.T @ g
-    return band, right.ravel()
+    return lower, right.ravel()
 
 
 def adjoint(pose: CameraPose) -> FloatArray:

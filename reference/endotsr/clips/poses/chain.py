@@ -26,7 +26,7 @@ class Link(NamedTuple):
 
     source: int  # frame to which it was registered
     found: int  # matches
-    share: float  # of the matches that agree
+    agreeing: float  # of the matches that agree
     left: float  # median distance in pixels that the pose leaves
     still: float  # median length of the flow, pixels
 
@@ -82,8 +82,8 @@ def _lengthened(matcher: Matcher, chain: Chain, j: int) -> Chain:
     assert start is not None
     _refuse_gap(chain.last, j, matcher.count)
     still = float(np.median(matches.flow))
-    link = Link(source, matches.count, done.share, float(np.median(done.distance)), still)
-    holds = source == chain.key and done.share >= KEEP_AGREEING and matches.count >= KEEP_FOUND * matches.usable
+    link = Link(source, matches.count, done.agreeing, float(np.median(done.distance)), still)
+    holds = source == chain.key and done.agreeing >= KEEP_AGREEING and matches.count >= KEEP_FOUND * matches.usable
     pose = compose(done.pose, start)
     return Chain([*chain.poses, pose], [*chain.links, link], chain.key if holds else j, j)
 
@@ -114,7 +114,7 @@ def _registered(matcher: Matcher, chain: Chain, j: int) -> tuple[int, Matches, R
         done = resection(matches, matcher.camera, between(known, source, last))
         if done is None:
             continue
-        enough = done.share >= USE_AGREEING and matches.count >= USE_FOUND * matches.usable
+        enough = done.agreeing >= USE_AGREEING and matches.count >= USE_FOUND * matches.usable
         if enough or source == last:
             return source, matches, done
     if j == last + 1:

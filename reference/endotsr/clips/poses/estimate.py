@@ -1,7 +1,7 @@
 """The poses of a clip from pictures and depth: a chain of flow and resection, then the direct bundle adjustment.
 
-In: `Views`. Out: `Estimate`. Poses are world to camera; the world is the camera of the first frame with a pose. Without
-a pose remain frames that show too little; `chain` names the limits.
+In: `Views`. Out: `PathEstimate`. Poses are world to camera; the world is the camera of the first frame with a pose.
+Frames that show too little remain without a pose; `chain` names the limits.
 """
 
 from collections.abc import Callable
@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.poses.agreement import left_by
-from endotsr.clips.poses.bundle import SCALES, STEPS, Fit, adjusted
+from endotsr.clips.poses.bundle import SCALES, STEPS, PairFit, adjusted
 from endotsr.clips.poses.chain import Chain, Link, chained
 from endotsr.clips.poses.levels import make_levels
 from endotsr.clips.poses.matches import Matcher, matcher_of
-from endotsr.clips.poses.movement import LEAST_MATCHES, Movement, Pair, movement, pairs_that_move
+from endotsr.clips.poses.movement import LEAST_MATCHES, FramePair, Movement, movement, pairs_that_move
 from endotsr.clips.poses.resection import left_over
 from endotsr.clips.poses.views import Views, between, known_depth, small_views
 from endotsr.errors import InputError
@@ -25,14 +25,14 @@ LEVELS = (1, 0)  # halvings of the pictures, coarse to fine
 ADJUSTMENTS = len(LEVELS) * SCALES * STEPS  # most steps that the bundle adjustment tries
 
 
-class Estimate(NamedTuple):
+class PathEstimate(NamedTuple):
     """Poses of a clip, and how well they fit. Lengths in scene units."""
 
     poses: list[CameraPose | None]  # None: this frame shows too little
     links: list[Link | None]  # how each frame was registered at first
     moves: Movement
-    before: Fit  # of the direct residuals, with the poses of the chain
-    after: Fit
+    before: PairFit  # of the direct residuals, with the poses of the chain
+    after: PairFit
     path: float  # length of the path of the camera
     left: float  # median pixels that the poses leave of the flow between frames, at the size of the flow
     still: float  # median pixels that no motion leaves
@@ -44,13 +44,13 @@ class Estimate(NamedTuple):
         return [k for k, pose in enumerate(self.poses) if pose is None]
 
     @property
-    def share(self) -> float:
+    def agreeing(self) -> float:
         """Mean fraction of the matches that agree, over the frames."""
-        found = [link.share for link in self.links if link is not None]
+        found = [link.agreeing for link in self.links if link is not None]
         return float(np.mean(found)) if found else float("nan")
 
 
-def movement_of(views: Views) -> tuple[Matcher, list[Pair], Movement]:
+def movement_of(views: Views) -> tuple[Matcher, list[FramePair], Movement]:
     """Whether the scope moves, with the matches that say so."""
     matcher = matcher_of(small_views(views))
     pairs = pairs_that_move(matcher)
@@ -63,8 +63,8 @@ def estimated(
     on_frame: Callable[[Chain], object] = lambda chain: None,
     on_step: Callable[[], object] = lambda: None,
     begun: Chain | None = None,
-    known: tuple[Matcher, list[Pair], Movement] | None = None,
-) -> Estimate:
+    known: tuple[Matcher, list[FramePair], Movement] | None = None,
+) -> PathEstimate:
     """Estimate the pose of every frame.
 
     on_frame  called with the chain after each frame; `begun` continues an interrupted one
@@ -88,7 +88,7 @@ def estimated(
         poses[k] = pose
     left, still = _leftover(matcher, pairs, poses)
     own = _own_motion(matcher, poses)
-    return Estimate(poses, chain.links, moves, bundle.before, bundle.after, _path(bundle.poses), left, still, own)
+    return PathEstimate(poses, chain.links, moves, bundle.before, bundle.after, _path(bundle.poses), left, still, own)
 
 
 def _path(poses: list[CameraPose]) -> float:
@@ -97,7 +97,7 @@ def _path(poses: list[CameraPose]) -> float:
     return float(np.linalg.norm(np.diff(centres, axis=0), axis=1).sum())
 
 
-def _leftover(matcher: Matcher, pairs: list[Pair], poses: list[CameraPose | None]) -> tuple[float, float]:
+def _leftover(matcher: Matcher, pairs: list[FramePair], poses: list[CameraPose | None]) -> tuple[float, float]:
     """Median pixels that the poses leave, and that no motion leaves; NaN without pairs."""
     whole = [pair for pair in pairs if poses[pair.source] and poses[pair.target]]
     if not whole:

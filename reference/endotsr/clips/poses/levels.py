@@ -4,13 +4,12 @@ The local mean of a picture is removed, and the rest divided by the local standa
 scope, exposure and vignetting cancel. Both are taken over usable pixels alone, so an instrument leaves no rim.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import gaussian_blur
 from endotsr.clips.opencv.geometry import grey_of, halved_blurred
+from endotsr.clips.poses.pair_kernels import PyramidLevel
 from endotsr.clips.poses.views import Views, known_depth, usable_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import backproject
@@ -20,18 +19,7 @@ FAINT = 16.0  # grey levels^2: added to the local variance
 MOST_POINTS = 4000  # of a frame
 
 
-class Level(NamedTuple):
-    """All frames at one size h x w. Points of frame i are the columns first[i] ... first[i + 1] - 1."""
-
-    pictures: NDArray[np.float32]  # (n, h, w) local standard deviations
-    usable: BoolArray  # (n, h, w)
-    first: NDArray[np.intp]  # (n + 1,)
-    points: FloatArray  # (3, P) in the axes of their camera, scene units
-    values: FloatArray  # (P,) of the picture at the points
-    lens: FloatArray  # (4,) fx, fy, cx, cy at this size
-
-
-def make_levels(views: Views, steps: tuple[int, ...]) -> list[Level]:
+def make_levels(views: Views, steps: tuple[int, ...]) -> list[PyramidLevel]:
     """The levels of a pyramid; step k halves the size k times."""
     planes: dict[int, list[tuple[NDArray[np.float32], BoolArray, FloatArray, FloatArray]]] = {k: [] for k in steps}
     for image, tissue, depth in zip(views.images, views.tissue, views.depth):
@@ -73,13 +61,13 @@ def normalised(grey: NDArray[np.float32], mask: BoolArray) -> NDArray[np.float32
     return centred / np.sqrt(variance + np.float32(FAINT))
 
 
-def _level(planes: list[tuple], views: Views, step: int) -> Level:
+def _level(planes: list[tuple], views: Views, step: int) -> PyramidLevel:
     pictures, usable, points, values = zip(*planes)
     sizes = [len(value) for value in values]
     side, camera = 2**step, views.camera
     centre = 0.5 - 0.5 / side  # sample k is at pixel side k: u' - 1/2 = (u - 1/2) / side
     lens = [camera.fx / side, camera.fy / side, camera.cx / side + centre, camera.cy / side + centre]
-    return Level(
+    return PyramidLevel(
         np.stack(pictures), np.stack(usable), np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp),
         np.ascontiguousarray(np.concatenate(points, axis=1)), np.concatenate(values), np.array(lens),
     )  # fmt: skip

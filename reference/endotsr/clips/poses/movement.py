@@ -22,7 +22,7 @@ LEAST_MATCHES = 25
 Answer = Literal["moving", "still", "unclear"]
 
 
-class Pair(NamedTuple):
+class FramePair(NamedTuple):
     """Two frames between which the picture moves."""
 
     source: int
@@ -60,7 +60,7 @@ class Movement(NamedTuple):
         return f"one rigid motion leaves {self.left:.0%} of the flow of {self.flow:.1f} pixels: {words[self.answer]}"
 
 
-def pairs_that_move(matcher: Matcher) -> list[Pair]:
+def pairs_that_move(matcher: Matcher) -> list[FramePair]:
     """Up to `MOST_PAIRS` pairs, each with the smallest gap at which the picture moves enough.
 
     The first and the last frame are left out: a time that is shifted by a frame has no pose there.
@@ -68,7 +68,7 @@ def pairs_that_move(matcher: Matcher) -> list[Pair]:
     gaps = [gap for gap in GAPS if gap < matcher.count - 2]
     if not gaps:
         return []
-    found: list[Pair] = []
+    found: list[FramePair] = []
     at = 0  # index of the gap that served last
     for i in np.unique(np.linspace(1, matcher.count - 2 - gaps[0], MOST_PAIRS).astype(int)).tolist():
         reach = [k for k, gap in enumerate(gaps) if i + gap <= matcher.count - 2]
@@ -101,14 +101,14 @@ def _best_gap(matcher: Matcher, i: int, gaps: list[int], at: int, last: int) -> 
     return kept, chosen
 
 
-def _pair(matcher: Matcher, source: int, target: int, matches: Matches) -> Pair:
+def _pair(matcher: Matcher, source: int, target: int, matches: Matches) -> FramePair:
     still = float(np.median(matches.flow))
     done = resection(matches, matcher.camera, consensus=False) if matches.count >= LEAST else None
     best = still if done is None else min(still, float(np.median(done.distance)))
-    return Pair(source, target, matches, still, best)
+    return FramePair(source, target, matches, still, best)
 
 
-def movement(pairs: list[Pair]) -> Movement:
+def movement(pairs: list[FramePair]) -> Movement:
     """The answer with depth."""
     if len(pairs) < LEAST_PAIRS:
         return Movement("unclear", float("nan"), float("nan"), len(pairs), float("nan"))

@@ -5,14 +5,29 @@ equation (B19); its derivative by the six numbers of equation (B16) at zero is [
 Y in target axes.
 """
 
-import numpy as np
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.kernels.jit import jit
 from endotsr.method.splatting.registration import move_point, register_point
 
 TUKEY, MAD = 4.685, 1.4826  # 95 % efficiency; standard deviation over median absolute deviation
 SUMS = 30  # 21 entries of the upper triangle, 6 of the right side, cost, sum of the weights, points seen
 RIGHT, COST, WEIGHT, SEEN = 21, 27, 28, 29
+
+
+class PyramidLevel(NamedTuple):
+    """All frames at one size h x w. Points of frame i are the columns first[i] ... first[i + 1] - 1."""
+
+    pictures: NDArray[np.float32]  # (n, h, w) local standard deviations
+    usable: BoolArray  # (n, h, w)
+    first: NDArray[np.intp]  # (n + 1,)
+    points: FloatArray  # (3, P) in the axes of their camera, scene units
+    values: FloatArray  # (P,) of the picture at the points
+    lens: FloatArray  # (4,) fx, fy, cx, cy at this size
 
 
 def _residual(level, target, pose, k):

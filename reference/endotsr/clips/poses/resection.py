@@ -16,11 +16,11 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, CameraPose, project
 
 LEAST = 12  # matches, and matches that agree
-LEAST_SHARE = 0.3  # of the matches that agree
+LEAST_AGREEING = 0.3  # of the matches that agree
 ROUNDS = 12  # of the least squares
 TUKEY, MAD = 4.685, 1.4826  # 95 % efficiency; standard deviation over median absolute deviation
 FLOOR = 0.9  # pixels: least width of the weights
-ENOUGH = 1e-7  # rad, and share of the depth: a shorter step ends the rounds
+ENOUGH = 1e-7  # rad, and fraction of the depth: a shorter step ends the rounds
 
 
 class Resection(NamedTuple):
@@ -31,7 +31,7 @@ class Resection(NamedTuple):
     weight: FloatArray  # (M,) in [0, 1]
 
     @property
-    def share(self) -> float:
+    def agreeing(self) -> float:
         """Fraction of the matches that agree."""
         return float((self.weight > 0.1).mean())
 
@@ -49,7 +49,7 @@ def resection(
     pose, x = start, matches.points
     if consensus:
         found = pose_by_consensus(x, matches.target, camera, start)
-        if found is not None and len(found.agree) > LEAST_SHARE * matches.count:
+        if found is not None and len(found.agree) > LEAST_AGREEING * matches.count:
             pose = CameraPose(found.rotation, found.translation)
     unit = float(np.median(x[2]))
     for _ in range(ROUNDS):
@@ -62,7 +62,7 @@ def resection(
     _, distance, weight = _errors(pose, matches, camera)
     done = Resection(pose, distance, weight)
     agree = float((weight > 0.1).sum())
-    sound = agree >= max(LEAST, LEAST_SHARE * matches.count) and np.isfinite(pose.translation).all()
+    sound = agree >= max(LEAST, LEAST_AGREEING * matches.count) and np.isfinite(pose.translation).all()
     return done if sound else None
 
 

@@ -15,9 +15,9 @@ import msgspec
 import numpy as np
 
 from endotsr.clips.poses.chain import Chain, Link
-from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, Estimate, estimated, movement_of
+from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, PathEstimate, estimated, movement_of
 from endotsr.clips.poses.matches import Matcher
-from endotsr.clips.poses.movement import Movement, Pair
+from endotsr.clips.poses.movement import FramePair, Movement
 from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences.camera import scene_factor
 from endotsr.clips.sequences.files import shortened
@@ -42,9 +42,9 @@ class EstimatedPoses(NamedTuple):
     """Cameras of every frame, and the estimate."""
 
     cameras: list[Camera]  # n
-    bridged: list[int]  # frames whose pose is interpolated between others
+    interpolated: list[int]  # frames whose pose is interpolated between others
     held: list[int]  # frames before the first or after the last pose, which have its pose
-    estimate: Estimate
+    estimate: PathEstimate
 
 
 class PoseReport(NamedTuple):
@@ -66,17 +66,17 @@ class _Partial(Section, frozen=True, kw_only=True):
     last: int
 
 
-class Watch(NamedTuple):
+class PoseProgress(NamedTuple):
     """What is told of the work while it goes on."""
 
     begin: Callable[[int], object] = lambda steps: None
     step: Callable[[], object] = lambda: None
 
 
-SILENT = Watch()
+SILENT = PoseProgress()
 
 
-def estimate_poses(sequence: Sequence, watch: Watch = SILENT) -> EstimatedPoses:
+def estimate_poses(sequence: Sequence, watch: PoseProgress = SILENT) -> EstimatedPoses:
     """The cameras of a sequence, from its pictures, masks and depth. The first one keeps its pose.
 
     watch     called with the number of steps, and after each
@@ -89,7 +89,7 @@ def estimate_poses(sequence: Sequence, watch: Watch = SILENT) -> EstimatedPoses:
     return _with_cameras(found, sequence.cameras[0])
 
 
-def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch: Watch = SILENT) -> PoseReport:
+def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch: PoseProgress = SILENT) -> PoseReport:
     """Estimate the poses of a folder in the common format and record them.
 
     replace   whether existing poses may be replaced
@@ -113,14 +113,16 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
     found = _resumed(folder, views, known, watch)
     factor = scene_factor(file.unit)
     rows = [np.column_stack([c.rotation, c.translation / factor]).ravel().tolist() for c in found.cameras]
-    entry = PoseEntry(origin=ORIGIN, bridged=sorted(found.bridged + found.held), matrices=rows)
+    entry = PoseEntry(origin=ORIGIN, interpolated=sorted(found.interpolated + found.held), matrices=rows)
     replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(file, poses=entry)))
     (folder / PARTIAL).unlink(missing_ok=True)
     return PoseReport(True, known[2], found, unit)
 
 
-def _resumed(folder: Path, views: Views, known: tuple[Matcher, list[Pair], Movement], watch: Watch) -> EstimatedPoses:
-    """Estimate, beginning with the partial result of this clip, and keep one on the way."""
+def _resumed(
+    folder: Path, views: Views, known: tuple[Matcher, list[FramePair], Movement], watch: PoseProgress
+) -> EstimatedPoses:
+    """PathEstimate, beginning with the partial result of this clip, and keep one on the way."""
     mark, latest = _mark(views), [_read_partial(folder / PARTIAL, _mark(views))]
     watch.begin(views.count - 1 + ADJUSTMENTS)
     for _ in range(len(latest[0].poses) - 1 if latest[0] else 0):
@@ -141,7 +143,7 @@ def _resumed(folder: Path, views: Views, known: tuple[Matcher, list[Pair], Movem
     return _with_cameras(found, views.camera)
 
 
-def _with_cameras(found: Estimate, first: Camera) -> EstimatedPoses:
+def _with_cameras(found: PathEstimate, first: Camera) -> EstimatedPoses:
     """A camera for each frame: gaps are interpolated, and both ends are held."""
     known = [k for k, pose in enumerate(found.poses) if pose is not None]
     held = [k for k in found.without if k < known[0] or k > known[-1]]
@@ -201,11 +203,11 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
         lines.append("warning: if the scope is still, these poses are motion of the tissue; then do not use them")
     e, unit = found.estimate, report.unit
     lines.append(
-        f"path {e.path:.4g} {unit}; {e.share:.0%} of the matches agree; the poses leave {e.left:.2f} pixels of the"
+        f"path {e.path:.4g} {unit}; {e.agreeing:.0%} of the matches agree; the poses leave {e.left:.2f} pixels of the"
         f" {e.still:.2f} that the picture moves"
     )
-    if found.bridged:
-        lines.append(f"bridged, the pose is interpolated: {_named(found.bridged)}")
+    if found.interpolated:
+        lines.append(f"interpolated, the pose is interpolated: {_named(found.interpolated)}")
     if found.held:
         lines.append(f"before the first or after the last pose, which is held: {_named(found.held)}")
     lines.append(

@@ -29,7 +29,7 @@
     direction = "world_to_camera"      # or "camera_to_world"
     axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
     origin = "given"                   # or, in words, the program that estimated them
-    bridged = []                       # frames whose pose is interpolated between others
+    interpolated = []                       # frames whose pose is interpolated between others
     matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers per frame
 
 In: the file. Out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder `images/`
@@ -107,7 +107,7 @@ class PoseEntry(Section, frozen=True, kw_only=True):
     direction: Literal["world_to_camera", "camera_to_world"] = "world_to_camera"
     axes: Literal["opencv", "opengl"] = "opencv"
     origin: str = "given"
-    bridged: list[int] = msgspec.field(default_factory=list)
+    interpolated: list[int] = msgspec.field(default_factory=list)
     matrices: list[list[float]]
 
 

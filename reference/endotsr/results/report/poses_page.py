@@ -36,15 +36,15 @@ def _path(found: EstimatedPoses, unit: str) -> str:
 
 
 def _frames(found: EstimatedPoses) -> str:
-    """Matches of every frame, and the frames that were bridged."""
+    """Matches of every frame, and the frames that were interpolated."""
     links = [(float(k), link) for k, link in enumerate(found.estimate.links) if link is not None]
     frames = [k for k, _ in links]
-    agreeing = ChartCurve("percent of the matches", frames, [100 * link.share for _, link in links])
+    agreeing = ChartCurve("percent of the matches", frames, [100 * link.agreeing for _, link in links])
     left = ChartCurve("pixels left", frames, [link.left for _, link in links])
     flow = ChartCurve("pixels of flow", frames, [link.still for _, link in links])
     charts = parts.figure("matches that agree with one rigid motion", _chart("agreeing", [agreeing]))
     charts += parts.figure("first registration, against its source frame", _chart("left", [left, flow]))
-    named = [("bridged", found.bridged), ("before the first or after the last pose", found.held)]
+    named = [("interpolated", found.interpolated), ("before the first or after the last pose", found.held)]
     rows = parts.definitions((text, ", ".join(map(str, frames)) or "none") for text, frames in named)
     return f'<div class="charts">{charts}</div>{rows}'
 
@@ -56,8 +56,8 @@ def _residual(found: EstimatedPoses) -> str:
         [
             ("robust scale of the residuals (B19) before", parts.cell(e.before.scale)),
             ("after", f"{parts.cell(e.after.scale)} local standard deviations"),
-            ("agreeing points, before", parts.cell(e.before.share)),
-            ("after", parts.cell(e.after.share)),
+            ("agreeing points, before", parts.cell(e.before.agreeing)),
+            ("after", parts.cell(e.after.agreeing)),
             ("pairs of frames", parts.cell(e.after.pairs)),
             ("pixels that the poses leave", f"{parts.cell(e.left)} of {parts.cell(e.still)}"),
         ]
