@@ -225,6 +225,9 @@ def test_a_wrong_input_gives_its_finding(case, sequence, tmp_path):
     assert all(f.what and f.why and f.remedy and str(tmp_path) in f.where for f in found)
 
 
+CHECK_ALONE = ("pose-mismatch", "pose-doubtful")  # a training does not hold poses against the pictures
+
+
 @pytest.mark.parametrize("case", WRONG)
 def test_train_and_check_judge_alike(case, sequence, tmp_path):
     """What the check refuses is refused, and its warnings are in the notes of what is accepted."""
@@ -237,7 +240,7 @@ def test_train_and_check_judge_alike(case, sequence, tmp_path):
         return
     notes = read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near).notes
     said = [found[1] for note in notes if (found := re.match(r"(?:warning|note): ([\w-]+): ", note))]
-    assert said == [f.code for f in checked.findings if f.code not in SAID_ALREADY]
+    assert said == [f.code for f in checked.findings if f.code not in (*SAID_ALREADY, *CHECK_ALONE)]
 
 
 def test_many_findings_of_one_kind_are_counted(sequence, tmp_path):
