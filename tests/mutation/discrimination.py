@@ -40,19 +40,19 @@ from mutation.registry import DEFECT, defect_mutants  # noqa: E402
 from mutation.survey import Checks  # noqa: E402
 
 FOLDERS = (
-    "kernels/test_exponential.py",
-    "kernels/test_gather.py",
-    "kernels/test_sums.py",
+    "method/kernels/test_exponential.py",
+    "method/kernels/test_gather.py",
+    "method/kernels/test_sums.py",
     "definition",
-    "equations",
-    "splatting",
-    "losses",
-    "scene",
-    "fitting",
+    "method/equations",
+    "method/splatting",
+    "method/losses",
+    "training/scene",
+    "training/fitting",
     "hard",
     "properties",
-    "checker/test_ranges.py",
-    "checker/pieces_without_compiler.py",
+    "port/checker/test_ranges.py",
+    "port/checker/pieces_without_compiler.py",
 )
 FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
 LATER = 30.0  # s of further checks for a mutant that no suite has detected and that is not listed as equivalent
@@ -207,7 +207,9 @@ def main(words: list[str]) -> int:
     if options.keep:
         options.keep.mkdir(parents=True, exist_ok=True)  # now, not after the first quarter of an hour
     plugin = Plugin(options)
-    folders = [str(ROOT / "tests" / name) for name in options.tests if (ROOT / "tests" / name).exists()]
+    folders = [str(ROOT / "tests" / name) for name in options.tests]
+    if missing := [name for name in folders if not Path(name).exists()]:
+        parser.error(f"--tests: no such folder or file: {', '.join(missing)}")
     pytest.main([f"--rootdir={ROOT}", *COLLECTING, *folders], plugins=[plugin])
     if not plugin.result:
         return 1

@@ -81,8 +81,8 @@ def beaten(folder: Path, clip: str, level: float, who: str) -> str:
     tissue = ["below" if level < value else "above" for value in (blend_tissue, flow_tissue)]
     return (
         f"{who} {plain} the mean of the two neighbouring frames ({blend:.2f} dB) and flow ({flow:.2f} dB); if these "
-        f"may read tissue only, as the model does, it is {tissue[0]} the mean ({blend_tissue:.2f} dB) and {tissue[1]} flow "
-        f"({flow_tissue:.2f} dB)."
+        f"may read tissue only, as the model does, it is {tissue[0]} the mean ({blend_tissue:.2f} dB) and {tissue[1]} "
+        f"flow ({flow_tissue:.2f} dB)."
     )
 
 
