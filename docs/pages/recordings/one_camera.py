@@ -108,8 +108,8 @@ def _forget_depth(clip: Path) -> None:
 
 def _interpolate(clip: Path) -> None:
     """Planes between the points, as computed by `endotsr prepare` from a reconstruction."""
-    from endotsr.clips.sequences.camera import CameraPose
     from endotsr.clips.sequences.points import depth_from_points
+    from endotsr.method.splatting.camera import CameraPose
 
     opened = describe(clip)
     intrinsics = opened.intrinsics

@@ -3,10 +3,11 @@
 import mpmath
 import numpy as np
 
+from endotsr.method.kernels.constants import Y00
 from endotsr.method.splatting.binning import depth_order
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.covariance import Shape, covariance_forward
-from endotsr.method.splatting.harmonics import Y00, harmonics_forward
+from endotsr.method.splatting.harmonics import harmonics_forward
 from endotsr.method.splatting.projection import footprint, projection_forward
 from endotsr.method.splatting.records import log_opacity
 from endotsr.method.splatting.render import Scene, render_forward, render_reverse

@@ -3,11 +3,12 @@
 import mpmath
 import numpy as np
 
-from endotsr.method.equations.appearance import Y00, appearance_forward
+from endotsr.method.equations.appearance import appearance_forward
 from endotsr.method.equations.calibration import calibrate
 from endotsr.method.equations.dictionary import dictionary_forward, frequencies
 from endotsr.method.equations.laplacian import laplacian_levels, laplacian_loss_forward, support_masks
 from endotsr.method.equations.matern import matern_weights
+from endotsr.method.kernels.constants import Y00
 from endotsr.method.losses.masked_l1 import masked_l1_forward
 from endotsr.method.losses.masked_ssim import masked_ssim_forward, ssim_target
 from pages.hard_cases.gallery.registry import case

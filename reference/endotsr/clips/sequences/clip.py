@@ -13,11 +13,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics, StereoCalibration
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.kinds import Finding
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
-from endotsr.method.splatting.camera import Camera
+from endotsr.method.splatting.camera import Camera, CameraPose
 
 Picture = NDArray[np.uint8]  # (H, W, 3) RGB
 Numbers = list[int] | range  # of frames

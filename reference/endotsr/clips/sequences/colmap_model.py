@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import CameraPose, Intrinsics, checked_intrinsics
+from endotsr.clips.sequences.camera import Intrinsics, checked_intrinsics
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_bytes, read_text
 
 LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
-from endotsr.clips.sequences.camera import CameraPose, Intrinsics, camera_to_world
+from endotsr.clips.sequences.camera import Intrinsics, camera_to_world
 from endotsr.clips.sequences.clip import REST, Clip
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.writing import replace_text
 
 Other = Literal["nerfstudio", "colmap"]

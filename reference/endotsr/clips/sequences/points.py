@@ -6,8 +6,9 @@ In: the world points that a frame sees. Out: depth (H, W), 0 = none.
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import CameraPose, Intrinsics
+from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 
 LEAST_POINTS = 4  # for a triangulation
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import AXES, CameraPose, Intrinsics, pose_of
+from endotsr.clips.sequences.camera import AXES, Intrinsics, pose_of
 from endotsr.clips.sequences.clip import REST, rests
 from endotsr.clips.sequences.depth_files import read_npy
 from endotsr.errors import InputError
-from endotsr.method.splatting.camera import Camera, camera_centre
+from endotsr.method.splatting.camera import Camera, CameraPose, camera_centre
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 LARGEST_POSES = 1 << 26  # bytes: half a million frames

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
-from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, Intrinsics
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
@@ -44,6 +44,7 @@ from endotsr.clips.sequences.stated_depth import refuse_no_lengths
 from endotsr.clips.sequences.straighten import Straightener, straightener
 from endotsr.clips.sequences.trajectory import filled
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.writing import new_folder
 
 LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers

@@ -42,17 +42,11 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from endotsr.clips.sequences.camera import (
-    ARBITRARY,
-    CameraPose,
-    Intrinsics,
-    checked_intrinsics,
-    pose_of,
-    scene_factor,
-)
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, scene_factor
 from endotsr.clips.sequences.clip import Assumed
 from endotsr.config import Section, checked, refuse_unknown_keys
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.toml import read_toml, toml_text
 
 FILE_NAME = "sequence.toml"

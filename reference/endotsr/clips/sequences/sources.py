@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
-from endotsr.clips.sequences.camera import (
-    ARBITRARY,
-    CameraPose,
-    Intrinsics,
-    checked_intrinsics,
-    scene_factor,
-)
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, scene_factor
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
@@ -28,6 +22,7 @@ from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.trajectory import poses_of_frames, read_trajectory
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 
 PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
 

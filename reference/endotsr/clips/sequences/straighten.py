@@ -11,17 +11,12 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
-from endotsr.clips.sequences.camera import (
-    CameraPose,
-    Intrinsics,
-    intrinsics_of_matrix,
-    opencv_matrix,
-)
+from endotsr.clips.sequences.camera import Intrinsics, intrinsics_of_matrix, opencv_matrix
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
-from endotsr.method.splatting.camera import degrees_between
+from endotsr.method.splatting.camera import CameraPose, degrees_between
 
 SKEWED = 0.5  # largest vertical over horizontal offset of two cameras that count as side by side
 

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import CameraPose, pose_of, scene_factor
+from endotsr.clips.sequences.camera import pose_of, scene_factor
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 
 NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.effects.frames import WIDEST
-from endotsr.clips.sequences.camera import CameraPose
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import describe_for_training, without_faults
 from endotsr.clips.sequences.splits import parse_frame_range
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
-from endotsr.method.splatting.camera import degrees_between
+from endotsr.method.splatting.camera import CameraPose, degrees_between
 
 LEAST_CORRELATION = 0.5  # of successive frames after warping along the flow; a lower value is a cut
 LARGEST_STEP = 0.1  # camera translation between successive frames, fraction of the depth; a larger one is a cut

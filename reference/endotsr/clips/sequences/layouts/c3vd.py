@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.opencv.stereo import Maps, remapped
-from endotsr.clips.sequences.camera import CameraPose, checked_rotation, intrinsics_of_matrix, inverse_pose
+from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matrix, inverse_pose
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import Layout
@@ -21,6 +21,7 @@ from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import matching_files
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 
 POSES, COLOUR, DEPTH = "pose.txt", "_color.png", "_depth.tiff"

@@ -11,14 +11,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.camera import (
-    ARBITRARY,
-    CameraPose,
-    Intrinsics,
-    checked_intrinsics,
-    pose_of,
-    shared_intrinsics,
-)
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, shared_intrinsics
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import time_order
@@ -28,6 +21,7 @@ from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.json import Keys, integer, listed, number, read_json
 from endotsr.untrusted.names import relative_path

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.camera import ARBITRARY, CameraPose, checked_rotation, intrinsics_of_matrix
+from endotsr.clips.sequences.camera import ARBITRARY, checked_rotation, intrinsics_of_matrix
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import frame_numbers, list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_of
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.arrays import read_npz
 
 CAMERAS = "cameras_points.npz"

@@ -12,12 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.camera import CameraPose, checked_rotation
+from endotsr.clips.sequences.camera import checked_rotation
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.json import parsed
 from endotsr.untrusted.yaml import matrix

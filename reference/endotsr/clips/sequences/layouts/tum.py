@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.sequences.camera import CameraPose, Intrinsics
+from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -22,6 +22,7 @@ from endotsr.clips.sequences.sources import (
 )
 from endotsr.clips.sequences.trajectory import poses_at, read_trajectory
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.names import relative_path
 
