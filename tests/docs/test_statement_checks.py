@@ -110,8 +110,11 @@ def test_the_first_sentences_of_the_page_at_full_size():
 
 def test_every_released_program_is_named():
     """ "The released code" names nothing that a reader can look up."""
-    words = re.compile(r"\b(?:the|a) released (?:code|program|implementation)\b", re.IGNORECASE)
+    words = re.compile(
+        r"\b(?:the|a) released (?:code|program|implementation)\b(?! (?:of|called|named) )", re.IGNORECASE
+    )
     files = [f for pattern in PLACES for f in ROOT.glob(pattern)]
+    files = [f for f in files if f.name != "references.md"]  # which names them
     assert [f.name for f in files if words.search(f.read_text(encoding="utf-8"))] == []
 
 
