@@ -7,6 +7,9 @@ The runs come from `endotsr train CLIP --preset sharp --seed 1 --lpips FILE` or 
 The result is docs/results/minutes.json; the table is part of docs/bench.md.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import argparse
 from pathlib import Path
 from statistics import mean

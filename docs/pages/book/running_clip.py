@@ -8,6 +8,9 @@
 The file has numbers alone.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import re
 import sys
 from datetime import date

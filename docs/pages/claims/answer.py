@@ -3,6 +3,9 @@
 Every number comes from a record; a clip that is not measured is named as such.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -8,6 +8,9 @@ tissue. The PSNR of the whole image is then -10 log10(fraction of tissue) above 
 The paper prints one of the two in each of two tables.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import sys
 from pathlib import Path
 

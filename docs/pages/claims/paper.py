@@ -7,6 +7,9 @@ is a row of docs/specification/rulings.md, and its verdict a row of docs/claims.
 error.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import re
 import sys
 from pathlib import Path

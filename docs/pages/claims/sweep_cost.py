@@ -6,6 +6,9 @@ Four equal runs are made for every division of the cores of this machine, each i
 has nothing else to do; `python docs/make.py claims` then writes the table of docs/guides/sweep.md.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import contextlib
 import io
 import sys

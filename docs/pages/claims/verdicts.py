@@ -3,6 +3,9 @@
 `rules` decides; `endotsr.studies.sweeps.ablation.COMPARISONS` defines the two configurations of each claim.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -29,10 +29,8 @@ def read_sinus(folder: Path) -> Sequence:
         _small(np.repeat(np.asarray(Image.open(folder / "mask.png").convert("L"))[..., None], 3, axis=2))[..., 0] == 255
     )
     count, (height, width) = len(paths), mask.shape
-    numbers = (k[0, 0], k[1, 1], k[0, 2] + 0.5, k[1, 2] + 0.5)
-    cameras = [
-        Camera(pose[:3, :3], pose[:3, 3], *(float(x) / SHRINK for x in numbers), width, height) for pose in poses
-    ]
+    fx, fy, cx, cy = (float(x) / SHRINK for x in (k[0, 0], k[1, 1], k[0, 2] + 0.5, k[1, 2] + 0.5))
+    cameras = [Camera(pose[:3, :3], pose[:3, 3], fx, fy, cx, cy, width, height) for pose in poses]
     depth = np.stack([_depth(camera, points[visible[:, i] > 0], mask) for i, camera in enumerate(cameras)])
     train, test = split_frames(count, "every_eighth", 8)
     return Sequence(

@@ -7,6 +7,9 @@ The squared error of the tissue pixels is divided among kinds of pixels; a pixel
 The tables are written to docs/results/README.md.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import argparse
 from datetime import date
 from pathlib import Path
@@ -121,7 +124,7 @@ def tables(result: dict[str, Any]) -> str:
 
 def main(words: list[str]) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("run", nargs="?", type=Path)
     options = parser.parse_args(words)
     file = RESULTS / "against_flow.json"

@@ -7,6 +7,9 @@ A measurement replaces the splits of its clip in the record and keeps the others
 The table is in docs/results/README.md between its marks, and the headline of README.md reads the same record.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import argparse
 from pathlib import Path
 from typing import Any

@@ -11,6 +11,9 @@ is used. Every run has the length `--iterations` and the initial points of `demo
 command continues with the missing runs. The tables are written between their marks in a page.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import argparse
 from collections.abc import Callable
 from dataclasses import replace

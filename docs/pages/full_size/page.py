@@ -9,6 +9,9 @@ A run is stored under its preset and its held-out frames, and replaces the previ
 small pictures, no model. Only runs of a simulated clip are accepted: pictures of patients are not stored.
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import sys
 from datetime import date
 from pathlib import Path

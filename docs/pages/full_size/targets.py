@@ -75,7 +75,7 @@ def table(result: dict[str, Any]) -> str:
 
 def main(words: list[str]) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("sequence", nargs="?")
     parser.add_argument("--scale", type=float, default=1.0)
     options = parser.parse_args(words)

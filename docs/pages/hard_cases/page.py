@@ -6,6 +6,9 @@ python docs/make.py hard_cases     rewrites hard_cases.json, hard_cases.png, and
 Every naive formula is executed, on the same rounded inputs as ours; the truth is exact or has 60 digits (mpmath).
 """
 
+# A record of a page is complete, or the KeyError says what it lacks.
+# pyright: reportTypedDictNotRequiredAccess=false
+
 import math
 import warnings
 from pathlib import Path

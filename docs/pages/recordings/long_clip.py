@@ -112,7 +112,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def main(words: list[str]) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--source", type=Path, default=DOCS.parents[1] / "shared" / "data" / "endonerf_pulling")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--memory", type=float, default=0.6)

@@ -172,7 +172,7 @@ def table(result: dict[str, Any]) -> str:
 
 def main(words: list[str]) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args(words)
     if not options.table:

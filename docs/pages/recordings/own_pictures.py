@@ -66,7 +66,7 @@ def recordings(clip: Path, root: Path) -> dict[str, Path]:
     for side in ("left", "right"):
         (root / "jpg" / side).mkdir(parents=True)
     for i, names in enumerate(pairs):
-        left, right = (cv2.imread(str(name)) for name in names)
+        left, right = (np.asarray(cv2.imread(str(name))) for name in names)
         for side, picture in (("left", left), ("right", right)):
             cv2.imwrite(str(root / "jpg" / side / f"{i:06d}.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         stacked = np.concatenate([left, right])

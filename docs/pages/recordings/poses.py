@@ -104,7 +104,7 @@ def measured(key: str, runs: dict[str, tuple[str, str, str, int]], clips: dict[s
     length = ITERATIONS if scene in SCENES else CLIP_ITERATIONS
     config = endotsr.make_config("paper", iterations=length, **sections)
     run = endotsr.train(shown, config, on_message=lambda text: None)
-    found = {"psnr_tissue": run.evaluate()["held_out"]["mean"]["psnr_tissue"]}
+    found: dict[str, float | None] = {"psnr_tissue": run.evaluate()["held_out"]["mean"]["psnr_tissue"]}
     if scene in SCENES:
         cameras = corrected_cameras(run.model.frames, shown.cameras, shown.times)
         found["pixels"] = pose_error(cameras, given)

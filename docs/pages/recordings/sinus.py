@@ -66,7 +66,7 @@ def table(found: dict[str, Any]) -> str:
 
 def main(words: list[str]) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--data", type=Path, default=DOCS.parents[1] / "shared" / "data" / "sinus_endoscopy")
     parser.add_argument("--scale", type=float, default=1 / 6)
     parser.add_argument("--preset", default="paper")

@@ -240,7 +240,7 @@ def chain_table(windows: int = 64) -> str:
 
 def main(words: list[str]) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("what", choices=["recording", "clip", "warm", "table"])
     parser.add_argument("source", type=Path, nargs="?", help="a sequence (clip), or a run (warm)")
     parser.add_argument("--frames", type=int, default=240)

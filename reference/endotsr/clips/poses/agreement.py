@@ -62,7 +62,7 @@ def agreement(matcher: Matcher, poses: list[CameraPose], pairs: list[FramePair] 
     """
     rows = np.array([np.concatenate([pose.rotation.ravel(), pose.translation]) for pose in poses])
     if np.ptp(rows, axis=0).max() < SAME:
-        return Agreement("same", *[float("nan")] * 3)
+        return Agreement("same", float("nan"), float("nan"), float("nan"))
     pairs = pairs_that_move(matcher) if pairs is None else pairs
     still, best = (float(np.median([getattr(p, name) for p in pairs] or [0.0])) for name in ("still", "best"))
     if len(pairs) < LEAST_PAIRS or still < LEAST_FLOW:

@@ -86,7 +86,8 @@ class Matcher:
         column, row = np.floor(place).astype(np.intp)
         depth = self._frame(source).depth[row, column].astype(np.float64)
         kept = depth > 0
-        points = backproject(self.camera, *(place[:, kept] - 0.5), depth[kept])
+        across, down = place[:, kept] - 0.5
+        points = backproject(self.camera, across, down, depth[kept])
         return Matches(points, place[:, kept], other.place[there[kept]].T, len(one.place))
 
     def seen_points(self, frame: int) -> int:

@@ -82,7 +82,7 @@ class ViewFrame(NamedTuple):
         height, width = rows * side, columns * side
         picture = np.ascontiguousarray(self.image[:, :height, :width].transpose(1, 2, 0))
         image = np.ascontiguousarray(area_resize(picture, columns, rows).transpose(2, 0, 1))
-        tissue = self.tissue[:height, :width].reshape(rows, side, columns, side).all(axis=(1, 3))
+        tissue = np.asarray(self.tissue[:height, :width].reshape(rows, side, columns, side).all(axis=(1, 3)))
         return ViewFrame(image, tissue, self.depth[side // 2 : height : side, side // 2 : width : side])
 
 

@@ -162,7 +162,7 @@ def _mark(views: Views) -> str:
     """SHA-256 of everything that the poses depend on."""
     found = hashlib.sha256(repr(views.camera[2:]).encode())
     for plane in (views.images, views.tissue, views.depth):
-        found.update(np.ascontiguousarray(plane))
+        found.update(np.ascontiguousarray(plane).data)
     return found.hexdigest()
 
 

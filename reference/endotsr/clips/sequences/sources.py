@@ -189,7 +189,8 @@ def stated_camera(options: SourceOptions, width: int, height: int, where: object
         return found._replace(baseline=options.baseline or found.baseline)
     if options.camera is None:
         return StatedCamera(baseline=options.baseline)
-    stated = checked_intrinsics(Intrinsics(*options.camera, width, height, options.distortion), where)
+    fx, fy, cx, cy = options.camera
+    stated = checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, options.distortion), where)
     return StatedCamera(stated, baseline=options.baseline)
 
 

@@ -159,7 +159,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         intrinsics=shared_intrinsics(cameras, file, notes),
         poses=[_pose(entry, f"{file}: frame {i}: transform_matrix") for i, entry in enumerate(entries)],
         rate=options.rate,
-        times=None if times is None else np.sort(times),
+        times=None if times is None else np.sort(times).astype(np.float64),
         notes=[f"{file.name}: {len(files)} frames, unit of lengths unknown", *notes],
     )
 
