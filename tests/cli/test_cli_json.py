@@ -68,10 +68,17 @@ def test_results_of_sequences(tmp_path):
     assert found["settings"]["frames"] == 3 and "breathing" in found["effects"]
 
 
-@pytest.mark.parametrize("words", [["--times", "0.5"], ["--content", "mesh"], ["--keys", "1"]])
-def test_a_page_refuses_a_choice_of_times_or_content(words, finished_run, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--times", "0.5"], "the format page with --times: a page contains all times"),
+        (["--content", "mesh"], "the format page with --content: a page contains all times"),
+        (["--keys", "1"], "--keys 1 is not allowed; allowed: an integer from 2"),
+    ],
+)
+def test_a_page_refuses_a_choice_of_times_or_content(words, said, finished_run, tmp_path, capsys):
     page = tmp_path / "page.html"
-    assert_refused(capsys, ["export", str(finished_run), "--out", str(page), *words], "page")
+    assert_refused(capsys, ["export", str(finished_run), "--out", str(page), *words], said)
     assert not page.exists()
 
 

@@ -46,11 +46,13 @@ class Outcome(NamedTuple):
     said: str  # everything printed
 
 
-def outcome(words: list[str], out: Path) -> Outcome:
-    """Run a command that writes to `out`, which is emptied before."""
+def outcome(words: list[str], out: Path, before: Path | None = None) -> Outcome:
+    """Run a command that writes to `out`, which is removed before, or replaced by a copy of the folder `before`."""
     if out.is_dir():
         shutil.rmtree(out)
     out.unlink(missing_ok=True)
+    if before is not None:
+        shutil.copytree(before, out)
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
         code = main(words)
@@ -61,18 +63,25 @@ def outcome(words: list[str], out: Path) -> Outcome:
     return Outcome(code, digest.hexdigest(), printed.getvalue())
 
 
-def silent(base: list[str], options: dict[str, list[str]], out: Path, permitted: tuple[str, ...] = ()) -> list[str]:
+def silent(
+    base: list[str],
+    options: dict[str, list[str]],
+    out: Path,
+    permitted: tuple[str, ...] = (),
+    before: Path | None = None,
+) -> list[str]:
     """The options that are without effect in silence, alone or beside another one.
 
     permitted   options that only permit something
+    before      the folder that the command changes, see `outcome`
     """
-    nothing = outcome(base, out)
+    nothing = outcome(base, out, before)
     assert nothing.code == 0, nothing.said
-    alone = {name: outcome([*base, *words], out) for name, words in options.items()}
+    alone = {name: outcome([*base, *words], out, before) for name, words in options.items()}
     found = [name for name, it in alone.items() if it.files == nothing.files and not _told(name, it)]
     read = [name for name in options if "does not read" not in alone[name].said]  # a layout refuses it in every pair
     for a, b in itertools.combinations(read, 2):
-        both = outcome([*base, *options[a], *options[b]], out)
+        both = outcome([*base, *options[a], *options[b]], out, before)
         for one, other in ((a, b), (b, a)):
             if both.files == alone[other].files and not _told(one, both) and alone[one].files != nothing.files:
                 found.append(f"{one} beside {other}")
@@ -160,11 +169,12 @@ def test_no_pair_of_options_of_depth_is_silent(tmp_path):
     assert _names(DepthOptions) - {*options, "smooth"} == {"replace", "json"}
     clip, one = tmp_path / "clip", tmp_path / "one"
     assert main(["prepare", str(tmp_path / "pair"), "--out", str(clip), *CAMERA, "--baseline", "4"]) == 0
-    assert silent(["depth", str(clip), "--replace"], options, clip / "depth", PERMISSIONS["depth"]) == []
+    out = tmp_path / "out"
+    assert silent(["depth", str(out)], options, out, PERMISSIONS["depth"], clip) == []
     assert main(["prepare", str(tmp_path / "a.mkv"), "--out", str(one), *CAMERA]) == 0
-    base = ["depth", str(one), "--replace", *options.pop("given"), "--kind", "relative"]
+    base = ["depth", str(out), *options.pop("given"), "--kind", "relative"]
     options.pop("kind")
-    assert silent(base, options, one / "depth", PERMISSIONS["depth"]) == []
+    assert silent(base, options, out, PERMISSIONS["depth"], one) == []
 
 
 def test_no_pair_of_options_of_render_is_silent(finished_run, tmp_path):

@@ -48,7 +48,7 @@ DEPTH = (
 TRAIN = (
     Excludes(
         ("calibrate-only",),
-        ("config", "preset", "iterations", "minutes", "schedule", "effects", "windows", "resume"),
+        ("config", "iterations", "minutes", "schedule", "effects", "windows", "resume"),
         ONE_RUN,
     ),
     Excludes(("calibrate-only",), ("no-evaluate", "lpips"), "it trains nothing and evaluates nothing"),
