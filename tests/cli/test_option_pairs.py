@@ -205,7 +205,11 @@ def test_no_pair_of_options_of_export_is_silent(finished_run, tmp_path):
 
 
 # Options of `train` without a relation, and why they count in every combination that is accepted.
-INDEPENDENT = {"out": "the run", "json": "the result"}
+INDEPENDENT = {
+    "out": "the run",
+    "json": "the result",
+    "preset": "the settings start from it; a run that exists names what it would change",
+}
 
 
 def test_every_option_of_train_is_related_or_independent():
