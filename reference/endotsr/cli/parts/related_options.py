@@ -1,7 +1,7 @@
 """The related options of the commands: which ones exclude one another, and which ones need another.
 
 Every option that another one makes pointless stands here; `parser.parse` refuses the combination with the reason.
-`tests/cli/test_option_pairs.py` tries all pairs, and `docs/guides/options.md` shows them. In `prepare`, what a layout
+`tests/cli/test_option_pairs.py` tries all pairs. In `prepare`, what a layout
 reads of the statements on a source stands in its own module (`takes`).
 """
 
