@@ -100,7 +100,10 @@ def test_table_writes_a_dash_for_no_value():
     metrics = {
         "held_out": {
             "mean": {"psnr_full": None, "psnr_tissue": 20.0},
-            "per_frame": [{"frame": 1, "name": "right", "psnr_tissue": 20.0}, {"frame": 2, "name": "covered", "psnr_tissue": None}],
+            "per_frame": [
+                {"frame": 1, "name": "right", "psnr_tissue": 20.0},
+                {"frame": 9, "name": "covered", "psnr_tissue": None},
+            ],
         },
         "baselines": {},
         "training": {"mean": {}},

@@ -48,7 +48,7 @@ def held_out_table(metrics: EvaluationRecord) -> str:
     measured += [(entry["label"], entry) for entry in [metrics.get("cross_fade")] if entry]
     measured += [(entry["label"], entry) for entry in metrics["baselines"].values()]
     means = [(label, *held_out_means(metrics, entry)) for label, entry in measured]
-    total, outside = len(metrics["held_out"]["per_frame"]), metrics["frames"].get("extrapolated") or []
+    total, outside = len(metrics["held_out"]["per_frame"]), (metrics.get("frames") or {}).get("extrapolated") or []
     split = bool(means[0][2])  # frames between training frames, and extrapolated ones
     lines = [_means_table(f"{total - len(outside) if split else total} held-out frames", [row[:2] for row in means])]
     if split:
