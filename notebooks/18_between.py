@@ -179,14 +179,7 @@ assert swing[both] < swing[alone] - 2
 #     Edges:   constant opposite flows give that flow at every time. Swapping the frames and a -> 1 - a only changes the
 #              sign of the field.
 #     """
-#     from endotsr.clips.opencv import warp_bilinear
-#
-#     a, b = np.float32(fraction), np.float32(1.0 - fraction)
-#     from_earlier, from_later = flows.forward, -flows.backward
-#     for _ in range(STEPS):
-#         from_earlier = warp_bilinear(flows.forward, -a * from_earlier)  # (18.2), (18.4)
-#         from_later = -warp_bilinear(flows.backward, b * from_later)  # (18.3)
-#     return b * from_earlier + a * from_later  # (18.5)
+#     return motion_field(flows.forward, flows.backward, fraction)
 # ```
 #
 # <!-- definition: endotsr.clips.sequences.between.frame_between -->
@@ -202,22 +195,18 @@ assert swing[both] < swing[alone] - 2
 #
 #     Reverse: none; the result is held fixed during training.
 #     """
-#     from endotsr.clips.opencv import warp_bilinear, warp_cubic
+#     from endotsr.clips.opencv import warp_cubic
 #
 #     pair, a = [earlier, later], np.float32(fraction)
 #     weights = np.array([1.0 - fraction, fraction], np.float32)
 #     field = motion_between(flows, fraction)
-#     places = (-a * field, (1 - a) * field)  # (18.1)
-#
-#     def moved(planes: NDArray, warp) -> FloatArray:
-#         return np.stack([warp(plane.astype(np.float32), place) for plane, place in zip(planes, places, strict=True)])
-#
+#     factors = np.array([-a, 1 - a], np.float32)  # (18.1)
 #     images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
-#     seen = moved(tissue, warp_bilinear) > WHOLE
+#     seen, known, depth = moved_priors(tissue, sequence.depth[pair].astype(np.float32, copy=False), field, factors)
 #     both = seen[0] & seen[1] & tissue[0] & tissue[1]
-#     image = _mixed(moved(images, warp_cubic), images, seen, both, weights)
-#     known = moved(tissue & (sequence.depth[pair] > 0), warp_bilinear) > WHOLE
-#     depth = _blended(moved(sequence.depth[pair], warp_bilinear), known, weights)
+#     moved = np.stack([warp_cubic(image, factor * field) for image, factor in zip(images, factors, strict=True)])
+#     image = _mixed(moved, images, seen, both, weights)
+#     depth = _blended(depth, known, weights)
 #     mask = np.tensordot(weights, seen, 1) > 0
 #     time = (1.0 - fraction) * float(sequence.times[earlier]) + fraction * float(sequence.times[later])
 #     camera = camera_between(sequence.cameras[earlier], sequence.cameras[later], fraction)

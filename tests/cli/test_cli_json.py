@@ -28,7 +28,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(command, tmp_p
     needed = {
         "demo": ["--out", out], "train": ["simulated", "--out", out], "prepare": [run, "--out", out],
         "depth": [run], "masks": [run], "ablate": ["simulated", "--out", out],
-        "check": [run], "simulate": ["still", "--out", out], "inspect": [run],
+        "check": [run], "poses": [run], "simulate": ["still", "--out", out], "inspect": [run],
         "render": [run, "--out", out], "export": [run, "--out", f"{out}.ply"],
         "evaluate": [run], "tradeoff": ["--out", out, "--budget", "10 ms"],
         "golden judge": [run], "golden run": ["--port", "true {requests} {outputs}"], "golden reference": [out],

@@ -71,7 +71,14 @@ def test_pictures_have_the_names_of_the_peers(finished_run):
 def test_metrics_stand_alone(finished_run):
     metrics = json.loads((finished_run / "metrics.json").read_text())
     assert metrics["held_out"]["mean"]["psnr_tissue"] > 5
-    assert set(metrics["baselines"]) == {"temporal_mean", "nearest_frame", "two_neighbours", "flow_interpolation"}
+    assert set(metrics["baselines"]) == {
+        "temporal_mean",
+        "nearest_frame",
+        "two_neighbours",
+        "two_neighbours_tissue",
+        "flow_interpolation",
+        "flow_interpolation_tissue",
+    }
     assert metrics["run"]["iteration"] == LAST and metrics["run"]["settings"]["model"]["beta"] == 0.3
     assert [row["label"].split()[0] for row in metrics["components"]] == ["the", "rendered", "rendered"]
     assert metrics["cross_fade"]["mean"]["psnr_tissue"] > 5

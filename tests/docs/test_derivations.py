@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "reference/endotsr"
 OPTIONS = (
     "clips/sequences/between",
+    "clips/sequences/between_kernels",
     "clips/sequences/tracks",
     "clips/sequences/smaller",
     "training/scene/tracked_motion",

@@ -76,4 +76,4 @@ def test_a_changed_source_is_another_measurement(tmp_path, monkeypatch):
         kept.sources("simulator")
     (package / "effects" / "one.py").write_text("x = 2\n", encoding="utf-8")
     assert kept.sources("") != whole and kept.sources("effects") != room
-    assert kept.sources("effects", beside=("store/marks",)) != kept.sources("effects", beside=("kept",))
+    assert kept.sources("effects", beside=("store/marks",)) != kept.sources("effects", beside=("store/kept",))

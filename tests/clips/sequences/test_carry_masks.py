@@ -11,7 +11,7 @@ from common_folder import written
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import grown, read_png, write_png
-from endotsr.clips.sequences.carry_masks import Motion, carried_once, carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import ClipFlows, carried_once, carry_masks, motion_of
 from endotsr.errors import InputError
 
 SIZE = (60, 80)
@@ -24,11 +24,11 @@ def tool(left: int) -> np.ndarray:
     return mask
 
 
-def sliding(count: int, step: int = 3) -> tuple[Motion, list[np.ndarray]]:
+def sliding(count: int, step: int = 3) -> tuple[ClipFlows, list[np.ndarray]]:
     """A tool that slides to the right, tissue around it that moves with it, and its masks: no pixel is uncovered."""
     masks = [tool(5 + step * i) for i in range(count)]
     field = np.stack([np.full(SIZE, step), np.zeros(SIZE)]).astype(np.float32)
-    return Motion([field.copy() for _ in range(count - 1)], [-field for _ in range(count - 1)]), masks
+    return ClipFlows([field.copy() for _ in range(count - 1)], [-field for _ in range(count - 1)]), masks
 
 
 def overlap(one, other) -> float:
@@ -58,7 +58,7 @@ def test_the_flow_of_the_inside_serves_the_edge():
 
 
 def test_a_margin_grows_the_mask_and_takes_either_side_in_the_middle():
-    still = Motion([np.zeros((2, *SIZE), np.float32)] * 4, [np.zeros((2, *SIZE), np.float32)] * 4)
+    still = ClipFlows([np.zeros((2, *SIZE), np.float32)] * 4, [np.zeros((2, *SIZE), np.float32)] * 4)
     one, other = tool(5), tool(15)
     found = carry_masks(still, {0: one, 4: other}, margin=3)
     np.testing.assert_array_equal(found.excluded[0], grown(one, 3))
@@ -70,7 +70,7 @@ def test_a_margin_grows_the_mask_and_takes_either_side_in_the_middle():
 
 
 def test_an_empty_and_a_full_key_are_keys():
-    still = Motion([np.zeros((2, *SIZE), np.float32)] * 2, [np.zeros((2, *SIZE), np.float32)] * 2)
+    still = ClipFlows([np.zeros((2, *SIZE), np.float32)] * 2, [np.zeros((2, *SIZE), np.float32)] * 2)
     empty, full = np.zeros(SIZE, bool), np.ones(SIZE, bool)
     assert not np.any(carry_masks(still, {0: empty, 2: empty}).excluded)
     assert np.all(carry_masks(still, {0: full, 2: full}).excluded)

@@ -54,16 +54,22 @@ def test_every_wrong_port_changes_the_source_and_no_two_change_it_alike():
         changed_text("method.losses.masked_l1", [Edit("method.losses.masked_l1", "no such line", "")])
 
 
+def _attribute(name: str) -> object:
+    """What the package above a module has under its name: the module, or a function of that name."""
+    above, _, own = name.rpartition(".")
+    return getattr(sys.modules[above], own, None) if above else None
+
+
 def test_a_copy_leaves_the_reference_as_it_is(golden):
     """Its modules, and its answer after the copy was used."""
     before = {name: module for name, module in sys.modules.items() if name.startswith("endotsr")}
+    attributes = {name: _attribute(name) for name in before}
     question = next(c for c in golden.cases if c.name == "masked_l1/generic")
     made = answers(WRONG_PORTS["l1_over_all_pixels"], [Question(question.name, question.operation,
                    golden.inputs(question), question.settings, question.flags)])  # fmt: skip
     assert {name: module for name, module in sys.modules.items() if name in before} == before
-    for name, module in before.items():
-        above, _, own = name.rpartition(".")
-        assert not above or getattr(sys.modules[above], own, module) is module, f"{above}.{own} is still the copy's"
+    for name, was in attributes.items():
+        assert _attribute(name) is was, f"{name} is still the copy's"
     right = all_operations()["masked_l1"].compute(golden.inputs(question), question.settings)
     assert right["loss"] == golden.array(question, "expected/loss.npy") != made[question.name].double["loss"]
 

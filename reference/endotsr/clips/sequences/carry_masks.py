@@ -51,21 +51,21 @@ class Carried(NamedTuple):
         return [i for i, agreement in enumerate(self.agreement) if agreement < LEAST_AGREEMENT]
 
 
-class Motion(NamedTuple):
+class ClipFlows(NamedTuple):
     """Dense flows between neighbouring frames, (2, H, W) px each."""
 
     forward: list[FloatArray]  # frame i -> frame i + 1
     backward: list[FloatArray]  # frame i + 1 -> frame i
 
 
-def motion_of(pictures: Sequence[Picture]) -> Motion:
+def motion_of(pictures: Sequence[Picture]) -> ClipFlows:
     """The flows of a clip, pictures (H, W, 3) uint8 in time order; the expensive part, which no key changes."""
     planes = [np.ascontiguousarray(picture.transpose(2, 0, 1)) for picture in pictures]
     pairs = list(pairwise(planes))
-    return Motion([dense_flow(a, b) for a, b in pairs], [dense_flow(b, a) for a, b in pairs])
+    return ClipFlows([dense_flow(a, b) for a, b in pairs], [dense_flow(b, a) for a, b in pairs])
 
 
-def carry_masks(motion: Motion, keys: Mapping[int, BoolArray], margin: int = 0) -> Carried:
+def carry_masks(motion: ClipFlows, keys: Mapping[int, BoolArray], margin: int = 0) -> Carried:
     """Masks of all frames from those of the key frames.
 
     motion    of `motion_of`
@@ -98,7 +98,7 @@ def carry_masks(motion: Motion, keys: Mapping[int, BoolArray], margin: int = 0) 
     return Carried(masks, agreement, _next_key(agreement, order))
 
 
-def _check_keys(keys: Mapping[int, BoolArray], count: int, motion: Motion) -> None:
+def _check_keys(keys: Mapping[int, BoolArray], count: int, motion: ClipFlows) -> None:
     if not keys:
         raise InputError("masks: no key frame is given; name at least one frame with its mask")
     for frame, mask in keys.items():

@@ -14,7 +14,7 @@ PAGES = {
 
 _AXES = {
     "Gaussian": "opacity_logit depth visible pruned cloned split parent moments_kept mean_gradient",
-    "row column": "mask depth_image opacity_image rendered_depth prior_depth edges valid_1 valid_2 valid_3",
+    "row column": "mask depth_image opacity_image rendered_depth prior_depth picture edges valid_1 valid_2 valid_3",
     "rgb row column": "colour_image rendered observed exposed band_1 band_2 band_3 colour",
     "rgb": "background bias log_gain",
     "rgb Gaussian": "residual residual_at_t colour",
@@ -36,6 +36,8 @@ _AXES = {
     "frequency": "omega rho",
     "frame": "times",
     "training frame": "train_index",
+    "xyz point": "points",
+    "point": "reference residual seen",
     "view": "g_rgb g_lap",
     "view rgb row column": "photometric laplacian",
     "frame rgb row column": "images",

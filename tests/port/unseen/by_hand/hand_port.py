@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-FILES = ("hand_time", "hand_losses", "hand_screen", "hand_rules")
+FILES = ("hand_time", "hand_losses", "hand_screen", "hand_pair", "hand_rules")
 OPERATIONS = (
     "reading", "generator", "frequencies", "dictionary", "atoms", "appearance", "motion", "matern", "deformation",
     "scene", "exposure", "pose", "masked_l1", "masked_ssim", "normalised_depth", "smoothness", "laplacian",
     "covariance", "projection", "harmonics", "composite", "render", "calibration", "adam", "schedule", "density",
-    "initialisation",
+    "initialisation", "registration",
 )  # fmt: skip
 NOT_PORTED = ("objective", "determinism", "training")
 

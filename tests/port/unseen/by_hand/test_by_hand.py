@@ -49,7 +49,9 @@ def test_every_mistake_fits_the_port_once_and_every_stage_has_some():
     for entry in ENTRIES.values():
         assert hand_port.sources(entry["edit"]) != hand_port.sources(), entry["id"]
         assert entry["text"].endswith(".") and entry["says"]
-    assert set(Counter(e["stage"] for e in ENTRIES.values())) == set(hand_port.OPERATIONS) - {"reading", "generator"}
+    later = {"registration"}  # (B19) is younger than the set, which is not added to
+    stages = set(hand_port.OPERATIONS) - {"reading", "generator"} - later
+    assert set(Counter(e["stage"] for e in ENTRIES.values())) == stages
 
 
 def test_an_edit_that_does_not_stand_once_is_an_error():

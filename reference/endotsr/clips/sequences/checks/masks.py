@@ -17,7 +17,8 @@ class MaskSteps:
     """The fraction of pixels in which each mask differs from both neighbours, from one pass over the masks.
 
     `add` takes the masks in time order, None where a frame has none. A frame counts if it and both of its neighbours
-    have a mask of one size.
+    have a mask of one size with tissue and excluded pixels. A mask of one value is a kind of its own, see
+    `clips.sequences.checks`: the instrument left the view or covers it, and what follows differs from it anyway.
     """
 
     def __init__(self) -> None:
@@ -28,16 +29,16 @@ class MaskSteps:
         """The mask of a frame, (H, W), True = tissue; stored until the second next one."""
         before, middle = self._last
         if before is not None and middle is not None and mask is not None:
-            if before.shape == middle.shape == mask.shape:
+            if before.shape == middle.shape == mask.shape and all(0 < m.mean() < 1 for m in (before, middle, mask)):
                 self.fractions[frame - 1] = float(np.mean((before == mask) & (middle != mask)))
         self._last = (middle, mask)
 
     def findings(self, where: str) -> list[Finding]:
         """A warning for every frame whose mask differs from both neighbours unusually much."""
         usual = float(np.median(list(self.fractions.values()) or [0.0]))
-        unlike = {i: share for i, share in self.fractions.items() if share > max(UNLIKE, USUAL * usual)}
+        unlike = {i: fraction for i, fraction in self.fractions.items() if fraction > max(UNLIKE, USUAL * usual)}
         what = "its mask differs from both neighbours in {:.1%} of the pixels"
-        return [finding("unlike-mask", where, what.format(share), i) for i, share in unlike.items()]
+        return [finding("unlike-mask", where, what.format(fraction), i) for i, fraction in unlike.items()]
 
 
 def mask_findings(masks: BoolArray, where: str) -> list[Finding]:
