@@ -23,7 +23,7 @@ GROUPS = (
     (
         "Clips",
         "From a recording to the arrays that training reads.",
-        ("sequences", "simulator", "effects", "opencv", "untrusted"),
+        ("sequences", "simulator", "effects", "poses", "opencv", "untrusted"),
     ),
     ("Training", "The model, its training, and the files of a run.", ("scene", "fitting", "runs")),
     ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
