@@ -103,11 +103,11 @@ def spread(found: Record, metric: str, fixed: bool) -> Spread | None:
 
 def averaged(of_clips: list[Estimate]) -> Estimate:
     """The mean over the clips, with equal weights. Paired: Welch's degrees of freedom; common: limits in quadrature."""
-    mean, median = (float(np.mean([e[k] for e in of_clips])) for k in (1, 2))
+    mean, median = float(np.mean([e.mean for e in of_clips])), float(np.mean([e.median for e in of_clips]))
     pairs = [RunPair(str(clip), seed, v) for clip, e in enumerate(of_clips) for seed, v in enumerate(e.values)]
     welch = estimate(pairs)
-    known = welch.student_low is not None and welch.student_high is not None
-    paired = (welch.student_low, welch.student_high) if known else None
+    low, high = welch.student_low, welch.student_high
+    paired = (low, high) if low is not None and high is not None else None
     values = tuple(value for e in of_clips for value in e.values)
     return Estimate(values, mean, median, paired, _quadrature(mean, [e.common for e in of_clips]))
 

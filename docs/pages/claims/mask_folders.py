@@ -39,7 +39,7 @@ def offset(folder: Path) -> float:
 
 def table(found: dict) -> str:
     """Predicted difference of both folders, and the published one."""
-    stated = np.mean([PUBLISHED[clip]["psnr_full"] for clip in CLIPS]) - MEANS_ON_TISSUE["A+S+L"][0]
+    stated = np.mean(np.array([PUBLISHED[clip]["psnr_full"] for clip in CLIPS], float)) - MEANS_ON_TISSUE["A+S+L"][0]
     rows = [
         [f"`{name}`", *(f"{found[name][clip]:.3f}" for clip in CLIPS), f"{np.mean(list(found[name].values())):.3f}"]
         for name in FOLDERS

@@ -149,6 +149,7 @@ def _level_row(found: Record, clip: str, key: str, of: str, unit: float) -> list
 def _base_row(found: Record, clip: str) -> list[str]:
     """The level of the base that follows from the paper: its level minus its gain with matched input."""
     level, (least, most) = PUBLISHED[clip]["psnr_full"], MATCHED_PSNR
+    assert level is not None
     claim = ["Level: PSNR of the base, from the level and the gain with matched input", "base",
              f"{level - most:.2f} to {level - least:.2f} dB"]  # fmt: skip
     values = list(runs_of(found, "base", "psnr_full").values())

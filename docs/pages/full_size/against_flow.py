@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import endotsr
+from endotsr.api import Run
 from endotsr.clips.sequences.between import flows_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.results.evaluation.baselines import flow_interpolation, neighbours, unit_image
@@ -67,6 +68,7 @@ def kinds(sequence: Sequence, index: int) -> dict[str, NDArray[np.bool_]]:
 def measured(run: Path) -> dict[str, Any]:
     """Sums of squared errors of model and flow, by frame and by kind of pixel."""
     finished = endotsr.open_run(run)
+    assert isinstance(finished, Run), f"{run}: trained in windows"
     sequence = finished.sequence
     frames, total = [], {name: np.zeros(3) for name in KINDS}
     for index in (int(i) for i in sequence.test_index):

@@ -94,7 +94,7 @@ def inner(sequence: Sequence) -> Sequence:
 
 def measured(
     key: str, runs: dict[str, tuple[str, str, int]], iterations: int, clips: dict[str, str], rows: Rows
-) -> dict[str, float]:
+) -> dict[str, Any]:
     """Train one run (scene, row, seed), and measure it, with trajectories if the truth is known."""
     import endotsr
 
@@ -106,7 +106,8 @@ def measured(
     }
     for section, values in rows[label].items():
         sections[section] = sections.get(section, {}) | values
-    config = endotsr.make_config("paper" if label == PAPER else "sharp", iterations=iterations, **sections)
+    settings: dict[str, Any] = {"iterations": iterations, **sections}
+    config = endotsr.make_config("paper" if label == PAPER else "sharp", **settings)
     metrics = endotsr.train(scene_of(scene, clips), config, on_message=lambda text: None).evaluate()
     return (metrics["trajectories"] or {}) | {
         "psnr_tissue": metrics["held_out"]["mean"]["psnr_tissue"],

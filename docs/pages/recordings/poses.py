@@ -85,7 +85,7 @@ def pose_error(cameras: list[Camera], sequence: Sequence) -> float:
     return float(np.sqrt(2 * np.mean(least_squares(apart, np.zeros(7)).fun ** 2)))
 
 
-def measured(key: str, runs: dict[str, tuple[str, str, str, int]], clips: dict[str, str]) -> dict[str, float]:
+def measured(key: str, runs: dict[str, tuple[str, str, str, int]], clips: dict[str, str]) -> dict[str, float | None]:
     """Train one run (scene, row of `SETTINGS`, one of `POSES`, seed) and measure it."""
     import endotsr
     from endotsr.training.fitting.model import corrected_cameras

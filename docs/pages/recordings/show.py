@@ -43,6 +43,7 @@ MOMENT = 0.5  # time at which the page is compared
 def measure(run: Path) -> dict[str, Any]:
     """Every command on this run, and the page in a browser."""
     opened = open_run(run)
+    assert isinstance(opened, Run), f"{run}: trained in windows"
     sequence, megabytes = opened.sequence, (run / "checkpoint.npz").stat().st_size / 1e6
     with tempfile.TemporaryDirectory() as folder:
         commands = {name: _one(run, words, Path(folder)) for name, words in COMMANDS.items()}
@@ -67,8 +68,8 @@ def _one(run: Path, words: tuple[str, ...], folder: Path) -> dict[str, float]:
 def _in_browser(run: Run, page: Path) -> dict[str, float]:
     """Milliseconds per picture, and PSNR against the reference renderer."""
     sys.path.insert(0, str(DOCS.parent / "tests" / "results" / "views"))
-    from browser import drawn
-    from frame_rate import milliseconds_a_picture
+    from browser import drawn  # type: ignore[import-not-found]
+    from frame_rate import milliseconds_a_picture  # type: ignore[import-not-found]
 
     reference = np.clip(run.render(MOMENT).colour, 0.0, 1.0)
     picture = drawn(page, f"t={MOMENT}").transpose(2, 0, 1) / 255.0

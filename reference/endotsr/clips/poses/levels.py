@@ -58,7 +58,7 @@ def normalised(grey: NDArray[np.float32], mask: BoolArray) -> NDArray[np.float32
     mean = gaussian_blur(grey * weight, LOCAL) / total
     centred = grey - mean
     variance = gaussian_blur(centred * centred * weight, LOCAL) / total
-    return centred / np.sqrt(variance + np.float32(FAINT))
+    return (centred / np.sqrt(variance + np.float32(FAINT))).astype(np.float32, copy=False)
 
 
 def _level(planes: list[tuple], views: Views, step: int) -> PyramidLevel:

@@ -109,7 +109,7 @@ def motion_field(forward: FloatArray, backward: FloatArray, fraction: float) -> 
     """(2, H, W) float32 px: the field of `between.motion_between`, from flows (2, H, W) float32 px."""
     field = np.empty(forward.shape, np.float32)
     a, b = np.float32(fraction), np.float32(1.0 - fraction)
-    parallel_for(_field_kernel, field.shape[1], forward, backward, a, b, field)
+    parallel_for(_field_kernel, forward.shape[1], forward, backward, a, b, field)
     return field
 
 

@@ -30,7 +30,7 @@ def _seen(module: Any, inputs: Inputs, settings: Settings, saved: Any) -> Found:
     return {"seen": saved.seen}
 
 
-def _cells(inputs: Inputs, settings: Settings, saved: Any) -> Found:
+def _cells(inputs: Inputs, settings: Settings, saved: Any) -> dict[str, NDArray]:
     """The pixel of every projection: the second derivative of the interpolation jumps between pixels."""
     lens = settings["camera"]
     x, y, z = inputs["rotation"] @ inputs["points"] + np.asarray(inputs["translation"])[:, None]
