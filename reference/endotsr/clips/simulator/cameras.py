@@ -2,13 +2,16 @@
 
 import numpy as np
 
+from endotsr.clips.simulator.hand import hand_path, hand_rotations
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera
 
+FOLLOWED = np.array([0.5, 0.5, 1.0])  # of the shift of a hand that its turn makes up for; the rest moves the picture
+
 
 def make_cameras(settings: SimulatorSettings, times: FloatArray, right: bool = False) -> list[Camera]:
-    """One camera per frame: at the origin, looking along z. With motion, it orbits the middle of the tissue.
+    """One camera per frame: at the origin, looking along z, or on the path of the camera motion.
 
     right    the second camera of a rectified pair: the same axes, offset to the right by the baseline
     """
@@ -21,9 +24,9 @@ def make_cameras(settings: SimulatorSettings, times: FloatArray, right: bool = F
         return [camera._replace(translation=camera.translation - aside) for camera in make_cameras(settings, times)]
     if not settings.camera_motion.on:
         return [rest] * len(times)
-    cameras = []
-    for centre in camera_centres(settings, times):
-        rotation = _looking_at(np.array([0.0, 0.0, settings.distance]) - centre)
+    centres, cameras = camera_centres(settings, times), []
+    rotations = _rotations(settings, times, centres)
+    for centre, rotation in zip(centres, rotations):
         cameras.append(rest._replace(rotation=rotation, translation=-rotation @ centre))
     return cameras
 
@@ -31,9 +34,19 @@ def make_cameras(settings: SimulatorSettings, times: FloatArray, right: bool = F
 def camera_centres(settings: SimulatorSettings, times: FloatArray) -> FloatArray:
     """Camera centres, (n, 3) mm: the origin, or the path of the camera motion."""
     part = settings.camera_motion
+    if part.on and part.path == "hand":
+        return hand_path(settings, times)
     angle = 2 * np.pi * part.cycles * np.asarray(times, float)
     path = np.stack([np.sin(angle), 0.5 * (1 - np.cos(angle)), np.zeros_like(angle)], axis=1)
     return part.amplitude * path if part.on else np.zeros((len(path), 3))
+
+
+def _rotations(settings: SimulatorSettings, times: FloatArray, centres: FloatArray) -> FloatArray:
+    """World-to-camera rotations, (n, 3, 3). An orbit keeps the middle of the tissue in the centre, a hand does not."""
+    middle = np.array([0.0, 0.0, settings.distance])
+    if settings.camera_motion.path == "hand":
+        return hand_rotations(settings, times) @ np.array([_looking_at(middle - FOLLOWED * c) for c in centres])
+    return np.array([_looking_at(middle - c) for c in centres])
 
 
 def _looking_at(forward: FloatArray) -> FloatArray:

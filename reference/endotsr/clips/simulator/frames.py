@@ -26,7 +26,7 @@ from endotsr.clips.simulator.views import SurfaceView, see
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 
-LEFT_NOISE, DEPTH_NOISE, RIGHT_NOISE = 2, 3, 7  # random streams; the scene uses 0, 1 and 4 to 6
+LEFT_NOISE, DEPTH_NOISE, RIGHT_NOISE = 2, 3, 7  # random streams; the scene uses 0, 1, 4 to 6 and 8
 
 
 class SimulatedScene(NamedTuple):

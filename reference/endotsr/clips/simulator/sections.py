@@ -4,7 +4,7 @@ Lengths are in millimetres, rates in cycles per sequence (the unit of the model'
 normalised time in [0, 1]. The effects act in this order: motion, light, instruments, camera, depth.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -99,12 +99,14 @@ class Instrument(ActiveEffect, frozen=True, kw_only=True):
 
 
 class CameraMotion(Effect, frozen=True, kw_only=True):
-    """The camera orbits the middle of the tissue; off = one Camera object for all frames."""
+    """The camera moves in front of the tissue; off = one Camera object for all frames."""
 
+    path: Literal["orbit", "hand"] = "orbit"
+    """orbit: around the middle of the tissue; hand: drifts, pushes in, rolls and trembles, drawn from the seed"""
     amplitude: NonNegative = 3.0
     """largest sideways shift of the camera, mm"""
     cycles: Positive = 1.0
-    """cycles per sequence"""
+    """cycles per sequence; of a hand: the rate of its waves, as a factor"""
 
 
 class SensorNoise(ActiveEffect, frozen=True, kw_only=True):
