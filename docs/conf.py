@@ -18,6 +18,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]
 extensions += ["notebook_cells", "unbroken_units", "demo_run"]
 exclude_patterns = ["_build", "_extensions", "conf.py", "make.py", "pages/**", "results/**.py"]  # makers of other pages
+exclude_patterns += ["notebooks/running_clip/**"]  # a module of the chapters, no page
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
 # The types of the package's arrays say little; shapes and units stand in the docstrings.

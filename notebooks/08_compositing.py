@@ -22,6 +22,7 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+from running_clip import load
 
 from endotsr.definition import compositing as definition
 from endotsr.method.splatting.binning import depth_order, screen_boxes, tile_lists
@@ -369,6 +370,75 @@ for settings in (PAPER, EXACT):
     for name, text in grads._asdict().items():
         name = name.removeprefix("d_").removeprefix("opacity_")
         np.testing.assert_allclose(found[name], text, rtol=1e-9, atol=1e-11, err_msg=name)
+
+# %% [markdown]
+# ## Figure: a pixel of the running clip
+#
+# The examples above have five Gaussians. The running clip of this book is a simulated clip of 63 frames of 640x512, and
+# the scene below was trained on it ({doc}`14_full_sequence`). The frame is held out: training did not use it. At the
+# marked pixel the model is wrong: a highlight is narrower in the render than in the frame. The bars are the terms of the
+# blend: many faint Gaussians, and most of them behind others. The right panel has $g_{\alpha_k}$ of (8.3) for the loss
+# $\frac12\|\hat I-I\|^2$. A negative gradient asks for more opacity. Which contributors should have one, the white or
+# the red ones?
+
+# %% tags=["hide-input"]
+clip = load()
+column, row = clip.pixel
+out, saved = render_forward(clip.scene, clip.camera, PAPER, degree=0)
+u, v = saved.projected.mean2d
+a, b, c = saved.projected.covariance2d.astype(np.float64)
+dx, dy = column + 0.5 - u, row + 0.5 - v
+q = dy**2 / c + c / (a * c - b * b) * (dx - b / c * dy) ** 2
+alphas = np.minimum(
+    PAPER.alpha_max, definition.opacity_of(clip.scene.opacity_logit) * np.exp(-q / 2)
+)
+colours = 0.5 + 0.5 / np.sqrt(np.pi) * clip.scene.harmonics[0]
+terms, T = [], 1.0
+for k in np.flatnonzero(alphas >= PAPER.alpha_cutoff):  # the scene is stored front to back
+    if T * (1 - alphas[k]) < PAPER.transmittance_stop:
+        break
+    terms.append((alphas[k], T, colours[:, k]))
+    T *= 1 - alphas[k]
+g_pixel = (
+    sum(alpha * front * colour for alpha, front, colour in terms) - clip.image[:, row, column]
+)
+pulls, behind, R = [], [], np.zeros(3)  # (8.1), (8.3): back to front
+for alpha, front, colour in reversed(terms):
+    pulls.append(front * (colour - R) @ g_pixel)
+    behind.append(R)
+    R = alpha * colour + (1 - alpha) * R
+np.testing.assert_allclose(R, out.colour[:, row, column], atol=1e-4)
+
+figure, axes = plt.subplots(
+    1, 4, figsize=(10.9, 3.1), layout="constrained", width_ratios=[1, 1, 1.5, 1.5]
+)
+near = slice(row - 32, row + 32), slice(column - 32, column + 32)
+for panel, picture, title in ((axes[0], clip.image, "frame"), (axes[1], out.colour, "render")):
+    panel.imshow(np.clip(picture, 0, 1).transpose(1, 2, 0)[near])
+    panel.plot(32, 32, "o", mec="k", mfc="none", ms=9)
+    panel.set(title=title, xticks=[], yticks=[])
+for k, (alpha, front, colour) in enumerate(terms):
+    axes[2].bar(k, front, width=1, color="0.9")
+    axes[2].bar(k, alpha * front, width=1, color=np.clip(colour, 0, 1), edgecolor="k", lw=0.3)
+axes[2].set(title="$T_k$, and the fraction $\\alpha_kT_k$", xlabel="contributor, front to back")
+axes[3].bar(range(len(pulls)), pulls[::-1], width=1, color="#0072B2")
+axes[3].axhline(0, color="k", lw=0.8)
+axes[3].set(title="$g_{\\alpha_k}$", xlabel="contributor, front to back")
+plt.show()
+wanted, rest = np.array(pulls[::-1][:20]), behind[::-1]  # of the contributors with some weight
+white = np.array([colour[1:].sum() for _, _, colour in terms[:20]])  # red is at its limit
+brighter = np.array([(colour > R)[1:].all() for (_, _, colour), R in zip(terms[:20], rest)])
+assert g_pixel[1:].max() < -0.1 and (wanted[brighter] < 0).all() and 0 < brighter.sum() < 20
+assert (wanted[white > np.median(white)] > 0).any()
+half = np.searchsorted(np.cumsum([alpha * front for alpha, front, _ in terms]), 0.5) + 1
+print(f"{len(terms)} contributors; the first {half} have half of the weight; T_n = {T:.4f}")
+print(f"error of the pixel: {np.abs(g_pixel).max() * 255:.0f} of 255")
+
+# %% [markdown]
+# The render has too little green and blue, so the gradient is negative where the colour has more of both than $R_{k+1}$,
+# the colour **behind**. (8.3) does not compare with the frame: one of the whiter half of the contributors has a positive
+# gradient, as it hides something whiter. And the gradients are small where $T_k$ is small: a Gaussian at the back changes
+# the picture only after those in front of it have become fainter.
 
 # %% [markdown]
 # The released rasteriser of 3DGS (`diff-gaussian-rasterization`) adds a small number to $\det^2$ in this last step, which

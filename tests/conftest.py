@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE / "method" / "splatting")]  # made_up_scenes is used in other folders too
-sys.path += [str(HERE.parent / name) for name in ("golden", "docs")]  # programs that are not installed
+sys.path += [str(HERE.parent / name) for name in ("golden", "docs", "notebooks")]  # not installed
 
 # No deadline: the first call of a kernel compiles it. Fixtures hold nothing that an example changes.
 COMMON = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}

@@ -18,6 +18,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("ENDOTSR_NOTEBOOK_SIZE", "small")
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
+sys.path.append(str(FOLDER))  # of the module `running_clip`
 Sign = tuple[int, int]  # cell, position in the walk of its syntax tree
 
 

@@ -21,6 +21,7 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.logging import getLogger
 
+RUNNING_CLIP = "running_clip"
 logger = getLogger(__name__)
 
 
@@ -37,6 +38,8 @@ def copy_notebooks(app: Sphinx) -> None:
         write(copies / name, file.read_text(encoding="utf-8"))
     for stale in (file for file in copies.iterdir() if file.is_file() and file.name not in sources):
         stale.unlink()
+    if (NOTEBOOKS / RUNNING_CLIP).is_dir():  # imported by chapters, which run in the folder of the copies
+        shutil.copytree(NOTEBOOKS / RUNNING_CLIP, copies / RUNNING_CLIP, dirs_exist_ok=True)
 
 
 def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:

@@ -36,6 +36,7 @@ def inside_docs(page: Path) -> Path:
     copy.parent.mkdir(exist_ok=True)
     shutil.copyfile(page, copy)
     shutil.copyfile(page.parent / "matplotlibrc", copy.parent / "matplotlibrc")
+    shutil.copytree(page.parent / "running_clip", copy.parent / "running_clip", dirs_exist_ok=True)
     return copy
 
 
