@@ -9,6 +9,7 @@ from made_up_sequence import made_up
 from data_folder import data_folder
 from endotsr.results.evaluation import evaluate
 from endotsr.results.evaluation.baselines import two_neighbours, unit_image
+from endotsr.results.evaluation.lpips import LpipsWeights
 
 
 @pytest.fixture
@@ -124,6 +125,19 @@ def test_baseline_rows_rank_as_the_data_says(sequence):
     assert values == sorted(values) and values[2] > values[1] + 1
     assert all(len(row["per_frame"]) == 2 and row["label"] for row in table.values())
     strict(table)
+
+
+def test_methods_share_the_maps_of_a_frame_and_not_their_rows(monkeypatch):
+    """Three methods on two frames: a map for each frame and range, and for each of the six renders and range."""
+    rng, asked = np.random.default_rng(3), []
+    sequence = made_up(rng.integers(0, 255, (3, 3, 40, 40)).astype(np.uint8), [0, 1], np.ones((3, 40, 40), bool))
+    weights = LpipsWeights((), (), (np.ones(3, np.float32),), np.zeros(3), np.ones(3))
+    monkeypatch.setattr(evaluate, "feature_maps", lambda image, *_: asked.append(0) or [image])
+    methods = {f"+ {c}": lambda i, c=c: np.minimum(unit_image(sequence, i) + np.float32(c), 1) for c in (0.0, 0.1, 0.2)}
+    found = evaluate.evaluate_methods(sequence, [0, 1], methods, weights)
+    assert len(asked) == 2 * 2 + 2 * 6
+    alone = {name: evaluate.evaluate_frames(sequence, [0, 1], render, weights) for name, render in methods.items()}
+    assert found == alone and found["+ 0.0"]["mean"]["lpips"] == 0 < found["+ 0.1"]["mean"]["lpips"]
 
 
 @pytest.mark.data

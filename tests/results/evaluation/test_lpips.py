@@ -38,6 +38,17 @@ def no_weights_anywhere(monkeypatch, tmp_path):
     return tmp_path / "endotsr" / "lpips_alex.npz"
 
 
+@pytest.mark.parametrize("height, width", [(3, 3), (4, 9), (6, 8), (7, 12)])
+def test_pooling_is_the_largest_of_nine(height, width):
+    image = np.random.default_rng(4).standard_normal((2, height, width)).astype(np.float32)
+    image[1, 2, 1] = np.nan
+    windows = [
+        [image[:, y : y + 3, x : x + 3].max(axis=(1, 2)) for x in range(0, width - 2, 2)]
+        for y in range(0, height - 2, 2)
+    ]
+    np.testing.assert_array_equal(module._pool(image), np.array(windows).transpose(2, 0, 1))
+
+
 def pair(height=35, width=47):
     rng = np.random.default_rng(2)
     return rng.random((3, height, width)), rng.random((3, height, width))

@@ -8,7 +8,7 @@ mask, a render that is not finite) is None, never NaN, because the result is JSO
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import cast
 
 import numpy as np
@@ -18,7 +18,7 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.results.evaluation.baselines import BASELINES, unit_image
 from endotsr.results.evaluation.coverage import TimesSeen, coverage, extrapolated, seen_metrics, times_seen
-from endotsr.results.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
+from endotsr.results.evaluation.lpips import InputRange, LpipsWeights, feature_maps, lpips_obstacle, map_distances
 from endotsr.results.evaluation.metrics import image_metrics, mean_metrics
 from endotsr.results.evaluation.records import (
     EvaluationRecord,
@@ -53,20 +53,34 @@ def evaluate_frames(
 
     Raises   ValueError naming the frame if the shapes of render and frame differ
     """
-    rows: list[FrameMetrics] = []
-    bad = 0
+    return evaluate_methods(sequence, indices, {"": render_frame}, lpips_weights, seen)[""]
+
+
+def evaluate_methods(
+    sequence: Sequence,
+    indices: Iterable[int],
+    methods: Mapping[str, RenderFrame],
+    lpips_weights: LpipsWeights | None = None,
+    seen: TimesSeen | None = None,
+) -> dict[str, FramesMeasured]:
+    """`evaluate_frames` for several methods, which share the feature maps of the true frames."""
+    rows: dict[str, list[FrameMetrics]] = {name: [] for name in methods}
+    bad = dict.fromkeys(methods, 0)
     for index in (int(i) for i in indices):
-        render, truth, mask = np.asarray(render_frame(index)), unit_image(sequence, index), sequence.masks[index]
-        if render.shape != truth.shape:
-            raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
-        found = image_metrics(render, truth, mask) | _lpips(render, truth, mask, lpips_weights)
-        if seen is not None:
-            found |= seen_metrics(render, truth, mask, seen)
-        values = {key: _finite(value) for key, value in found.items()}
-        bad += sum(values[key] is None and found[key] is not None for key in found)
+        truth, mask = unit_image(sequence, index), sequence.masks[index]
+        distance = _Distance(truth, mask, lpips_weights)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
-        rows.append(cast(FrameMetrics, about | values))
-    return measured_rows(rows, bad)
+        for name, render_frame in methods.items():
+            render = np.asarray(render_frame(index))
+            if render.shape != truth.shape:
+                raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
+            found = image_metrics(render, truth, mask) | distance.of(render)
+            if seen is not None:
+                found |= seen_metrics(render, truth, mask, seen)
+            values = {key: _finite(value) for key, value in found.items()}
+            bad[name] += sum(values[key] is None and found[key] is not None for key in found)
+            rows[name].append(cast(FrameMetrics, about | values))
+    return {name: measured_rows(rows[name], bad[name]) for name in methods}
 
 
 def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
@@ -104,10 +118,9 @@ def baseline_table(
     sequence: Sequence, lpips_weights: LpipsWeights | None = None, seen: TimesSeen | None = None
 ) -> dict[str, LabelledFrames]:
     """Held-out metrics of the baselines, in the order of `EVERY_BASELINE`; `seen` as in `evaluate_frames`."""
-    return {
-        name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights, seen)}
-        for name, (label, make) in EVERY_BASELINE.items()
-    }
+    methods = {name: make(sequence) for name, (_, make) in EVERY_BASELINE.items()}
+    measured = evaluate_methods(sequence, sequence.test_index, methods, lpips_weights, seen)
+    return {name: {"label": label, **measured[name]} for name, (label, _) in EVERY_BASELINE.items()}
 
 
 def training_sample(sequence: Sequence) -> list[int]:
@@ -165,12 +178,27 @@ def evaluation_record(
     }
 
 
-def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> Means:
-    """Both LPIPS values, with a clipped render and excluded pixels 0; None without weights."""
-    if weights is None:
-        return dict.fromkeys(LPIPS_KEYS)
-    shown, wanted = np.where(mask, np.clip(render, 0, 1), 0), np.where(mask, truth, 0)
-    return {key: lpips(shown, wanted, weights, how) for key, how in LPIPS_KEYS.items()}
+class _Distance:
+    """LPIPS from one true frame, with excluded pixels 0; the feature maps of the frame are computed once."""
+
+    def __init__(self, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> None:
+        usable = weights is not None and lpips_obstacle(weights, *mask.shape) is None
+        self._mask, self._weights = mask, weights if usable else None
+        self._truth = {key: self._maps(truth, how) for key, how in LPIPS_KEYS.items()} if usable else {}
+
+    def of(self, render: FloatArray) -> Means:
+        """Both LPIPS values of a render, clipped; None without weights or for a small picture."""
+        if self._weights is None:
+            return dict.fromkeys(LPIPS_KEYS)
+        shown = np.clip(render, 0, 1)
+        return {
+            key: math.fsum(map_distances(self._maps(shown, how), self._truth[key], self._weights))
+            for key, how in LPIPS_KEYS.items()
+        }
+
+    def _maps(self, image: FloatArray, how: InputRange) -> list[FloatArray]:
+        assert self._weights is not None
+        return feature_maps(np.where(self._mask, image, 0), self._weights, how)
 
 
 def difference(inside: Means, outside: Means) -> Means:

@@ -99,12 +99,21 @@ def lpips(
 
 def layer_distances(a: FloatArray, b: FloatArray, weights: LpipsWeights, input_range: InputRange) -> list[float]:
     """The five terms of the sum, first layer first."""
-    features = [_features(_normalised(image, weights, input_range), weights) for image in (a, b)]
-    distances = []
-    for one, other, head in zip(*features, weights.heads):
-        squared = (_unit_length(one) - _unit_length(other)) ** 2
-        distances.append(float(np.tensordot(head, squared, 1).mean(dtype=np.float64)))
-    return distances
+    one, other = (feature_maps(image, weights, input_range) for image in (a, b))
+    return map_distances(one, other, weights)
+
+
+def feature_maps(image: FloatArray, weights: LpipsWeights, input_range: InputRange) -> list[FloatArray]:
+    """The five feature maps (out, H_l, W_l) of a picture (3, H, W), divided by their norm over channels."""
+    return [_unit_length(found) for found in _features(_normalised(image, weights, input_range), weights)]
+
+
+def map_distances(a: list[FloatArray], b: list[FloatArray], weights: LpipsWeights) -> list[float]:
+    """The five terms of the sum, from the `feature_maps` of two pictures."""
+    return [
+        float(np.tensordot(head, (one - other) ** 2, 1).mean(dtype=np.float64))
+        for one, other, head in zip(a, b, weights.heads, strict=True)
+    ]
 
 
 def _normalised(image: FloatArray, weights: LpipsWeights, input_range: InputRange) -> FloatArray:
@@ -137,8 +146,12 @@ def _convolve(image: FloatArray, kernel: FloatArray, stride: int, padding: int) 
 
 
 def _pool(image: FloatArray) -> FloatArray:
-    """3 x 3 maximum pooling with stride 2."""
-    return np.lib.stride_tricks.sliding_window_view(image, (3, 3), axis=(1, 2))[:, ::2, ::2].max(axis=(3, 4))
+    """3 x 3 maximum pooling with stride 2: rows first, then columns."""
+    for _ in range(2):
+        count = (image.shape[1] - 3) // 2 + 1
+        first, second, third = (image[:, k : k + 2 * count - 1 : 2] for k in range(3))
+        image = np.maximum(np.maximum(first, second), third).swapaxes(1, 2)
+    return image
 
 
 def _unit_length(features: FloatArray) -> FloatArray:
