@@ -62,6 +62,8 @@ class PrepareOptions:
     """read these files as metric depth even if they look like disparity or relative depth"""
     points: Literal["interpolated", "sparse", "none"] = "interpolated"
     """depth from the points of a reconstruction (COLMAP): interpolated, at the points only, or none"""
+    model: Annotated[str, Option("NAME")] = ""
+    """COLMAP model to read, such as sparse/1; without it, the one with the most pictures"""
     frames: Annotated[str, Option("A:B[:S],...")] = ""
     """frames or seconds of the source: 0:10,12,30s:45s"""
     drop: Annotated[str, Option("N,...")] = ""
@@ -164,7 +166,7 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
 
     same = (
         "layout", "stereo", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
-        "excluded_value", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation",
+        "excluded_value", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation", "model",
     )  # fmt: skip
     return SourceOptions(
         **{name: getattr(options, name) for name in same},

@@ -67,6 +67,7 @@ from input_kinds import (
     view_is_kept,
     without_zeros,
 )
+from left_inputs import LEFT_ROWS
 from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
 from odd_inputs import ODD_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
@@ -280,6 +281,7 @@ ROWS = [
     *(Row(f"export to {name}", exported(name, *words), "refused", "allowed: FILE.ply")
       for name, *words in (("a.spz",), ("a.splat",), ("a.obj", "--content", "mesh"), ("a.gltf", "--content", "mesh"))),
     *ODD_ROWS,
+    *LEFT_ROWS,
 ]  # fmt: skip
 
 

@@ -27,6 +27,7 @@ PREPARE = (
     Needs(("excluded-value",), ("masks", "unite-masks"), "it describes the masks of these files"),
     Needs(("depth-unit", "depth-scale", "trust-depth"), ("depth",), "it describes the depth of these files"),
     Needs(("points",), ("layout=colmap", "layout=points"), "only a reconstruction has points"),
+    Needs(("model",), ("layout=colmap",), "only COLMAP leaves several models"),
     Excludes(
         ("source-rate",),
         tuple(f"layout={name}" for name in ("common", "endonerf", "scared", "servct", "tum")),

@@ -49,30 +49,27 @@ class ColmapModel(NamedTuple):
     points: dict[int, FloatArray]  # id -> (3,)
 
 
-def find_model(path: Path) -> Path | None:
-    """The folder of the model: the path or its sparse/0, sparse or colmap/sparse/0; None without a model."""
-    for folder in (path, path / "sparse" / "0", path / "sparse", path / "colmap" / "sparse" / "0"):
-        if any((folder / f"cameras{ending}").is_file() for ending in (".txt", ".bin")):
-            return folder
-    return None
+def registered_count(folder: Path) -> int:
+    """The number of registered pictures of a model. Raises InputError for a missing or damaged file."""
+    if (folder / "cameras.txt").exists():
+        return len(_image_lines(_found(folder / "images.txt")))
+    return _Bytes(_found(folder / "images.bin")).count(64)
 
 
 def read_model(folder: Path) -> ColmapModel:
-    """The model in a folder. Text files take precedence over binary files.
+    """The model in a folder. Text files take precedence over binary files; points3D may be missing.
 
     Raises:  InputError naming the file, and the line or entry that violates the format.
     """
     text = (folder / "cameras.txt").exists()
     ending = ".txt" if text else ".bin"
-    for name in ("images", "points3D"):
-        if not (folder / f"{name}{ending}").is_file():
-            raise InputError(f"{folder / (name + ending)}: file not found")
+    seen, cloud = _found(folder / f"images{ending}"), folder / f"points3D{ending}"
     if text:
-        cameras, images = _cameras_text(folder / "cameras.txt"), _images_text(folder / "images.txt")
-        points = _points_text(folder / "points3D.txt")
+        cameras, images = _cameras_text(folder / "cameras.txt"), _images_text(seen)
+        points = _points_text(cloud) if cloud.exists() else {}
     else:
-        cameras, images = _cameras_binary(folder / "cameras.bin"), _images_binary(folder / "images.bin")
-        points = _points_binary(folder / "points3D.bin")
+        cameras, images = _cameras_binary(folder / "cameras.bin"), _images_binary(seen)
+        points = _points_binary(cloud) if cloud.exists() else {}
     for image in images:
         if image.camera not in cameras:
             raise InputError(f"{folder}: image {image.name}: camera {image.camera} is not in cameras{ending}")
@@ -101,6 +98,13 @@ def _pose(values: list[float] | FloatArray, where: str) -> CameraPose:
     return CameraPose(Rotation.from_quat(numbers[[1, 2, 3, 0]]).as_matrix(), numbers[4:7])
 
 
+def _found(path: Path) -> Path:
+    """The path. Raises InputError if it is no file."""
+    if not path.is_file():
+        raise InputError(f"{path}: file not found")
+    return path
+
+
 def _lines(path: Path) -> list[tuple[int, str]]:
     lines = read_text(path, LARGEST_FILE).splitlines()
     return [(number, line) for number, line in enumerate(lines, 1) if not line.startswith("#")]
@@ -120,11 +124,17 @@ def _cameras_text(path: Path) -> dict[int, Intrinsics]:
     return found
 
 
-def _images_text(path: Path) -> list[ModelImage]:
-    lines, found = _lines(path), []
+def _image_lines(path: Path) -> list[tuple[int, str, str]]:
+    """Number and text of the line of every picture, and the line of its points."""
+    lines = _lines(path)
     while lines and not lines[-1][1].strip() and len(lines) % 2:
         lines.pop()  # trailing empty line; elsewhere, an empty line means no points
-    for (number, line), (_, seen) in zip(lines[::2], [*lines[1::2], (0, "")]):
+    return [(number, line, seen) for (number, line), (_, seen) in zip(lines[::2], [*lines[1::2], (0, "")])]
+
+
+def _images_text(path: Path) -> list[ModelImage]:
+    found = []
+    for number, line, seen in _image_lines(path):
         words, where = line.split(maxsplit=9), f"{path}: line {number}"
         try:
             values, camera, name = [float(word) for word in words[1:8]], int(words[8]), words[9].strip()

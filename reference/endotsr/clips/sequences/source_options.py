@@ -30,4 +30,5 @@ class SourceOptions:
     rate: float | None = None  # frames per second; the pictures then count as evenly spaced
     orientation: Literal["turned", "stored"] | None = None  # for a video that states a rotation
     points: Literal["interpolated", "sparse", "none"] = "interpolated"  # depth from points of a reconstruction
+    model: str = ""  # of several COLMAP models; "": the largest
     settings: SequenceConfig | None = None  # of a training, which choose the masks of the source and their polarity

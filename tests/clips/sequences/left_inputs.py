@@ -1,0 +1,122 @@
+"""Rows of `inputs_tried.py` about folders as other programs leave them: models, pairs, copies, trajectories, marks."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+import raw_sources
+from input_kinds import Row, close, prepare
+from raw_sources import scene_picture
+
+from endotsr.clips.sequences.sequence_file import read_sequence_file
+
+FRAMES = 6
+ALL = [scene_picture(i) for i in range(FRAMES)]
+
+
+def colmap(*words: str, binary: bool = False, change=lambda raw: None):
+    """A COLMAP model of six frames as the input of `prepare`."""
+
+    def make(folder: Path) -> list[str]:
+        raw_sources.colmap(folder / "raw", binary, FRAMES)
+        change(folder / "raw")
+        return prepare("raw", *words, camera=())(folder)
+
+    return make
+
+
+def part_of(model: Path, out: Path, first: int, last: int) -> None:
+    """A text model with some of the pictures of another one."""
+    shutil.copytree(model, out)
+    lines = (model / "images.txt").read_text().splitlines()
+    (out / "images.txt").write_text("\n".join(lines[2 * first : 2 * last]) + "\n")
+
+
+def two_models(raw: Path) -> None:
+    """sparse/0 has two pictures, sparse/1 four."""
+    (raw / "sparse/0").rename(raw / "whole")
+    part_of(raw / "whole", raw / "sparse/0", 0, 2)
+    part_of(raw / "whole", raw / "sparse/1", 2, FRAMES)
+    shutil.rmtree(raw / "whole")
+
+
+def one_unregistered(raw: Path) -> None:
+    (raw / "sparse/0").rename(raw / "whole")
+    part_of(raw / "whole", raw / "sparse/0", 0, FRAMES - 1)
+    shutil.rmtree(raw / "whole")
+
+
+def moved(pictures: str, model: str):
+    """Pictures and model in other places."""
+
+    def change(raw: Path) -> None:
+        (raw / "images").rename(raw / "p")
+        (raw / "sparse/0").rename(raw / "m")
+        shutil.rmtree(raw / "sparse")
+        for name, place in (("p", pictures), ("m", model)):
+            (raw / place).parent.mkdir(parents=True, exist_ok=True)
+            (raw / name).rename(raw / place)
+
+    return change
+
+
+def cameras(*factors: float):
+    """One camera per picture, with these factors of the focal length."""
+
+    def change(raw: Path) -> None:
+        model = raw / "sparse/0"
+        (model / "cameras.txt").write_text(
+            "".join(f"{k + 1} PINHOLE 64 48 {60 * f} {61 * f} 30.0 25.0\n" for k, f in enumerate(factors))
+        )
+        lines = (model / "images.txt").read_text().splitlines()
+        for k in range(0, len(lines), 2):
+            words = lines[k].split()
+            words[8] = str(k // 2 % len(factors) + 1)
+            lines[k] = " ".join(words)
+        (model / "images.txt").write_text("\n".join(lines) + "\n")
+
+    return change
+
+
+def both_sides(raw: Path) -> None:
+    """Pictures of left/ and right/ in one model: frames 0 to 2 of each."""
+    listed = (raw / "sparse/0/images.txt").read_text()
+    for k in range(FRAMES):
+        side, number = ("left", k) if k < FRAMES // 2 else ("right", k - FRAMES // 2)
+        name = f"{side}/{number:04d}.png"
+        (raw / "images" / side).mkdir(exist_ok=True)
+        (raw / f"images/frame{k:04d}.png").rename(raw / "images" / name)
+        listed = listed.replace(f"frame{k:04d}.png", name)
+    (raw / "sparse/0/images.txt").write_text(listed)
+
+
+def focal(value: float):
+    return lambda folder: np.isclose(read_sequence_file(folder / "o").camera.fx, value, atol=1e-3)
+
+
+COLMAP_ROWS = [
+    Row("COLMAP, two models, the first is the small one", colmap(change=two_models), "told",
+        "sparse/1 is read, the largest model; not read: sparse/0 (2 pictures)", close(ALL[2:], 0.01)),
+    Row("COLMAP, two models, --model", colmap("--model", "sparse/0", change=two_models), "told", "as stated",
+        close(ALL[:2], 0.01)),
+    Row("COLMAP, --model that is not there", colmap("--model", "3", change=two_models), "refused",
+        "allowed: sparse/0, sparse/1"),
+    Row("COLMAP, a picture that is not registered", colmap(change=one_unregistered), "told",
+        "1 pictures are not registered", close(ALL[:-1], 0.01)),
+    Row("COLMAP, dense/0/sparse", colmap(change=moved("dense/0/images", "dense/0/sparse")), "right", "",
+        close(ALL, 0.01)),
+    Row("COLMAP, input/ and distorted/", colmap(change=moved("input", "distorted/sparse/0")), "right", "",
+        close(ALL, 0.01)),
+    Row("COLMAP, no points3D", colmap(change=lambda raw: (raw / "sparse/0/points3D.txt").unlink()), "told",
+        "training needs depth", close(ALL, 0.01)),
+    Row("COLMAP, one camera per picture", colmap(change=cameras(1.0, 1.001, 0.999)), "told",
+        "one camera per picture", focal(60)),
+    Row("COLMAP, cameras that differ", colmap(change=cameras(1.0, 1.1)), "refused",
+        "the cameras of the pictures differ"),
+    Row("COLMAP, left and right in one model", colmap(change=both_sides), "told", "3 pictures of right/ not read",
+        close(ALL[:3], 0.01)),
+]  # fmt: skip
+LEFT_ROWS = [*COLMAP_ROWS]
