@@ -99,6 +99,7 @@ def extract(run: endotsr.Run) -> tuple[dict[str, NDArray], dict[str, NDArray], d
     pictures = {"frame": index, "before": around.before, "after": around.after}
     about = {
         "frame": index, "size": [camera.width, camera.height], "pixel": pixel, "gaussians": model.gaussians.count,
+        "growth": [entry["gaussians"] for entry in run.log[::100]],
         "seed": run.record["seed"], "iterations": run.record["iterations_done"], "date": date.today().isoformat(),
         "config": {part: msgspec.to_builtins(getattr(model.config, part)) for part in ("model", "raster", "loss")},
     }  # fmt: skip
