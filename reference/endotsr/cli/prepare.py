@@ -44,10 +44,10 @@ class PrepareOptions:
     """poses in TUM format: stamp tx ty tz qx qy qz qw"""
     trajectory_direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
     """direction of the poses"""
-    trajectory_axes: Literal["opencv", "opengl"] = "opencv"
-    """axes of the camera: opencv = x right, y down, z forward; opengl = x right, y up, z backward"""
+    trajectory_axes: Literal["opencv", "opengl", "llff"] | None = None
+    """axes of the camera: opencv = right, down, forward; opengl = right, up, backward; llff = down, right, backward"""
     trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None
-    """unit of the positions (TUM and StereoMIS: m)"""
+    """unit of the positions (TUM and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one per frame, or one file for all frames"""
     excluded_value: Literal["white", "black"] = "white"

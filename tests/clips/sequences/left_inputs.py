@@ -11,6 +11,7 @@ import raw_sources
 from input_kinds import Row, close, prepare
 from raw_sources import scene_picture
 
+from endotsr.cli.main import main
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 FRAMES = 6
@@ -119,4 +120,51 @@ COLMAP_ROWS = [
     Row("COLMAP, left and right in one model", colmap(change=both_sides), "told", "3 pictures of right/ not read",
         close(ALL[:3], 0.01)),
 ]  # fmt: skip
-LEFT_ROWS = [*COLMAP_ROWS]
+
+
+def moving(folder: Path) -> None:
+    """A clip of a moving scope; its poses stay in true.npy."""
+    size = ["--width", "160", "--height", "128", "--frames", "14"]
+    assert main(["simulate", "moving-camera", "--out", str(folder / "clip"), *size, "-q"]) == 0
+    np.save(folder / "true.npy", np.load(folder / "clip/poses_bounds.npy")[:, :15])
+
+
+def llff(folder: Path) -> None:
+    """The axes that LLFF's own tool writes: down, right, backward."""
+    moving(folder)
+    rows = np.load(folder / "clip/poses_bounds.npy")
+    for row in rows:
+        matrix = row[:15].reshape(3, 5)
+        right, up, back = matrix[:, :3].T.copy()
+        matrix[:, 0], matrix[:, 1], matrix[:, 2] = -up, right, back
+    np.save(folder / "clip/poses_bounds.npy", rows)
+
+
+def llff_prepared(*words: str):
+    def make(folder: Path) -> list[str]:
+        llff(folder)
+        return prepare("clip", *words, camera=())(folder)
+
+    return make
+
+
+def llff_trained(folder: Path) -> list[str]:
+    llff(folder)
+    return ["train", str(folder / "clip"), "--out", str(folder / "run"), "--iterations", "2", "-q"]
+
+
+def true_poses(folder: Path) -> bool:
+    """The written poses are those of the clip."""
+    written = np.array(read_sequence_file(folder / "o").poses.matrices).reshape(-1, 3, 4)
+    true = np.load(folder / "true.npy").reshape(-1, 3, 5)
+    turns = (true[:, :, :3] * [1.0, -1.0, -1.0]).transpose(0, 2, 1)
+    shifts = -np.einsum("nij,nj->ni", turns, true[:, :, 3])
+    return np.allclose(written, np.concatenate([turns, shifts[:, :, None]], axis=2), atol=1e-4)
+
+
+POSE_ROWS = [
+    Row("LLFF, axes of its own tool", llff_prepared(), "refused", "prepare --trajectory-axes llff"),
+    Row("LLFF, axes of its own tool, training", llff_trained, "refused", "prepare --trajectory-axes llff"),
+    Row("LLFF, --trajectory-axes llff", llff_prepared("--trajectory-axes", "llff"), "right", "", true_poses),
+]  # fmt: skip
+LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS]

@@ -20,7 +20,7 @@ PREPARE = (
     Needs(("distortion",), ("camera",), "the coefficients belong to the intrinsics that are stated with them"),
     Needs(
         ("trajectory-unit", "trajectory-direction", "trajectory-axes"),
-        ("trajectory", "layout=stereomis", "layout=tum"),
+        ("trajectory", *(f"layout={name}" for name in ("stereomis", "tum", "endonerf", "nerfstudio"))),
         "it describes the poses of this file",
     ),
     Excludes(("trajectory-axes",), ("layout=tum",), "the poses of this layout have the axes of OpenCV"),

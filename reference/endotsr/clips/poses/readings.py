@@ -27,11 +27,10 @@ class Reading(NamedTuple):
 
 REMEDIES = {
     "inverse": "the other direction: prepare --trajectory-direction, or [poses] direction in sequence.toml",
-    "OpenGL axes": "the other axes: prepare --trajectory-axes, or [poses] axes in sequence.toml",
-    "LLFF axes": "the columns of the rotations are down, right, back: write them as right, up, back"
-    " (columns 1, -0, 2 of each 3x5 matrix)",
-    "axes turned as from LLFF": "the columns of the rotations were turned as if they were LLFF's: undo it"
-    " (columns -1, 0, 2 of each 3x5 matrix)",
+    "OpenGL axes": "the other axes: prepare --trajectory-axes opengl or opencv, or [poses] axes in sequence.toml",
+    "LLFF axes": "the columns of the rotations are down, right, backward: prepare --trajectory-axes llff",
+    "axes turned as from LLFF": "the columns of the rotations were turned as if they were LLFF's: prepare"
+    " --trajectory-axes opengl; if the file itself was changed, undo it (columns -1, 0, 2 of each 3x5 matrix)",
     "quaternions w x y z": "write the quaternions in the order x y z w",
     "quaternions x y z w": "the quaternions were reordered once too often: write them as they were",
     "unit x 1000": "a unit 1000 times as long: prepare --trajectory-unit, or unit in sequence.toml",

@@ -1,9 +1,9 @@
 """Conversion between LLFF pose files and cameras.
 
 A row is a row-major 3x5 matrix and two bounds: [R | t | (H, W, f)], near, far. The columns of R are camera-to-world
-axes with x right, y up, z backward. They become OpenCV axes as [c0, -c1, -c2], as in published loaders of this format;
-for identical static poses, any rotation is only a choice of world axes. Both axes have one focal length, and the
-principal point is the image centre, (W/2, H/2) with pixel edges at integers.
+axes. Published loaders of endoscopic clips take them as x right, y up, z backward, which is the default here; LLFF's
+own tool writes down, right, backward. For identical static poses, any rotation is only a choice of world axes. Both
+axes have one focal length, and the principal point is the image centre, (W/2, H/2) with pixel edges at integers.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import AXES, Intrinsics, pose_of
+from endotsr.clips.sequences.camera import AXES, Intrinsics, pose_of, scene_factor
 from endotsr.clips.sequences.clip import REST, rests
 from endotsr.clips.sequences.depth_files import read_npy
 from endotsr.errors import InputError
@@ -60,7 +60,20 @@ class RowCameras(NamedTuple):
     pose_faults: dict[int, str]
 
 
-def cameras_of_rows(rows: NDArray[np.float64], width: int, height: int, path: Path) -> RowCameras:
+class RowConvention(NamedTuple):
+    """What the numbers of a row mean."""
+
+    axes: str = "opengl"  # of the camera, a key of `AXES`
+    direction: str = "camera_to_world"
+    unit: str = "mm"  # of the positions
+
+
+OF_CLIPS = RowConvention()  # as published loaders of endoscopic clips read them
+
+
+def cameras_of_rows(
+    rows: NDArray[np.float64], width: int, height: int, path: Path, convention: RowConvention = OF_CLIPS
+) -> RowCameras:
     """The cameras of the rows (n, 17).
 
     width, height  size of the image files, pixels
@@ -74,7 +87,7 @@ def cameras_of_rows(rows: NDArray[np.float64], width: int, height: int, path: Pa
     faults = {}
     for i, row in enumerate(rows):
         try:
-            poses.append(_pose(row, (width, height, focal), f"{path}: frame {i}"))
+            poses.append(_pose(row, (width, height, focal), f"{path}: frame {i}", convention))
         except InputError as error:
             poses.append(None)
             faults[i] = str(error)
@@ -85,7 +98,9 @@ def cameras_of_rows(rows: NDArray[np.float64], width: int, height: int, path: Pa
     return RowCameras(intrinsics, None, known[0], {})
 
 
-def _pose(row: NDArray[np.float64], camera: tuple[int, int, float], where: str) -> CameraPose:
+def _pose(
+    row: NDArray[np.float64], camera: tuple[int, int, float], where: str, convention: RowConvention
+) -> CameraPose:
     width, height, usual = camera
     matrix = row[:15].reshape(3, 5)
     stated_height, stated_width, focal = matrix[:, 4]
@@ -99,7 +114,8 @@ def _pose(row: NDArray[np.float64], camera: tuple[int, int, float], where: str) 
         raise InputError(f"{where}: focal length {focal:g}, must be positive")
     if abs(focal - usual) > SAME_FOCAL * usual:
         raise InputError(f"{where}: focal length {focal:g}, of the first frame {usual:g}; use one for all frames")
-    pose = pose_of(matrix[:, :3], matrix[:, 3], "camera_to_world", "opengl", where)
+    shift = matrix[:, 3] * scene_factor(convention.unit)
+    pose = pose_of(matrix[:, :3], shift, convention.direction, convention.axes, where)
     return pose._replace(rotation=pose.rotation + 0.0)  # + 0 turns -0 into 0
 
 

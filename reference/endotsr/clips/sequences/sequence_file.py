@@ -27,7 +27,7 @@
 
     [poses]                            # absent: static camera at the origin
     direction = "world_to_camera"      # or "camera_to_world"
-    axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
+    axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward; or "llff"
     origin = "given"                   # or, in words, the program that estimated them
     interpolated = []                       # frames whose pose is interpolated between others
     matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers per frame
@@ -99,7 +99,7 @@ class PoseEntry(Section, frozen=True, kw_only=True):
     """One pose per frame."""
 
     direction: Literal["world_to_camera", "camera_to_world"] = "world_to_camera"
-    axes: Literal["opencv", "opengl"] = "opencv"
+    axes: Literal["opencv", "opengl", "llff"] = "opencv"
     origin: str = "given"
     interpolated: list[int] = msgspec.field(default_factory=list)
     matrices: list[list[float]]

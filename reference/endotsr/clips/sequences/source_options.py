@@ -19,7 +19,7 @@ class SourceOptions:
     baseline: float | None = None  # of a rectified pair, in `unit`
     trajectory: Path | None = None  # TUM: time or frame, position, quaternion x y z w
     direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
-    axes: Literal["opencv", "opengl"] = "opencv"
+    axes: Literal["opencv", "opengl", "llff"] | None = None  # of the camera; None: those of the layout
     trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None  # None: the unit of the layout
     masks: Path | None = None
     excluded_value: Literal["white", "black"] = "white"

@@ -201,7 +201,7 @@ def stated_poses(
     if options.trajectory is None:
         return None, []
     unit = options.trajectory_unit or "m"
-    trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
+    trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes or "opencv")
     poses, how = poses_of_frames(trajectory, count, rate, times)
     return poses, [f"{options.trajectory.name}: {how}; positions in {unit}"]
 

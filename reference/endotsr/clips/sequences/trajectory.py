@@ -39,7 +39,7 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
 
     unit        of the positions: um, mm, cm, m or arbitrary
     direction   camera_to_world (positions of the camera) or world_to_camera
-    axes        of the camera: opencv (x right, y down, z forward) or opengl (x right, y up, z backward)
+    axes        of the camera, a key of `AXES`
 
     Raises:  InputError naming the line and the reason.
     """

@@ -9,6 +9,7 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
@@ -19,6 +20,7 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 
 SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
+COMMON = "common"  # the layout that `prepare` writes once the poses agree with the pictures
 MOST = 5  # notes of one kind
 
 
@@ -38,6 +40,10 @@ def guarded(
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
     found += depth_findings(depth, str(clip.depth.files[0].parent), clip.arbitrary, near, clip.depth.assumed)
     found += camera_findings(sequence.cameras, usual_depth(depth), folder)
+    if (
+        clip.layout != COMMON and not sequence.static_camera and not clip.pose_faults
+    ):  # `prepare` has held the poses of the others
+        found += agreement_findings(agreement_of(clip, clip.cameras(range(clip.count))), str(clip.stated_in))
     return notes_of([finding for finding in found if finding.code not in SAID_ALREADY])
 
 

@@ -12,12 +12,23 @@ from pathlib import Path
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.poses import POSE_FILES, cameras_of_rows, find_pose_file, read_pose_rows
+from endotsr.clips.sequences.poses import (
+    POSE_FILES,
+    RowConvention,
+    cameras_of_rows,
+    find_pose_file,
+    read_pose_rows,
+)
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, MASKS, RIGHT
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import size_of, with_stated
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
+
+AXES_TAKEN = (
+    "poses: axes right, up, backward, as EndoNeRF clips have them; for those of LLFF's own tool, down, right, backward:"
+    " prepare --trajectory-axes llff"
+)
 
 
 def recognises(path: Path) -> bool:
@@ -41,7 +52,8 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
     where = next((path / name for name in POSE_FILES if (path / name).exists()), path)
     rows = folder.tried(lambda: read_pose_rows(find_pose_file(path), len(folder.images)), "cameras", where)
     size = folder.size = _size(folder) or (None if rows is None else (int(rows[0, 9]), int(rows[0, 4])))
-    found = None if rows is None or size is None else cameras_of_rows(rows, *size, where)
+    convention = RowConvention(options.axes or "opengl", options.direction, options.trajectory_unit or "mm")
+    found = None if rows is None or size is None else cameras_of_rows(rows, *size, where, convention)
     clip = Clip(
         layout="endonerf",
         where=path,
@@ -54,6 +66,7 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
         unit="mm",
         baseline=options.baseline,
         rate=options.rate,
+        notes=[AXES_TAKEN] if found is not None and found.poses is not None and options.axes is None else [],
         stated_in=where,
         faults=folder.faults,
         **({} if found is None else found._asdict()),

@@ -1,8 +1,8 @@
 """nerfstudio, instant-ngp and Blender: `transforms.json` or `transforms_train.json`.
 
 The file holds intrinsics, camera-to-world matrices and names of pictures. Camera axes are OpenGL's, pixel edges are at
-integers, masks are black on excluded pixels, and depth files store thousandths of the unknown unit of the matrices.
-`FIELDS` lists all fields.
+integers, masks are black on excluded pixels, and depth files store thousandths of the unit of the matrices, which no
+field states. `FIELDS` lists all fields.
 """
 
 from pathlib import Path
@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, shared_intrinsics
+from endotsr.clips.sequences.camera import (
+    ARBITRARY,
+    Intrinsics,
+    checked_intrinsics,
+    pose_of,
+    scene_factor,
+    shared_intrinsics,
+)
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import time_order
@@ -142,7 +149,9 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
     if masks is None and any(masked):
         masks = masks_of(masked, "black", width, height)
-    depth = depth_of(planes, DEPTH_STEP) if any(planes) else None
+    unit = options.trajectory_unit or ARBITRARY
+    factor = scene_factor(unit)
+    depth = depth_of(planes, DEPTH_STEP * factor) if any(planes) else None
     cloud = None if depth is not None else _cloud(folder, data, file, notes)
     notes += [found.line for found in gap_findings(files)]
     if beside := [name for name in OTHERS if file.name == FILES[1] and (folder / name).is_file()]:
@@ -154,13 +163,13 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         pictures=pictures_from_files(files, []),
         masks=masks,
         depth=depth,
-        points=None if cloud is None else lambda i: cloud,
-        unit=ARBITRARY,
+        points=None if cloud is None else lambda i: cloud * factor,
+        unit=ARBITRARY if unit == ARBITRARY else "mm",
         intrinsics=shared_intrinsics(cameras, file, notes),
-        poses=[_pose(entry, f"{file}: frame {i}: transform_matrix") for i, entry in enumerate(entries)],
+        poses=[_pose(entry, options, factor, f"{file}: frame {i}") for i, entry in enumerate(entries)],
         rate=options.rate,
         times=None if times is None else np.sort(times).astype(np.float64),
-        notes=[f"{file.name}: {len(files)} frames, unit of lengths unknown", *notes],
+        notes=[f"{file.name}: {len(files)} frames, unit of lengths {'unknown' if unit == ARBITRARY else unit}", *notes],
     )
 
 
@@ -218,9 +227,10 @@ def _picture(folder: Path, name: Any, where: str) -> Path:
     return next((file for file in found if file.is_file()), path)
 
 
-def _pose(entry: Keys, where: str) -> CameraPose:
+def _pose(entry: Keys, options: SourceOptions, factor: float, where: str) -> CameraPose:
+    where += ": transform_matrix"
     stored = matrix(entry.get("transform_matrix"), where, (4, 4), (3, 4))
-    return pose_of(stored[:3, :3], stored[:3, 3], "camera_to_world", "opengl", where)
+    return pose_of(stored[:3, :3], stored[:3, 3] * factor, options.direction, options.axes or "opengl", where)
 
 
 LAYOUT = Layout(
