@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import endotsr
+from endotsr.clips.effects.inspect import inspect_sequence
+from endotsr.clips.effects.plan import apply_plan, make_plan
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 from endotsr.method.splatting.render import RenderSaved, Scene, render_forward
@@ -33,6 +35,7 @@ from endotsr.training.runs.files import write_json
 from endotsr.training.scene.gaussians import Gaussians, arrays
 from endotsr.untrusted.writing import replace_file
 from pages.full_size.page import noise_of
+from pages.store.marks import read_json
 
 FOLDER = Path(__file__).parents[3] / "notebooks" / "running_clip"
 BLOCK = 16  # pixels of the side of the block with the largest error
@@ -76,6 +79,18 @@ def near(gaussians: Gaussians, saved: RenderSaved, pixel: tuple[int, int]) -> di
     return {name: np.ascontiguousarray(array[..., chosen]) for name, array in arrays(gaussians).items()}
 
 
+def inspected(run: endotsr.Run) -> dict[str, Any]:
+    """Verdicts of the tests of the clip, its rates, the changes of the plan, and the effects that were simulated."""
+    inspection = inspect_sequence(run.sequence)
+    truth = Path(run.record["input"]["source"]) / "truth" / "truth.json"
+    return {
+        "verdicts": {name: verdict.kind for name, verdict in inspection.verdicts.items()},
+        "cycles": [line.cycles for line in inspection.lines],
+        "plan": apply_plan(make_plan(inspection, run.config), run.config)[1],
+        "effects": read_json(truth, "endotsr simulate pulling --out CLIP")["effects"],
+    }
+
+
 def extract(run: endotsr.Run) -> tuple[dict[str, NDArray], dict[str, NDArray], dict[str, NDArray], dict[str, Any]]:
     """(view, gaussians, pictures, about) of a run."""
     sequence, model = run.sequence, run.model
@@ -101,6 +116,7 @@ def extract(run: endotsr.Run) -> tuple[dict[str, NDArray], dict[str, NDArray], d
         "frame": index, "size": [camera.width, camera.height], "pixel": pixel, "gaussians": model.gaussians.count,
         "growth": [entry["gaussians"] for entry in run.log[::100]],
         "seed": run.record["seed"], "iterations": run.record["iterations_done"], "date": date.today().isoformat(),
+        "inspection": inspected(run),
         "config": {part: msgspec.to_builtins(getattr(model.config, part)) for part in ("model", "raster", "loss")},
     }  # fmt: skip
     return view, near(model.gaussians, saved, pixel), {n: sequence.images[k] for n, k in pictures.items()}, about
