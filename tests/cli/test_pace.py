@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endotsr.cli.parts.options import base_settings
-from endotsr.clips.sequences.checks.cost import at_start, work_left
+from endotsr.clips.sequences.checks.duration import at_start, work_left
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PRESETS, QUICK, lengthened, with_settings
@@ -35,13 +35,16 @@ def test_the_ends_are_the_presets():
 
 @pytest.mark.parametrize("minutes", [1.0, 3.0, 10.0, 40.0])
 def test_the_planned_time_is_the_wish(still, minutes):
-    config = paced_for(minutes, still, SHARP, unit=0.12)
+    config = paced_for(minutes, still, SHARP, unit=0.12, threads=1)
     planned = 0.12 * work_left(config, still.width * still.height, at_start(config))
+    gaps, times, size = 8, 12, 64 * 48 / (640 * 512)  # of training frames; two gaps have a frame between
+    assert np.diff(still.train_index).tolist() == [2, 1, 1, 1, 1, 1, 1, 2]
+    planned += 0.12 * size * (0.5 * gaps + 0.8 * times) * (1.25 if config.training.coarse_start else 1.0)
     assert 0.97 * 60 * minutes < planned <= 60 * minutes
 
 
 def test_more_minutes_are_never_less_of_anything(still):
-    found = [paced_for(m, still, SHARP, unit=0.12) for m in np.geomspace(0.5, 60, 9)]
+    found = [paced_for(m, still, SHARP, unit=0.12, threads=1) for m in np.geomspace(0.5, 60, 9)]
     for name in ("training.iterations", "density.maximum", "initialisation.first_frame_points"):
         section, key = name.split(".")
         values = [getattr(getattr(config, section), key) for config in found]
@@ -50,7 +53,7 @@ def test_more_minutes_are_never_less_of_anything(still):
 
 def test_too_few_minutes_are_refused_with_the_least(still):
     with pytest.raises(InputError, match=r"0\.001 minutes are not allowed: the shortest training of this clip takes"):
-        paced_for(0.001, still, SHARP, unit=0.12)
+        paced_for(0.001, still, SHARP, unit=0.12, threads=1)
 
 
 def test_the_machine_is_timed_without_a_trace(still):

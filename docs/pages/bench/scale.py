@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
+from endotsr.clips.sequences.checks.duration import expected_frames
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.results.report.style import BLUE, GREEN, ORANGE, legend, name_axes, new_figure, plain_axes, save
@@ -28,7 +29,7 @@ def estimated(preset: str, frames: int, width: int, height: int) -> tuple[int, C
     """Iterations of a run with a preset, and its cost."""
     config = lengthened(PRESETS[preset], len(every_eighth(frames)[0]))
     config = with_settings(config, sequence={"memory": MEMORY})
-    return config.training.iterations, estimated_cost(frames, width, height, config)
+    return config.training.iterations, estimated_cost(expected_frames(frames, config), width, height, config)
 
 
 def table() -> str:

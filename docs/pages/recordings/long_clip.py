@@ -25,6 +25,7 @@ import numpy as np
 
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.checks.cost import estimated_cost
+from endotsr.clips.sequences.checks.duration import expected_frames
 from endotsr.config import config_from_dict, with_iterations
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
@@ -80,7 +81,8 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
         found = peaks([sys.executable, "-m", "endotsr", *words, *limit])
         metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
     config = config_from_dict({"preset": options.preset, "sequence": {"memory": options.memory}})
-    cost = estimated_cost(options.frames, width, height, with_iterations(config, iterations))
+    frames = expected_frames(options.frames, config)
+    cost = estimated_cost(frames, width, height, with_iterations(config, iterations))
     about = {"frames": options.frames, "width": width, "height": height, "preset": options.preset}
     return about | {
         "memory": options.memory,

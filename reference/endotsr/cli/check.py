@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
+
+if TYPE_CHECKING:
+    from endotsr.clips.sequences.checks.duration import Speed
 
 
 @dataclass
@@ -33,19 +36,21 @@ def run(words: list[str]) -> int:
     options = parse(CheckOptions, words, "check", CheckOptions(settings=base))
     if not options.sequence:
         raise InputError("check: SEQUENCE is missing: a sequence folder")
+    from endotsr.cli.parts.waiting import in_words
     from endotsr.clips.sequences.checks.check import check_sequence
     from endotsr.results.report.check_page import check_page
     from endotsr.training.runs.files import write_json
     from endotsr.untrusted.writing import replace_text
 
-    checked = check_sequence(Path(options.sequence), options.settings)
+    checked = check_sequence(Path(options.sequence), options.settings, _speed(options.settings))
     for finding in checked.findings:
         print(f"{finding.level}: {finding.code}: {finding.line}")
     cost = checked.facts.get("cost")
     if cost:
         print(
             f"{checked.facts['frames']} frames of {checked.facts['width']}x{checked.facts['height']}: training needs"
-            f" about {cost['total_bytes'] / 1e9:.1f} GB and {cost['minutes']:.0f} minutes on two cores,"
+            f" about {cost['total_bytes'] / 1e9:.1f} GB and {in_words(60 * cost['command_minutes'])} with the"
+            f" evaluation, {in_words(60 * cost['minutes'])} of them for the iterations,"
             f" and ends with about {cost['gaussians']} Gaussians"
         )
     print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")
@@ -55,3 +60,13 @@ def run(words: list[str]) -> int:
     if options.html is not None:
         replace_text(options.html, check_page(checked))
     return 1 if checked.refused else 0
+
+
+def _speed(settings: Config) -> "Speed":
+    """The speed of the last training on this machine with the threads of the settings, else the assumed one."""
+    from endotsr.clips.sequences.checks.duration import Speed, assumed_unit
+    from endotsr.method.kernels.threads import use_threads
+    from endotsr.training.runs.speed import remembered_unit
+
+    threads = use_threads(settings.training.threads)
+    return Speed(remembered_unit(threads) or assumed_unit(threads), threads)

@@ -175,7 +175,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     threads = use_threads(config.training.threads)
     config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
     if options.minutes is not None:
-        config, schedule_note = _of_minutes(options, sequence, config)
+        config, schedule_note = _of_minutes(options, sequence, config, threads)
     found: RunRecord = {}
     lines = ["effects: everything; `--effects auto` trains only the components that the clip needs"]
     if options.effects == "auto":
@@ -185,13 +185,14 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     _print_sequence(source, sequence)
     for line in lines:
         print(line)
-    print("starting", flush=True)
-    shown = _progress(RunFolder(options.out), sequence, config)
+    shown = _progress(RunFolder(options.out), sequence, config, options)
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads)
-    return train_new_run(options.out, {**record, **found}, sequence, config, shown), sequence
+    folder = train_new_run(options.out, {**record, **found}, sequence, config, shown)
+    shown.remember_speed()
+    return folder, sequence
 
 
-def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> tuple[Config, str]:
+def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.runs.pace import paced_for, seconds_of_unit
@@ -199,7 +200,7 @@ def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> 
     assert options.minutes is not None
     compile_ahead(config, print)
     unit = seconds_of_unit(sequence, config)
-    found = paced_for(options.minutes, sequence, config, unit)
+    found = paced_for(options.minutes, sequence, config, unit, threads)
     return found, (
         f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * unit:.0f} ms: "
         f"{found.training.iterations} iterations, {found.density.maximum} Gaussians"
@@ -226,16 +227,27 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     if asked.training.iterations > kept.training.iterations:
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
-    resume_run(folder, sequence, threads, _progress(folder, sequence, folder.config()))
+    resume_run(folder, sequence, threads, _progress(folder, sequence, folder.config(), options))
     return folder, sequence
 
 
-def _progress(folder: RunFolder, sequence: "Sequence", config: Config) -> Progress:
-    """The progress of a training, on standard error and as a page in its folder."""
-    from endotsr.results.report.live_page import LIVE_PAGE, LivePage
+def _progress(folder: RunFolder, sequence: "Sequence", config: Config, options: TrainOptions) -> Progress:
+    """The progress of a training, on standard error and as a page in its folder; prints what the command will take."""
+    import numba
 
+    from endotsr.cli.parts.waiting import waiting_line
+    from endotsr.clips.sequences.checks.duration import Plan, frames_of
+    from endotsr.results.evaluation.lpips import load_lpips_weights
+    from endotsr.results.report.live_page import LIVE_PAGE, LivePage
+    from endotsr.training.fitting.compile_ahead import done_before
+    from endotsr.training.runs.speed import remembered_unit
+
+    frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
+    perceived = load_lpips_weights(options.lpips) is not None if options.evaluate else None
+    plan = Plan(config, frames, sequence.width * sequence.height, threads, perceived)
+    print(waiting_line(plan, remembered_unit(threads), done_before(config).exists()))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
-    return Progress(config, sequence.width * sequence.height, LivePage(folder, sequence, config))
+    return Progress(plan, LivePage(folder, sequence, config))
 
 
 def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:

@@ -15,7 +15,8 @@ from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.checks.cost import Standing, estimated_cost, work_left
+from endotsr.clips.sequences.checks.cost import estimated_cost
+from endotsr.clips.sequences.checks.duration import Standing, expected_frames, work_left
 from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
 from endotsr.clips.sequences.checks.masks import MaskSteps, mask_findings
 from endotsr.clips.sequences.frame_store import FrameStore
@@ -27,6 +28,7 @@ from endotsr.config import PAPER, SequenceConfig, config_from_dict
 from endotsr.errors import InputError
 
 FRAMES = 9
+SIXTY = expected_frames(60, PAPER)
 
 
 @pytest.fixture(scope="module")
@@ -349,7 +351,8 @@ def test_an_inverted_picture_of_depth_is_found_by_the_stereo_pair(tmp_path):
 
 def test_cost_grows_with_the_clip_up_to_the_limit():
     def of(frames, preset="paper", memory=8.0):
-        return estimated_cost(frames, 640, 512, config_from_dict({"preset": preset, "sequence": {"memory": memory}}))
+        config = config_from_dict({"preset": preset, "sequence": {"memory": memory}})
+        return estimated_cost(expected_frames(frames, config), 640, 512, config)
 
     small, large = of(60), of(120)
     assert large.sequence_bytes == pytest.approx(2 * small.sequence_bytes) and not large.file_bytes
@@ -362,7 +365,7 @@ def test_cost_grows_with_the_clip_up_to_the_limit():
 
 def test_a_budget_decides_gaussians_and_minutes():
     wide, narrow = (
-        estimated_cost(60, 640, 512, config_from_dict({"preset": "quick", "density": {"maximum": n}}))
+        estimated_cost(SIXTY, 640, 512, config_from_dict({"preset": "quick", "density": {"maximum": n}}))
         for n in (60_000, 22_000)
     )
     assert (wide.gaussians, narrow.gaussians) == (60_000, 22_000)

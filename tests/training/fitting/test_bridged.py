@@ -122,6 +122,17 @@ def wait_for(condition):
     assert condition()
 
 
+def test_the_wait_for_targets_is_counted_once_for_each_gap(sequence):
+    targets, clock = BridgedTargets(sequence, DEMO), time.perf_counter
+    first = int(sequence.train_index[0]), int(sequence.train_index[1])
+    began = clock()
+    targets.observed(BridgedTime(*first, 0.5))
+    whole, found = clock() - began, targets.making
+    assert found.gaps == 1 and 0.3 * whole < found.waited <= whole and found.beside == 0
+    targets.observed(BridgedTime(*first, 0.5))
+    assert targets.making == found
+
+
 @needs_two_threads
 def test_targets_computed_ahead_have_the_same_bits(sequence):
     numba.set_num_threads(2)
@@ -143,6 +154,7 @@ def test_nothing_is_computed_ahead_that_there_is_no_room_for(sequence):
     with TargetsAhead() as ahead:
         ahead.follow(limited)
         wait_for(lambda: not ahead._thread.is_alive())
+    assert limited.making.beside > 0 == limited.making.waited and limited.making.gaps >= len(limited.stored)
     kept = [(int(a), int(b)) for a, b in itertools.pairwise(sequence.train_index) if (a, b) in limited.stored]
     assert kept and kept[0] == (0, 2) and len(kept) < len(sequence.train_index) - 1
 

@@ -1,17 +1,16 @@
 """Progress on standard error (a bar on a terminal, lines elsewhere) and on the page of a training."""
 
 import math
-import statistics
 import sys
 import time
-from collections import deque
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from endotsr.clips.sequences.checks.cost import Standing, gaussians_at_end, iteration_work, work_left
-from endotsr.config import Config
+import numpy as np
+
+from endotsr.clips.sequences.checks.duration import Plan, Standing, estimated_seconds, expected_gaussians
 from endotsr.results.report.tables import duration
 from endotsr.training.fitting.records import LogEntry
+from endotsr.training.runs.time_left import TimeLeft
 
 if TYPE_CHECKING:
     from endotsr.results.report.live_page import LivePage
@@ -19,26 +18,24 @@ if TYPE_CHECKING:
 
 QUIET_SECONDS = 30.0  # between lines if standard error is no terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the postfix contains the time left
-LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations for the time left
 FORECAST_AFTER = 30  # iterations of this process
-SPIKE = 10.0  # medians; longer iterations compiled code and are left out
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR: every tenth iteration)
 
 
 class Progress:
     """Loss and PSNR (running means over views), number of Gaussians and time left.
 
-    config   settings of the training, with a fixed length
-    pixels   per frame
+    plan     settings of the training, with a fixed length, and its frames
     page     receives the same events, and the time left
     """
 
-    def __init__(self, config: Config, pixels: int, page: "LivePage | None" = None) -> None:
-        self._config, self._pixels, self._page = config, pixels, page
-        self._total, self._done, self._training = config.training.iterations, 0, None
+    def __init__(self, plan: Plan, page: "LivePage | None" = None) -> None:
+        self._plan, self._page = plan, page
+        self._total, self._done = plan.config.training.iterations, 0
+        self._training: TrainingState | None = None
         self._said = self._ended = time.monotonic()
         self._means: dict[str, float] = {}
-        self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)
+        self.time_left = TimeLeft(plan)
         self._bar: Any = None
 
     def begin(self, state: "TrainingState") -> None:
@@ -66,17 +63,15 @@ class Progress:
             if value is not None and math.isfinite(value):
                 mean = self._means.get(name)
                 self._means[name] = value if mean is None else memory * mean + (1 - memory) * value
-        now = time.monotonic()
-        standing = self._standing(entry)
-        seen = self._pixels / 4 if standing.coarse else self._pixels
-        work = iteration_work(standing.gaussians, seen, standing.iteration / self._total)
-        self._seconds.append((now - self._ended) / float(work))
+        now, state = time.monotonic(), self._training
+        assert state is not None
+        standing = Standing(entry["iteration"], entry.get("gaussians", 0), state.coarse)
+        self.time_left.add(standing, now - self._ended, state.making)
         self._ended, self._done = now, self._done + 1
         if self._page is not None:
             self._page.update(entry, lambda: self._left(standing))
-        if self._done == FORECAST_AFTER and (left := self._left(standing)) is not None:
-            count = gaussians_at_end(self._config)
-            self.say(f"forecast: {left} of training left, about {count} Gaussians at the end")
+        if self._done == FORECAST_AFTER and (forecast := self._forecast(standing)):
+            self.say(forecast)
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
@@ -88,6 +83,12 @@ class Progress:
                 file=sys.stderr,
                 flush=True,
             )
+
+    def remember_speed(self) -> None:
+        """Store the speed of this machine for later forecasts, if the training was long enough to tell."""
+        from endotsr.training.runs.speed import remember_unit
+
+        remember_unit(self._plan.threads, self.time_left.unit, self._done, self._plan.pixels)
 
     def say(self, message: str) -> None:
         """Print a line without breaking the bar."""
@@ -108,24 +109,19 @@ class Progress:
         time_left = "time left unknown" if left is None else f"{left} left"
         return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left}"
 
-    def _standing(self, entry: LogEntry) -> Standing:
-        coarse = self._training is not None and self._training.coarse
-        return Standing(entry["iteration"], entry.get("gaussians", 0), coarse)
-
     def _left(self, standing: Standing) -> str | None:
-        unit = unit_seconds(self._seconds)
-        return None if unit is None else duration(unit * work_left(self._config, self._pixels, standing))
+        seconds = self.time_left.seconds(standing)
+        return None if seconds is None else duration(seconds)
 
-
-def unit_seconds(seconds: Sequence[float]) -> float | None:
-    """Mean seconds per unit of work, without iterations that compiled code; None = too few iterations.
-
-    seconds   of the latest iterations, each divided by its work
-    """
-    if len(seconds) < LEAST_ITERATIONS:
-        return None
-    limit = SPIKE * statistics.median(seconds)
-    return statistics.fmean(s for s in seconds if s <= limit)
+    def _forecast(self, standing: Standing) -> str:
+        """The line after the first timed iterations; empty without a time."""
+        left, unit = self._left(standing), self.time_left.unit
+        if left is None or unit is None:
+            return ""
+        evaluation = estimated_seconds(self._plan, unit).evaluation
+        then = f", then {duration(evaluation)} of evaluation" if evaluation else ""
+        count = expected_gaussians(self._plan.config, standing, np.array([self._total]))[0]
+        return f"forecast: {left} of training left{then}; about {count:.0f} Gaussians at the end"
 
 
 class StepBar:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from endotsr.clips.sequences.checks.cost import estimated_cost
+from endotsr.clips.sequences.checks.duration import expected_frames
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config, with_settings
 from endotsr.errors import InputError
@@ -83,7 +84,7 @@ def outcomes_at(
 def run_bytes(size: Size, config: Config) -> float:
     """Estimated memory of one run, bytes."""
     read = with_settings(config, sequence={"scale": 1.0})
-    return MARGIN * estimated_cost(size.frames, size.width, size.height, read).total_bytes
+    return MARGIN * estimated_cost(expected_frames(size.frames, read), size.width, size.height, read).total_bytes
 
 
 def capacity(

@@ -7,6 +7,7 @@ second thread before they are needed. This module computes no loss.
 
 import itertools
 import threading
+import time
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -32,6 +33,7 @@ from endotsr.training.fitting.packed import (
     unpacked_mask,
     unpacked_supports,
 )
+from endotsr.training.fitting.records import NOTHING_MADE, Making
 from endotsr.training.fitting.sampling import BridgedTime
 
 
@@ -52,26 +54,37 @@ class BridgedTargets:
     sequence: Sequence
     config: Config
     stored: Kept[tuple[int, int], dict[BridgedTime, Stored]] = field(default_factory=Kept)  # by gap
-    lock: threading.Lock = field(default_factory=threading.Lock)  # of `stored`
+    lock: threading.Lock = field(default_factory=threading.Lock)  # of `stored` and `making`
+    making: Making = NOTHING_MADE
 
     def observed(self, at: BridgedTime) -> tuple[Targets, Camera]:
         """The targets at a bridged time, in the precision of the training, and the camera there."""
-        made = self.of_gap(at.earlier, at.later)[at]
+        made = self.of_gap(at.earlier, at.later, waiting=True)[at]
         mask, precision = unpacked_mask(made.mask), self.config.training.precision
         depth = None if made.depth is None else unpacked_depth(made.depth, precision)
         rule = self.config.loss.upsampling
         supports = None if made.supports is None else unpacked_supports(made.supports, mask, rule)
         return targets_of(stored_target(made.image, STEPS, mask, precision), depth, supports, self.config), made.camera
 
-    def of_gap(self, earlier: int, later: int) -> dict[BridgedTime, Stored]:
-        """The targets of all times of a gap, from any thread. Two threads may compute the same gap, with equal bits."""
-        gap = (earlier, later)
+    def of_gap(self, earlier: int, later: int, waiting: bool = False) -> dict[BridgedTime, Stored]:
+        """The targets of all times of a gap, from any thread. Two threads may compute the same gap, with equal bits.
+
+        waiting   whether the training waits for them
+        """
+        gap, clock = (earlier, later), time.perf_counter if waiting else time.thread_time
         with self.lock:
             if gap in self.stored:
                 return self.stored[gap]
+        began = clock()
         made = self._made(earlier, later)
         with self.lock:
+            self._count(clock() - began, waiting)
             return self.stored.get(gap, lambda: made)
+
+    def _count(self, seconds: float, waiting: bool) -> None:
+        """Add one gap to `making`."""
+        gaps, waited, beside = self.making
+        self.making = Making(gaps + 1, waited + seconds * waiting, beside + seconds * (not waiting))
 
     def _made(self, earlier: int, later: int) -> dict[BridgedTime, Stored]:
         """The targets of all times of a gap."""

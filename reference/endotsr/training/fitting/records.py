@@ -1,6 +1,6 @@
-"""Records written by a training: log entries and checkpoint headers."""
+"""Records of a training: log entries, checkpoint headers, and the work on targets."""
 
-from typing import Any, Required, TypedDict
+from typing import Any, NamedTuple, Required, TypedDict
 
 
 class LogEntry(TypedDict, total=False):
@@ -18,6 +18,17 @@ class LogEntry(TypedDict, total=False):
     psnr: float | None  # dB, over the tissue of the view; None for a perfect render or without tissue
     gaussians: Required[int]
     seconds: float
+
+
+class Making(NamedTuple):
+    """The work on targets between the frames up to now, for forecasts; no result depends on it."""
+
+    gaps: int = 0  # computed
+    waited: float = 0.0  # seconds that the training waited for them
+    beside: float = 0.0  # seconds of processor time in the second thread
+
+
+NOTHING_MADE = Making()
 
 
 class RngState(TypedDict):

@@ -1,8 +1,9 @@
 """The state of a training, and its constants.
 
 `TrainingState` has everything that changes between iterations. A checkpoint stores it without `ahead` and `drawn`,
-which are recomputed. Everything else (targets, atoms, rates) is a function of the state, the sequence and the
-configuration; a resumed run is therefore bitwise equal to an uninterrupted one. This module computes no gradient.
+which are recomputed, and without `making`. Everything else (targets, atoms, rates) is a function of the state, the
+sequence and the configuration; a resumed run is therefore bitwise equal to an uninterrupted one. This module computes
+no gradient.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from endotsr.training.fitting.checkpoint import Checkpoint, restore_rng, save_ch
 from endotsr.training.fitting.model import OffsetsAhead, Spectral, spectral_from
 from endotsr.training.fitting.objective import Targets, optional_depth_target, targets_of
 from endotsr.training.fitting.packed import PackedMask, packed_supports, unpacked_supports
-from endotsr.training.fitting.records import CheckpointHeader, RngState
+from endotsr.training.fitting.records import NOTHING_MADE, CheckpointHeader, Making, RngState
 from endotsr.training.fitting.sampling import Drawn, View
 from endotsr.training.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.training.scene.gaussians import Gaussians, arrays
@@ -50,6 +51,7 @@ class TrainingState:
     ahead: OffsetsAhead | None = None  # computed with the update of the FDM; not part of a checkpoint
     coarse: bool = False  # the next iteration is compared with frames of half size
     drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint stores the generator before the draw
+    making: Making = NOTHING_MADE  # the work on targets at this size of the frames; not part of a checkpoint
 
     @property
     def rng_state(self) -> RngState:

@@ -102,6 +102,7 @@ def train(
                 ahead.follow(constants.bridged)
                 on_message(f"coarse start: full-size frames after iteration {state.iteration}")
             entry = training_step(state, constants)
+            state.making = constants.bridged.making
             on_iteration(entry)
             if advice := watch.see(entry, state.gaussians):
                 on_message(advice)

@@ -6,4 +6,5 @@ sources   sequences by name: a folder, or `simulated`; the only module that impo
 model     checkpoint -> model or training     training  training with logs and checkpoints
 records   types of run.json                   diverged  the state before an iteration that was not finite
 pace      settings for a training time        stopping  signals, deferred until an iteration ends
+time_left time left of a training             speed     the speed of this machine, kept between trainings
 """

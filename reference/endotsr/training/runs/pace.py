@@ -8,7 +8,7 @@ of a model without motion.
 import statistics
 import time
 
-from endotsr.clips.sequences.checks.cost import at_start, iteration_work, work_left
+from endotsr.clips.sequences.checks.duration import Plan, estimated_seconds, frames_of, iteration_work
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError
@@ -40,17 +40,16 @@ def paced(config: Config, x: float) -> Config:
     return with_settings(timed, density=density, initialisation=points, training=training)
 
 
-def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -> Config:
-    """The settings with the largest x whose training takes at most `minutes`.
+def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float, threads: int) -> Config:
+    """The settings with the largest x whose training, with its targets between the frames, takes at most `minutes`.
 
-    unit    seconds per unit of work, from `seconds_of_unit`
+    unit    seconds per unit of work with these threads, from `seconds_of_unit`
     Raises: InputError if the shortest training takes longer.
     """
-    pixels = sequence.width * sequence.height
+    frames, pixels = frames_of(sequence.train_index, sequence.test_index), sequence.width * sequence.height
 
     def seconds(x: float) -> float:
-        asked = paced(config, x)
-        return unit * work_left(asked, pixels, at_start(asked))
+        return estimated_seconds(Plan(paced(config, x), frames, pixels, threads), unit).training
 
     low, high = SHORTEST, LONGEST
     if seconds(low) > 60 * minutes:

@@ -23,6 +23,8 @@ from endotsr.clips.sequences.checks.depth import (
     light_finding,
     usual_depth,
 )
+from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
+from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
 from endotsr.clips.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
 from endotsr.clips.sequences.checks.frames import (
     FrameFacts,
@@ -41,7 +43,7 @@ from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.sources import matching_files
 from endotsr.clips.sequences.splits import parse_frame_range, split_frames
-from endotsr.config import Config, lengthened
+from endotsr.config import Config, lengthened, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.method.kernels.machine import memory_of_machine
 from endotsr.method.kernels.memory import ASSUMED, unknown_memory
@@ -97,8 +99,10 @@ class _Pass:
         return None
 
 
-def check_sequence(path: Path, config: Config) -> Checked:
+def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> Checked:
     """Every finding on the sequence at `path`.
+
+    speed    of the machine, for the time of a training
 
     Raises:  InputError only if there is nothing to check: no folder, or a layout that needs `endotsr prepare`.
     """
@@ -124,12 +128,12 @@ def check_sequence(path: Path, config: Config) -> Checked:
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
     if run.samples:
         _check_masks(clip, run, config)
-    config = _of_length(clip, config, run)
+    config, frames = _of_length(clip, config, run)
     if size:
         facts |= {"width": size[1], "height": size[0]}
         if not any(fault.code == "cameras" for fault in clip.faults):
             facts |= _check_cameras(clip, run, size)
-        facts["cost"] = _cost(clip, size, config, run)._asdict()
+        facts["cost"] = _cost(clip, size, config, frames, speed, run)._asdict()
     return Checked(str(path), worst_first(run.findings), facts, run.pictures)
 
 
@@ -262,10 +266,10 @@ def _check_masks(clip: Clip, run: _Pass, config: Config) -> None:
     run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where)
 
 
-def _cost(clip: Clip, size: Size, config: Config, run: _Pass) -> Cost:
+def _cost(clip: Clip, size: Size, config: Config, frames: Frames, speed: Speed, run: _Pass) -> Cost:
     """Memory, disk and time of a training, with findings if they are insufficient."""
-    height, width, count, where = *size[:2], len(clip.images), str(clip.where)
-    cost = estimated_cost(count, width, height, config)
+    height, width, count, where = *size[:2], frames.total, str(clip.where)
+    cost = estimated_cost(frames, width, height, config, speed)
     run.tried(lambda: FrameStore(count, width, height, config.sequence.memory, where), "disk", where)
     if cost.file_bytes:
         what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and are stored in a file during training"
@@ -278,12 +282,14 @@ def _cost(clip: Clip, size: Size, config: Config, run: _Pass) -> Cost:
     return cost
 
 
-def _of_length(clip: Clip, config: Config, run: _Pass) -> Config:
+def _of_length(clip: Clip, config: Config, run: _Pass) -> tuple[Config, Frames]:
     """The settings with the length of a training on these frames. An impossible split becomes a finding."""
 
-    def training_frames() -> int:
-        frames = parse_frame_range(config.sequence.frames, len(clip.images))
-        return len(split_frames(len(frames), config.sequence.split, config.sequence.block_length)[0])
+    def split() -> Frames:
+        chosen = parse_frame_range(config.sequence.frames, len(clip.images))
+        return frames_of(*split_frames(len(chosen), config.sequence.split, config.sequence.block_length))
 
-    count = run.tried(training_frames, "frames", clip.where)
-    return config if count is None else lengthened(config, count)
+    frames = run.tried(split, "frames", clip.where)
+    if frames is None:
+        return with_fixed_length(config), expected_frames(len(clip.images), config)
+    return lengthened(config, frames.training), frames

@@ -1,0 +1,32 @@
+"""What a person waits for in `endotsr train`, in one line before the first iteration."""
+
+from endotsr.clips.sequences.checks.duration import COMPILATION, Plan, assumed_unit, estimated_seconds
+from endotsr.results.report.tables import duration
+
+
+def waiting_line(plan: Plan, unit: float | None, compiled: bool) -> str:
+    """The parts of the command after reading, with the time of each.
+
+    unit       seconds per unit of work in an earlier training on this machine; None = unknown
+    compiled   whether the kernels are in the cache
+    """
+    found = estimated_seconds(plan, assumed_unit(plan.threads) if unit is None else unit)
+    steps = {
+        "initial motion": found.start,
+        "compilation, once": 0.0 if compiled else COMPILATION,
+        f"{plan.config.training.iterations} iterations": found.training,
+        "evaluation": found.evaluation,
+    }
+    named = ", ".join(f"{name} {duration(seconds)}" for name, seconds in steps.items() if seconds >= 1)
+    known = "at the speed of the last training" if unit is not None else "the speed of this machine is assumed"
+    return f"about {in_words(sum(steps.values()))} for {plan.frames.total} frames ({known}): {named}"
+
+
+def in_words(seconds: float) -> str:
+    """A duration as "40 seconds", "3 minutes" or "1.5 hours"."""
+    if seconds < 55:
+        return f"{max(1, round(seconds))} seconds"
+    if seconds < 90 * 60:
+        minutes = round(seconds / 60)
+        return f"{minutes} minute{'s' * (minutes != 1)}"
+    return f"{seconds / 3600:.1f} hours"

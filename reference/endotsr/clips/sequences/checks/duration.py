@@ -1,0 +1,211 @@
+"""Seconds of the parts of `endotsr train`, estimated from the settings, the frames and the speed of the machine.
+
+    work(N, P, u) = (0.1 + 0.4 P / (640 * 512) + 0.5 N / 60 000) (0.65 + 0.35 min(u / 0.35, 1))
+
+is the work of an iteration with N Gaussians and P pixels at the fraction u of the run. Its unit is a late iteration of
+the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing. The
+first factor was measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256 pixels, the second
+on logs of `sharp` and `quick`: early iterations have small Gaussians, colours of degree 0 and mostly inactive time
+bases.
+
+The constants of the other parts are in units of one thread at 640x512 pixels. They were measured on the two EndoNeRF
+clips together with the unit itself, as processor time of one thread. Nothing is timed here.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.splits import split_frames
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import IndexArray
+
+PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
+BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration
+EARLY, LATE_FROM = 0.65, 0.35  # first over late iteration; fraction of the run before late ones
+SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
+# Assumed growth for `density.growth = "threshold"`, whose final number is not known in advance: a larger weight of the
+# similarity gives larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
+# at half size and twice the threshold the growth was 1.5, 1.8 and 2.1 with the weights 0.2, 0.35 and 0.5.
+GROWTH, GROWTH_BY_GRADIENT = 1.2, 8e-4
+SEEN_ENOUGH = 0.2  # root of the fraction of the growing time after which the observed growth replaces the assumed one
+
+SERIAL = 1.7  # time of an iteration on one thread over that on several; the other parts use one thread
+READ = 0.25  # units per frame: decoding, checks
+TRACKED, TRACKED_POINTS = 0.8, 7.5e-6  # units per training frame for the initial motion, and for each of its points
+FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
+MEASURED, PERCEIVED = 1.0, 4.0  # units per picture for its metrics, and for LPIPS
+METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
+PAGES = 60.0  # units for the viewer, the report and the renders
+EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
+COMPILATION = 30.0  # seconds for the kernels of a training, once per machine
+
+
+def assumed_unit(threads: int) -> float:
+    """Seconds per unit of work of a machine whose speed is unknown."""
+    return SECONDS * (1.0 if threads > 1 else SERIAL)
+
+
+class Standing(NamedTuple):
+    """The progress of a training, which determines the remaining work."""
+
+    iteration: int  # completed
+    gaussians: int
+    coarse: bool = False  # the next iteration uses frames of half size
+
+
+def at_start(config: Config) -> Standing:
+    """Progress before the first iteration, with the number of points that the initialisation requests at most."""
+    points = config.initialisation.first_frame_points + config.initialisation.other_frame_points
+    return Standing(0, points, config.training.coarse_start)
+
+
+def iteration_work(gaussians: float | NDArray, pixels: float | NDArray, progress: float | NDArray) -> float | NDArray:
+    """Work of one iteration; `progress` is the completed fraction of the run."""
+    early = EARLY + (1 - EARLY) * np.minimum(progress / LATE_FROM, 1.0)
+    return (BASE + OF_PIXELS * pixels / PIXELS + OF_GAUSSIANS * gaussians / GAUSSIANS) * early
+
+
+def gaussians_at_end(config: Config) -> int:
+    """The budget of Gaussians, or the initial number times the growth expected from the gradients."""
+    density = config.density
+    expected = round(growth_by_threshold(config) * at_start(config).gaussians)
+    return density.maximum if density.growth == "budget" else min(expected, density.maximum)
+
+
+def growth_by_threshold(config: Config) -> float:
+    """Expected factor from the initial number of Gaussians to the final one, without a limit."""
+    return GROWTH + GROWTH_BY_GRADIENT * config.loss.ssim_weight / config.density.gradient_threshold
+
+
+def work_left(config: Config, pixels: int, at: Standing) -> float:
+    """Work from here to the end, with the numbers of `expected_gaussians`.
+
+    pixels   of a frame of full size
+
+    A coarse start is assumed to last until `density.until`.
+    """
+    later = np.arange(at.iteration + 1, config.training.iterations + 1)
+    seen = np.where(at.coarse & (later <= max(config.density.until, 1)), pixels / 4, pixels)
+    counts = expected_gaussians(config, at, later)
+    return float(np.sum(iteration_work(counts, seen, later / config.training.iterations)))
+
+
+def expected_gaussians(config: Config, at: Standing, later: NDArray[np.integer]) -> NDArray[np.floating]:
+    """Expected number of Gaussians at later iterations, without pruning.
+
+    A budget is approached linearly between `density.start` and `density.until`. By the threshold, the number grows with
+    the square root of the time between them, up to `density.maximum`: on EndoNeRF cutting from 36 900 to 160 100
+    without that limit, within 5 % of this curve.
+    """
+    density, initial = config.density, at_start(config).gaussians
+    last = max(density.until, density.start + 1)
+    place, places = (np.clip((i - density.start) / (last - density.start), 0.0, 1.0) for i in (at.iteration, later))
+    budget, goal = density.growth == "budget", max(gaussians_at_end(config), at.gaussians)
+    if not budget:
+        place, places = np.sqrt(place), np.sqrt(places)
+        uncapped = initial * growth_by_threshold(config)
+        if place > SEEN_ENOUGH:
+            uncapped = initial + (at.gaussians - initial) / place
+        goal = max(uncapped, at.gaussians)
+    rise = (places - place) / (1.0 - place) if place < 1.0 else np.zeros(len(later))
+    return np.minimum(at.gaussians + rise * (goal - at.gaussians), max(density.maximum, at.gaussians))
+
+
+class Frames(NamedTuple):
+    """Numbers of frames that determine the time of a training."""
+
+    total: int
+    training: int
+    held_out: int
+    times: int  # of targets between the training frames
+
+    @property
+    def gaps(self) -> int:
+        """Number of pairs of consecutive training frames."""
+        return max(0, self.training - 1)
+
+
+class Speed(NamedTuple):
+    """The speed of a machine; the default is that of an assumed one."""
+
+    unit: float = SECONDS  # seconds per unit of work with these threads
+    threads: int = 2
+
+
+ASSUMED = Speed()
+
+
+class Plan(NamedTuple):
+    """One command, as far as its time is concerned."""
+
+    config: Config  # of fixed length
+    frames: Frames
+    pixels: int  # of a frame of full size
+    threads: int = 2  # with more than one, a second thread makes the targets between the frames
+    perceived: bool | None = True  # whether the evaluation computes LPIPS; None = no evaluation
+
+    def alone(self, unit: float) -> float:
+        """Seconds per unit of work on one thread, from those with the threads of the plan."""
+        return unit * (SERIAL if self.threads > 1 else 1.0)
+
+
+class Seconds(NamedTuple):
+    """Seconds of the parts of one command, in order."""
+
+    reading: float
+    start: float  # initial points and their motion
+    targets: float  # between the frames; the iterations make them at first use
+    iterations: float  # without the targets
+    evaluation: float  # with report and viewer
+
+    @property
+    def training(self) -> float:
+        """Seconds of the iterations with their targets."""
+        return self.targets + self.iterations
+
+
+def frames_of(train_index: IndexArray, held_out: IndexArray) -> Frames:
+    """The numbers of frames of a split."""
+    gaps = np.diff(train_index)
+    training, kept = len(train_index), len(held_out)
+    return Frames(training + kept, training, kept, int(np.sum(2 * gaps - 1)))
+
+
+def expected_frames(count: int, config: Config) -> Frames:
+    """The numbers of frames of a clip of `count` frames. A clip that the split refuses counts as training frames."""
+    try:
+        return frames_of(*split_frames(count, config.sequence.split, config.sequence.block_length))
+    except InputError:
+        return frames_of(np.arange(count), np.arange(0))
+
+
+def estimated_seconds(plan: Plan, unit: float = SECONDS) -> Seconds:
+    """Seconds of the parts of a command. unit: seconds per unit of work with the threads of the plan."""
+    config, frames, size = plan.config, plan.frames, plan.pixels / PIXELS
+    alone, first = plan.alone(unit), at_start(config)
+    tracked = (TRACKED + TRACKED_POINTS * first.gaussians) * (config.initialisation.motion != "none")
+    sizes = 1.25 if config.training.coarse_start else 1.0
+    targets = sizes * gap_units(frames) * frames.gaps * visited(config, frames.gaps, config.training.iterations)
+    pictures = frames.held_out * METHODS * (MEASURED + PERCEIVED * bool(plan.perceived))
+    pictures += MEASURED * frames.training / EVERY_TRAINING_FRAME
+    return Seconds(
+        alone * size * READ * frames.total,
+        alone * size * tracked * frames.training,
+        alone * size * targets / plan.threads,
+        unit * work_left(config, plan.pixels, first),
+        0.0 if plan.perceived is None else alone * (PAGES + size * pictures),
+    )
+
+
+def gap_units(frames: Frames) -> float:
+    """Mean units per gap for its targets, on one thread at 640x512 pixels."""
+    return FLOWS + TARGET * frames.times / max(frames.gaps, 1)
+
+
+def visited(config: Config, gaps: int, iterations: float) -> float:
+    """Expected fraction of the gaps that this number of iterations visits."""
+    draws = config.training.bridge_fraction * iterations
+    return 1.0 - (1.0 - 1.0 / gaps) ** draws if gaps > 1 else float(gaps > 0 and draws > 0)
