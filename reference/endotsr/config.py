@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import msgspec
 
 from endotsr.errors import InputError
+from endotsr.untrusted.json import Keys
 from endotsr.untrusted.toml import read_toml, toml_text
 
 SectionType = TypeVar("SectionType", bound=msgspec.Struct)
@@ -342,7 +343,7 @@ DEMO = with_settings(
 PRESETS = {"paper": PAPER, "sharp": SHARP, "quick": QUICK, "demo": DEMO}
 
 
-def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Config:
+def config_from_dict(data: Keys, where: str = "configuration") -> Config:
     """A strict `Config` from nested dictionaries over the preset named in data["preset"] (default `paper`)."""
     preset = data.get("preset", "paper")
     if not isinstance(preset, str) or preset not in PRESETS:
@@ -352,7 +353,7 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
     return checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
 
 
-def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
+def checked(data: Keys, kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
     """A section from plain data, with types and ranges checked. Raises InputError with key and allowed values."""
     _refuse_non_finite(data, where, prefix)
     try:
@@ -369,7 +370,7 @@ def load_config(path: Path) -> Config:
     return config_from_dict(read_toml(path), str(path))
 
 
-def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def merged(base: Keys, changes: Keys) -> Keys:
     """Settings as plain data, with the changes of one source (such as a file) merged over the earlier sources.
 
     A source with `iterations` but without `visits_per_frame` fixes the length of the run and overrides earlier
@@ -383,7 +384,7 @@ def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def without_former_keys(data: dict[str, Any], where: str, bridge_fraction: float = 0.0) -> dict[str, Any]:
+def without_former_keys(data: Keys, where: str, bridge_fraction: float = 0.0) -> Keys:
     """The settings without the keys of `FORMER`, which stored runs of earlier versions have.
 
     bridge_fraction   default if the data has none: without bridged times, their target is irrelevant

@@ -80,8 +80,9 @@ def measure_scaling(largest: int, names: Sequence[str], say: Say) -> dict[str, A
     for name, axis in chosen.items():
         results: list[dict[str, Any]] = []
         for case in (*axis.cases, *reversed(axis.cases)):
-            results.append(apart(measure, case))
-            say(f"{name}: {line(results[-1])}")
+            timed = apart(measure, case)
+            results.append(timed)
+            say(f"{name}: {line(timed)}")
         found[name] = summary(axis, faster(results))
     return {"axes": found, "memory": memory(found)}
 

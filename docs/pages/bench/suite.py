@@ -59,7 +59,7 @@ def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Sa
     for path in scenes:
         read_arrays(path)
     out.mkdir(parents=True, exist_ok=True)
-    measures: dict[str, tuple[Callable[[], dict[str, Any]], Callable[[dict[str, Any]], str] | None]] = {
+    measures: dict[str, tuple[Callable[[], Any], Callable[[Any], str] | None]] = {
         "start": (lambda: bench_start.measure_start(3), bench_start.table),
         "stages": (lambda: stages.measure_stages(grid(scenes), say), None),
         "peers": (lambda: bench_peers.measure_peers((60_000,), PRECISIONS, 2, 2), bench_peers.table),

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
@@ -10,6 +10,7 @@ from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.sweep import ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
+from endotsr.untrusted.json import Keys
 
 if TYPE_CHECKING:
     from endotsr.studies.sweeps.ablation_page import AblationRecord
@@ -103,7 +104,7 @@ def without_folders(word: str) -> str:
     return f"{head}{equals}{path.name}" if path.is_absolute() or path.exists() else word
 
 
-def spec_data(options: AblateOptions) -> dict[str, Any]:
+def spec_data(options: AblateOptions) -> Keys:
     """The sweep for the options, in the form of a SPEC.toml. Raises InputError for invalid options."""
     from endotsr.studies.sweeps.ablation import CONFIGURATIONS, ablation_spec
 
@@ -116,7 +117,7 @@ def spec_data(options: AblateOptions) -> dict[str, Any]:
     if length < 2:
         raise InputError(f"ablate: --iterations {length} is not allowed; allowed: an integer >= 2")
     activation = with_iterations(PRESETS[options.preset], length).training.residual_activation
-    keys: dict[str, Any] = {"preset": options.preset, "splits": list(options.splits)}
+    keys: Keys = {"preset": options.preset, "splits": list(options.splits)}
     if options.iterations is not None:
         keys["iterations"] = length
     if options.lpips is not None:

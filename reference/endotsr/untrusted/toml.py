@@ -8,11 +8,12 @@ import msgspec
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
+from endotsr.untrusted.json import Keys
 
 LARGEST_FILE = 1 << 20  # bytes
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> Keys:
     """The tables of a TOML file, not validated. Raises InputError naming the file."""
     text = read_text(Path(path), LARGEST_FILE)
     try:
@@ -23,7 +24,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
-def toml_text(data: dict[str, Any]) -> str:
+def toml_text(data: Keys) -> str:
     """TOML of plain values and one level of sections. Keys outside a section whose value is None are omitted."""
     lines, sections = [], []
     for key, value in data.items():
@@ -46,7 +47,7 @@ def _toml_value(value: Any) -> str:
     return repr(value)
 
 
-def by_key(settings: Any) -> dict[str, Any]:
+def by_key(settings: Any) -> Keys:
     """`section.key` -> value of plain tables, and `key` -> value outside a section. {} for anything else."""
     found = {}
     for name, values in settings.items() if isinstance(settings, dict) else ():

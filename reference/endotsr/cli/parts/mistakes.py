@@ -1,10 +1,10 @@
 """Errors for unknown words of a command line: one line with the likely option, or the keys of the section."""
 
 import difflib
-from typing import Any
 
 from endotsr.cli.parts.fields import Field
 from endotsr.errors import InputError
+from endotsr.untrusted.json import Keys
 
 LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
@@ -32,7 +32,7 @@ def option_names(fields: list[Field]) -> list[str]:
 
 def _unknown_key(fields: list[Field], option: str) -> str:
     """The unknown part of a dotted option with the allowed keys; "" without a dot or without sections."""
-    keys: dict[str, Any] = {}
+    keys: Keys = {}
     for field in (field for field in fields if not field.positional):
         tree = keys
         *sections, last = field.key.split(".")

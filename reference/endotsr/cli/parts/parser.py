@@ -20,6 +20,7 @@ from endotsr.cli.parts.relations import check_relations
 from endotsr.config import allowed_values, checked, merged
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_unwritable
+from endotsr.untrusted.json import Keys
 
 T = TypeVar("T")
 HELP_ALL = "--help-all"
@@ -203,8 +204,8 @@ def _written_out(field: Field, word: str) -> str:
 
 def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], Any], default: T | None) -> T:
     """The options with the given values; changed sections are checked."""
-    values: dict[str, Any] = {} if default is None else dict(vars(default))
-    sections: dict[str, dict[str, Any]] = {}
+    values: Keys = {} if default is None else dict(vars(default))
+    sections: dict[str, Keys] = {}
     for path, value in given.items():
         if len(path) == 1:
             values[path[0]] = value
@@ -218,7 +219,7 @@ def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], A
     return options(**values)
 
 
-def _put(tree: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
+def _put(tree: Keys, path: tuple[str, ...], value: Any) -> None:
     for name in path[:-1]:
         tree = tree.setdefault(name, {})
     tree[path[-1]] = value

@@ -1,7 +1,7 @@
 """`endotsr train --windows`, and the evaluation of such a run."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 from endotsr.cli.parts.progress import StepBar
 from endotsr.config import Config
@@ -11,8 +11,8 @@ from endotsr.training.runs.files import refuse_inside, write_json
 from endotsr.training.runs.sources import SIMULATED
 
 if TYPE_CHECKING:
-    from endotsr.results.evaluation.records import EvaluationRecord
     from endotsr.studies.sweeps.place import Place
+    from endotsr.studies.windows.evaluation import Flicker, Seams, WindowedEvaluation, WindowRow
 
 AUTO = "auto"
 
@@ -50,7 +50,7 @@ def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: 
     plan_recording(Path(source), config, wanted, out)
 
 
-def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> dict[str, Any]:
+def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> "WindowedEvaluation":
     """Evaluate a run of windows, write metrics.json to its folder, and print the tables; returns the metrics."""
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.report.run_text import held_out_table
@@ -63,14 +63,14 @@ def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = 
     for row in metrics["windows"]:
         print(_row(row))
     if "held_out" in metrics:
-        print(held_out_table(cast("EvaluationRecord", metrics)))
+        print(held_out_table(metrics))
     print(_seam_line(metrics["seams"]))
     for gap in metrics["left_out"]:
         print(f"left out: frames {gap['first']}:{gap['end']}: {gap['reason']}")
     return metrics
 
 
-def _row(row: dict[str, Any]) -> str:
+def _row(row: "WindowRow") -> str:
     memory, psnr = row["peak_memory_bytes"], row["psnr_tissue"]
     words = [f"window {row['name']}: frames {row['first']}:{row['end']}, {row['start']}"]
     words += [f"{row['iterations']} iterations in {duration(row['seconds'])}"]
@@ -79,8 +79,8 @@ def _row(row: dict[str, Any]) -> str:
     return ", ".join([*words, "no held-out frame" if psnr is None else f"PSNR tissue {psnr:.2f} dB"])
 
 
-def _seam_line(seams: dict[str, Any]) -> str:
-    def shown(values: dict[str, float | None]) -> str:
+def _seam_line(seams: "Seams") -> str:
+    def shown(values: "Flicker") -> str:
         if values["ratio"] is None:
             return "not measured"
         return f"{values['seams']:.2f} at seams, {values['inside']:.2f} inside (ratio {values['ratio']:.2f})"

@@ -257,7 +257,7 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
         state, seen = train.iterate(state, sequence, spectral, config, tape, raster, canny_edges)
         log.append({"loss": seen.loss, **seen.terms, **_sizes(state)})
         counts.append(state.gaussians.opacity_logit.size)
-    found: dict[str, Any] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
+    found: dict[str, NDArray] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
     found |= {f"final_{name}": array for name, array in moving.arrays(state.gaussians).items()}
     return found | {"lambda_lap": weight, "count": np.array(counts)}, None
 

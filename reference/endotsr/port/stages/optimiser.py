@@ -46,7 +46,7 @@ def _rates(module: Any, iteration: int, config: Config) -> dict[str, float]:
 def _schedule(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     config, iterations = config_of(settings, np.dtype(np.float64)), [int(i) for i in inputs["iteration"]]
     rows = [_rates(module, i, config) for i in iterations]
-    found: dict[str, Any] = {f"rate_{name}": np.array([row[name] for row in rows]) for name in rows[0]}
+    found: dict[str, NDArray] = {f"rate_{name}": np.array([row[name] for row in rows]) for name in rows[0]}
     assert isinstance(config.loss.lambda_lap, float)
     return found | {
         "laplacian_weight": np.array([config.loss.lambda_lap * module.laplacian_ramp(i, config) for i in iterations]),
@@ -113,7 +113,7 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
     state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
     log = [training_step(state, constants) | _sizes(state) for _ in range(config.training.iterations)]
-    found: dict[str, Any] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
+    found: dict[str, NDArray] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
     found |= {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
     return found | {
         "lambda_lap": weight,

@@ -25,7 +25,7 @@ COMPOSITORS: tuple[Compositor, ...] = ("definition", "blocks")
 
 def raster_of(settings: Settings) -> RasterSettings:
     """The rasteriser settings of a case."""
-    fields: dict[str, Any] = dict(settings["raster"])
+    fields = dict(settings["raster"])
     fields["deviations"] = LegacyDeviations(**fields["deviations"])
     return RasterSettings(**fields)
 

@@ -5,7 +5,6 @@ model predict a prior from the priors of training frames, which have similar err
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.baselines import neighbours
+from endotsr.results.evaluation.records import Measured, MeasureRow
 
 LEAST_OPACITY = 0.5  # minimum opacity of a pixel with valid depth; below, the render is mostly background
 
@@ -30,7 +30,7 @@ def normalised_depth(out: RenderOut, least_opacity: float = 0.0) -> FloatArray:
     return np.where(seen, out.depth / np.where(seen, out.opacity, 1), 0).astype(out.depth.dtype)
 
 
-def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut]) -> dict[str, Any]:
+def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut]) -> Measured:
     """Errors over the tissue pixels of the held-out frames that have a prior, in scene units.
 
     render   frame number and camera -> render
@@ -66,7 +66,7 @@ def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut
     return {"unit": sequence.unit, "rows": rows}
 
 
-def _errors(label: str, depth: FloatArray, truth: FloatArray) -> dict[str, Any]:
+def _errors(label: str, depth: FloatArray, truth: FloatArray) -> MeasureRow:
     error = np.abs(depth.astype(np.float64) - truth)
     return {
         "label": label,

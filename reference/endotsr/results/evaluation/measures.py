@@ -17,7 +17,6 @@ frames flicker because of camera noise; a larger value means that the model itse
 """
 
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.baselines import unit_image
 from endotsr.results.evaluation.depth import held_out_depth
+from endotsr.results.evaluation.records import Measured, MeasureRow
 from endotsr.results.evaluation.right_view import right_view
 from endotsr.training.fitting.model import render_at, with_corrected_cameras
 from endotsr.training.runs.model import Model
@@ -39,7 +39,7 @@ LEVELS = 255.0  # results are given in 8-bit grey levels
 
 RenderView = Callable[[int, Camera], RenderOut]  # frame number (for the time) and camera -> render
 
-MEASURES: dict[str, Callable[[Model, Sequence, str, RenderView], dict[str, Any]]] = {
+MEASURES: dict[str, Callable[[Model, Sequence, str, RenderView], Measured]] = {
     "depth": lambda model, sequence, source, render: held_out_depth(sequence, render),
     "flicker": lambda model, sequence, source, render: flicker(sequence, render),
     "right_view": lambda model, sequence, source, render: right_view(sequence, source, model.config.sequence, render),
@@ -53,7 +53,7 @@ def check_measures(names: Iterable[str], what: str = "measure") -> None:
             raise InputError(f"{what} {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
 
 
-def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str) -> dict[str, dict[str, Any]]:
+def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str) -> dict[str, Measured]:
     """The named measurements of a model.
 
     source   folder of the sequence, or `simulated`
@@ -70,20 +70,20 @@ def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str
     return {name: MEASURES[name](model, seen, source, render) for name in names}
 
 
-def measure_lines(found: dict[str, dict[str, Any]]) -> list[str]:
+def measure_lines(found: dict[str, Measured]) -> list[str]:
     """The measurements as lines of text."""
     lines = []
     for name, entry in found.items():
         if "reason" in entry:
             lines.append(f"{name}: not measured: {entry['reason']}")
             continue
-        for row in entry["rows"]:
+        for row in entry.get("rows", ()):
             values = ", ".join(f"{key} {value:.4g}" for key, value in row.items() if isinstance(value, float))
             lines.append(f"{name}: {row['label']}: {values}")
     return lines
 
 
-def flicker(sequence: Sequence, render: RenderView) -> dict[str, Any]:
+def flicker(sequence: Sequence, render: RenderView) -> Measured:
     """Root mean square of d over the static pixels and all inner frames, or the held-out ones; grey levels.
 
     render   frame number and camera -> render; called once per frame
@@ -105,7 +105,7 @@ def flicker(sequence: Sequence, render: RenderView) -> dict[str, Any]:
     return {"pixels": int(np.count_nonzero(static)), "rows": rows}
 
 
-def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int], FloatArray]) -> dict[str, Any]:
+def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int], FloatArray]) -> MeasureRow:
     values = np.stack([frame(i)[:, static].astype(np.float64) for i in range(sequence.count)])
     squares = np.square(values[:-2] - 2 * values[1:-1] + values[2:]).mean(axis=(1, 2)) / 6  # of frames 1 .. n - 2
     held_out = [int(i) - 1 for i in sequence.test_index if 0 < i < sequence.count - 1]

@@ -1,10 +1,11 @@
 """The types of metrics.json. Every number is finite; a metric without a value is None."""
 
-from typing import Any, NotRequired, Required, TypedDict
+from typing import NotRequired, Required, TypedDict
 
 from endotsr.results.evaluation.coverage import FrameCoverage
 from endotsr.training.runs.machine import MachinePart
 from endotsr.training.runs.records import InputPart
+from endotsr.untrusted.json import Keys
 
 Means = dict[str, float | None]  # metric -> value
 
@@ -103,7 +104,7 @@ class RunPart(TypedDict):
     versions: dict[str, str]
     machine: MachinePart
     input: InputPart
-    settings: dict[str, Any]
+    settings: Keys
 
 
 class PicturesPart(TypedDict):
@@ -113,6 +114,21 @@ class PicturesPart(TypedDict):
     pairing: str
     arrays_sha256: dict[str, str]
     files: dict[str, str]  # file of every frame
+
+
+MeasureRow = dict[str, str | float | None]
+"""A row of a measurement: its `label`, and values by name; None where there is no frame."""
+
+
+class Measured(TypedDict, total=False):
+    """One entry of `measures` in metrics.json: `rows`, or the `reason` why there are none."""
+
+    reason: str
+    rows: list[MeasureRow]
+    unit: str  # of lengths
+    pixels: int  # of `flicker`: static pixels
+    baseline: float  # of `right_view`: distance of both cameras
+    spread: float  # of `right_view`: relative spread of the baseline
 
 
 class EvaluationRecord(TypedDict):
@@ -130,7 +146,7 @@ class EvaluationRecord(TypedDict):
     cross_fade: NotRequired[LabelledFrames]
     trajectories: NotRequired[MotionPart | None]
     pose_correction: NotRequired[PosePart | None]
-    measures: NotRequired[dict[str, dict[str, Any]]]
+    measures: NotRequired[dict[str, Measured]]
     label: NotRequired[str]
     pictures: NotRequired[PicturesPart]
 

@@ -11,7 +11,7 @@ Pixels without depth use the depth of the nearest pixel with one.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.baselines import unit_image
 from endotsr.results.evaluation.evaluate import training_sample
 from endotsr.results.evaluation.metrics import psnr_tissue, ssim_tissue
+from endotsr.results.evaluation.records import Measured, MeasureRow
 
 FOLDER = "images_right"
 MATCHED_FRAMES = 5  # number of frames for the stereo baseline
@@ -43,7 +44,7 @@ class Moved(NamedTuple):
 
 def right_view(
     sequence: Sequence, source: str, settings: SequenceConfig, render: Callable[[int, Camera], RenderOut]
-) -> dict[str, Any]:
+) -> Measured:
     """PSNR (dB) and SSIM over the evaluated pixels, for the held-out frames and every sixth training frame.
 
     source   sequence folder with images_right/
@@ -61,7 +62,7 @@ def right_view(
     baseline, spread = found
     if not baseline > 0 or spread > SPREAD:
         return {"reason": f"disparity and depth give no consistent baseline ({baseline:.3g}, spread {spread:.0%})"}
-    rows: dict[str, dict[str, Any]] = {}
+    rows: dict[str, MeasureRow] = {}
     for part, frames in (("held_out", sequence.test_index), ("training", training_sample(sequence))):
         values = [_frame(sequence, int(i), baseline, right(int(i)), render) for i in frames]
         for label in values[0] if values else ():

@@ -6,7 +6,7 @@ In: a scene and its views. Out: a folder with colour/, depth/, opacity/ and rend
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, NotRequired, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,15 @@ ABOUT_DEPTH = {
 }
 DEPTH_LEVELS = 65535  # of a 16-bit picture
 DEPTH_HEADROOM = 1.5  # factor on the largest prior depth, because rendered depth may exceed it
+
+
+class PictureEntry(TypedDict):
+    """A picture in render.json."""
+
+    file: str
+    time: float
+    camera_of_frame: int
+    camera: NotRequired[dict[str, Any]]  # unless the view is exactly that of a frame
 
 
 class ReadFrames(Protocol):
@@ -135,7 +144,7 @@ def write_pictures(
     consume   consumes the pictures after they are written, for example to write a film of the same renders
     """
     out.absolute().parent.mkdir(parents=True, exist_ok=True)
-    entries: list[dict[str, Any]] = []
+    entries: list[PictureEntry] = []
     with replacing_folder(out) as target:
         for name in ("colour", "depth", "opacity"):
             (target / name).mkdir()
@@ -155,10 +164,10 @@ def write_pictures(
     return len(entries)
 
 
-def _entry(view: PlannedView, placement: Placement) -> dict[str, Any]:
+def _entry(view: PlannedView, placement: Placement) -> PictureEntry:
     """The entry of render.json, with the camera unless the view is exactly that of a frame."""
-    entry = {"file": f"{view.label}.png", "time": view.time, "camera_of_frame": view.frame}
-    return entry if view.exact else entry | {"camera": _as_json(placed_camera(view.camera, placement))}
+    entry: PictureEntry = {"file": f"{view.label}.png", "time": view.time, "camera_of_frame": view.frame}
+    return entry if view.exact else {**entry, "camera": _as_json(placed_camera(view.camera, placement))}
 
 
 def _write_view(target: Path, label: str, out: RenderOut, step: float, npy: bool) -> None:

@@ -7,7 +7,7 @@ view-dependent colour.
 """
 
 import zlib
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,15 @@ ROTATION_LEVELS = 127  # largest level of a quaternion component, either sign
 OPACITY_STEP = 1 / 255  # Gaussians with a lower opacity are never drawn
 POSITION, LOG_SCALE, COLOUR = slice(0, 3), slice(3, 6), slice(6, 9)  # rows that are quantised within their range
 COMPRESSION = 6  # level of zlib; higher levels take much longer and save 1 %
+
+
+class TrajectoryHeader(TypedDict):
+    """What a page needs to unpack the paths of the points."""
+
+    count: int
+    times: list[float]
+    low: list[float]
+    high: list[float]
 
 
 class Trajectories(NamedTuple):
@@ -99,7 +108,7 @@ def packed(found: Trajectories) -> bytes:
     return zlib.compress(b"".join(planes), COMPRESSION)
 
 
-def header(found: Trajectories) -> dict[str, Any]:
+def header(found: Trajectories) -> TrajectoryHeader:
     """The input of the page for unpacking the numbers."""
     return {
         "count": found.words.shape[2],

@@ -18,6 +18,7 @@ from endotsr.config import PAPER, Config, with_settings
 from endotsr.method.kernels.constants import Y00
 from endotsr.results.export.npz import read_arrays
 from endotsr.studies.bench.clock import SPLAT, StageClock, spread
+from endotsr.studies.bench.records import CaseTimes, Densification, ViewCounts
 from endotsr.training.scene import workload
 from endotsr.training.scene.gaussians import Gaussians, arrays
 
@@ -59,14 +60,8 @@ def apart(function: Callable[..., Any], *arguments: Any) -> Any:
         return pool.submit(function, *arguments).result()
 
 
-def measure(case: BenchCase) -> dict[str, Any]:
-    """Measure a case. Call it through `apart`.
-
-    returns  JSON-able: "case"; "stages" {name: spread}; "splat" and "iteration": spread of the sum of the four
-             splatting stages and of all stages; "first_iteration_s", with compilation or loading of compiled code;
-             "view" {"visible", "listed", "blended"}; "parameters" per Gaussian; "peak_memory_bytes"; "densification"
-             {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was timed
-    """
+def measure(case: BenchCase) -> CaseTimes:
+    """Measure a case. Call it through `apart`."""
     from endotsr.method.kernels.threads import use_threads
     from endotsr.training.runs.machine import peak_memory_bytes
 
@@ -157,7 +152,7 @@ def representative(config: Config) -> int:
     return start + config.density.interval // 2
 
 
-def _view(state: Any, constants: Any) -> dict[str, int]:
+def _view(state: Any, constants: Any) -> ViewCounts:
     """Visible Gaussians, entries of the tile lists and blended pairs of the first training view."""
     from endotsr.method.splatting.render import render_forward
     from endotsr.studies.bench.pairs import count_pairs
@@ -171,7 +166,7 @@ def _view(state: Any, constants: Any) -> dict[str, int]:
     return {"visible": int(saved.order.size), "listed": listed, "blended": count_pairs(saved).blended}
 
 
-def _densification(state: Any, constants: Any, repeats: int) -> dict[str, Any] | None:
+def _densification(state: Any, constants: Any, repeats: int) -> Densification | None:
     """Time of the densification within an iteration. It changes the scene, hence few repeats."""
     from endotsr.training.fitting.trainer import training_step
 
@@ -184,4 +179,4 @@ def _densification(state: Any, constants: Any, repeats: int) -> dict[str, Any] |
             training_step(state, constants, clock)
     seconds = [t["density control"] for t in clock.repeats[1:]]
     per_iteration = float(np.median(seconds)) * 1e3 / interval
-    return spread(seconds) | {"per_iteration_ms": per_iteration, "gaussians": state.gaussians.count}
+    return {**spread(seconds), "per_iteration_ms": per_iteration, "gaussians": state.gaussians.count}

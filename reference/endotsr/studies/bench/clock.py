@@ -11,9 +11,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
+
+from endotsr.studies.bench.records import Spread
 
 REST = "rest"
 SPLAT = ("projection", "binning", "blend forward", "blend reverse")
@@ -76,8 +77,8 @@ class StageClock:
         self._since = now
 
 
-def spread(seconds: Sequence[float]) -> dict[str, Any]:
-    """{"median_ms", "quartiles_ms": [25 %, 75 %]} of times in seconds."""
+def spread(seconds: Sequence[float]) -> Spread:
+    """Median and quartiles of times in seconds."""
     low, median, high = np.percentile(np.array(seconds) * 1e3, [25, 50, 75])
     return {"median_ms": float(median), "quartiles_ms": [float(low), float(high)]}
 

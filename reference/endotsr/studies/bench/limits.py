@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from endotsr.config import PAPER
 from endotsr.method.splatting.records import GRADIENT, RECORD  # numbers of a Gaussian, and of a pair's gradients
+from endotsr.studies.bench.records import CaseTimes, Limit, Peaks
 from endotsr.training.scene.gaussians import DEFORMATION_CHANNELS
 
 RADIX_BITS = 11  # of a digit of the depth sort
@@ -58,14 +59,14 @@ def work(result: Mapping[str, Any]) -> dict[str, Work]:
     }
 
 
-def limits(result: Mapping[str, Any], peaks: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """For each stage {"limit_ms", "bound": "arithmetic" or "memory", "fraction": limit / measured median}.
+def limits(result: CaseTimes, peaks: Peaks) -> dict[str, Limit]:
+    """The lower bound of each stage.
 
     peaks   from `endotsr.studies.bench.peaks.measure_peaks` with the threads of the case
     """
     flop_rate = peaks["flop_per_second"][result["case"]["precision"]]
     byte_rate = max(peaks["bytes_per_second"].values())
-    found = {}
+    found: dict[str, Limit] = {}
     for name, (flop, traffic) in work(result).items():
         arithmetic, memory = 1e3 * flop / flop_rate, 1e3 * traffic / byte_rate
         limit, median = max(arithmetic, memory), result["stages"][name]["median_ms"]

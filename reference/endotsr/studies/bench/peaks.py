@@ -5,14 +5,13 @@ compiled with contraction, like the fast path. `endotsr.studies.bench.limits` co
 peaks.
 """
 
-from typing import Any
-
 import numba
 import numpy as np
 
 from endotsr.method.kernels.jit import jit
 from endotsr.method.kernels.threads import parallel_for, use_threads
 from endotsr.studies.bench.clock import repeated
+from endotsr.studies.bench.records import Peaks
 
 STEPS = 16  # dependent multiply-adds of one chain
 CHAINS = 8  # independent chains per number: enough to hide the latency of an FMA
@@ -89,14 +88,21 @@ def bandwidths(repeats: int = 7, array_bytes: int = ARRAY_BYTES) -> dict[str, fl
     return {name: 3.0 * out.nbytes / best for name, best in seconds.items()}
 
 
-def measure_peaks(threads: int) -> dict[str, Any]:
-    """{"threads", "flop_per_second" {precision}, "bytes_per_second" {kernel}}: the best of the repeats."""
+def measure_peaks(threads: int) -> Peaks:
+    """The best of the repeats."""
     use_threads(threads)
     fma = {precision: fma_peak(precision) for precision in ("float32", "float64")}
     return {"threads": threads, "flop_per_second": fma, "bytes_per_second": bandwidths()}
 
 
-def higher(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+def higher(before: Peaks, after: Peaks) -> Peaks:
     """The maximum of two measurements for each peak."""
-    rates = ("flop_per_second", "bytes_per_second")
-    return before | {kind: {name: max(v, after[kind][name]) for name, v in before[kind].items()} for kind in rates}
+
+    def best(one: dict[str, float], other: dict[str, float]) -> dict[str, float]:
+        return {name: max(value, other[name]) for name, value in one.items()}
+
+    return {
+        "threads": before["threads"],
+        "flop_per_second": best(before["flop_per_second"], after["flop_per_second"]),
+        "bytes_per_second": best(before["bytes_per_second"], after["bytes_per_second"]),
+    }

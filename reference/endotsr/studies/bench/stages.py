@@ -9,12 +9,13 @@ from endotsr.results.report.tables import memory, plain
 from endotsr.studies.bench.case import BenchCase, apart, measure
 from endotsr.studies.bench.limits import limits
 from endotsr.studies.bench.peaks import higher, measure_peaks
+from endotsr.studies.bench.records import BenchResult, CaseResult, CaseTimes, Spread
 
 Say = Callable[[str], None]
 
 
-def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
-    """{"peaks": one per number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
+def measure_stages(cases: Iterable[BenchCase], say: Say) -> BenchResult:
+    """All cases with their limits, and the peaks per number of threads.
 
     Raises: InputError before any measurement, if the file of a case is not a trained scene.
     """
@@ -23,19 +24,20 @@ def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
         read_arrays(Path(scene))
     numbers = sorted({case.threads for case in cases})
     before = [apart(measure_peaks, threads) for threads in numbers]
-    results = []
+    results: list[CaseTimes] = []
     for case in cases:
         results.append(apart(measure, case))
         say(line(results[-1]))
     after = [apart(measure_peaks, threads) for threads in numbers]  # the first measurement may have been disturbed
     peaks = {threads: higher(a, b) for threads, a, b in zip(numbers, before, after)}
-    for result in results:
-        result["limits"] = limits(result, peaks[result["case"]["threads"]])
-        result["ns_per_pair"] = ns_per_pair(result)
-    return {"peaks": list(peaks.values()), "cases": results}
+    bounded: list[CaseResult] = [
+        {**found, "limits": limits(found, peaks[found["case"]["threads"]]), "ns_per_pair": ns_per_pair(found)}
+        for found in results
+    ]
+    return {"peaks": list(peaks.values()), "cases": bounded}
 
 
-def ns_per_pair(result: dict[str, Any]) -> dict[str, float | None]:
+def ns_per_pair(result: CaseTimes) -> dict[str, float | None]:
     """Nanoseconds per blended pair of both blending stages and of all splatting stages; None without pairs."""
     pairs = result["view"]["blended"]
     medians = {name: result["stages"][name]["median_ms"] for name in ("blend forward", "blend reverse")}
@@ -49,7 +51,7 @@ def name_of(case: dict[str, Any]) -> str:
     return f"{what}, {case['width']}x{case['height']}, {case['precision']}, {case['threads']} threads"
 
 
-def line(result: dict[str, Any]) -> str:
+def line(result: CaseTimes) -> str:
     """One case as a line of text."""
     pairs = result["view"]["blended"]
     return (
@@ -58,7 +60,7 @@ def line(result: dict[str, Any]) -> str:
     )
 
 
-def table(result: dict[str, Any]) -> str:
+def table(result: CaseResult) -> str:
     """One case as a table: each stage with its quartiles, fraction of the iteration, limit and kind of limit."""
     rows = [*result["stages"].items(), ("splat", result["splat"]), ("iteration", result["iteration"])]
     cells = [_row(name, spread, result) for name, spread in rows]
@@ -75,7 +77,7 @@ def table(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _row(name: str, spread: dict[str, Any], result: dict[str, Any]) -> list[str]:
+def _row(name: str, spread: Spread, result: CaseResult) -> list[str]:
     """One row of the table; limit cells are empty for a stage without a limit."""
     low, high = spread["quartiles_ms"]
     fraction = spread["median_ms"] / result["iteration"]["median_ms"]

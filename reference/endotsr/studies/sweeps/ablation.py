@@ -22,6 +22,7 @@ from endotsr.results.evaluation.compare import CONFIDENCE, bootstrapped
 from endotsr.results.evaluation.records import MetricValues
 from endotsr.studies.sweeps.execute import FINISHED
 from endotsr.studies.sweeps.results import METRICS, RunRow
+from endotsr.untrusted.json import Keys
 
 FIXED = " fixed"  # suffix of configurations that start from the shared checkpoint, without density control
 NO_PRIOR = "S without prior"
@@ -29,10 +30,10 @@ COMPONENTS = {"A": "appearance", "S": "spectral_motion", "L": "laplacian"}
 MATCHED = ("iterations", "preset", "arrays_sha256")  # keys of a row that must be equal in a pair
 
 
-def model_of(name: str) -> dict[str, dict[str, Any]]:
+def model_of(name: str) -> dict[str, Keys]:
     """Settings of a configuration by name: "base", "A+S", "S without prior"."""
     on = set(name.split(" ")[0].split("+")) if name != "base" else set()
-    changes: dict[str, dict[str, Any]] = {"model": {setting: key in on for key, setting in COMPONENTS.items()}}
+    changes: dict[str, Keys] = {"model": {setting: key in on for key, setting in COMPONENTS.items()}}
     return changes | ({"loss": {"lambda_msp": 0.0}} if name == NO_PRIOR else {})
 
 
@@ -41,7 +42,7 @@ CONFIGURATIONS = ("base", "A", "S", "L", "A+S", "A+S+L", NO_PRIOR)
 
 def ablation_spec(
     sequences: Iterable[str], seeds: int, *, fixed_at: int | None, chosen: Iterable[str] = CONFIGURATIONS, **keys: Any
-) -> dict[str, Any]:
+) -> Keys:
     """A sweep of the configurations, in the form of `sweeps.spec.spec_of`.
 
     seeds     number of seeds, 0 .. seeds - 1
@@ -50,7 +51,7 @@ def ablation_spec(
     chosen    names among CONFIGURATIONS
     keys      other keys of the spec
     """
-    made: dict[str, Any] = {name: model_of(name) for name in chosen}
+    made: Keys = {name: model_of(name) for name in chosen}
     if fixed_at is not None:
         start = {"configuration": "base", "iteration": fixed_at}
         made |= {f"{name}{FIXED}": model_of(name) | {"density": {"until": 0}, "start": start} for name in list(made)}

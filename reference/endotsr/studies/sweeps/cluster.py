@@ -78,7 +78,7 @@ class _Sent:
 
     def __init__(self, client: Any, sequence_of: Callable[[Job], Sequence] | None) -> None:
         self._client, self._sequence_of = client, sequence_of
-        self._found: dict[str, Any] = {}
+        self._found: dict[str, object] = {}
 
     def of(self, job: Job) -> Any:
         """The sequence of a job as a future; the first call sends it to every worker. None: workers read it."""

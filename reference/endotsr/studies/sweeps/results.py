@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any, Required, cast
 
 from endotsr.errors import InputError
-from endotsr.results.evaluation.records import FrameMetrics, MetricValues
+from endotsr.results.evaluation.records import FrameMetrics, LabelledMeans, Measured, MetricValues
 from endotsr.results.report.comparison import csv_text
 from endotsr.results.report.tables import markdown
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.studies.sweeps.jobs import Job
 from endotsr.training.runs.files import read_json, write_json
 from endotsr.training.runs.machine import MachinePart, now
+from endotsr.untrusted.json import Keys
 from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of results.json; raised when a key changes its name or meaning
@@ -55,10 +56,10 @@ class RunRow(MetricValues, total=False):
     width: int | None
     height: int | None
     arrays_sha256: dict[str, str]
-    settings: dict[str, Any]
+    settings: Keys
     per_frame: list[FrameMetrics]
-    baselines: dict[str, dict[str, Any]]  # label and mean of each
-    measures: dict[str, dict[str, Any]]
+    baselines: dict[str, LabelledMeans]
+    measures: dict[str, Measured]
     versions: dict[str, str] | None
     machine: MachinePart | None
 

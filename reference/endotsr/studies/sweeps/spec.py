@@ -36,7 +36,7 @@ from endotsr.config import (
 from endotsr.errors import InputError
 from endotsr.results.evaluation.measures import check_measures
 from endotsr.training.runs.sources import SIMULATED
-from endotsr.untrusted.json import Text, integer
+from endotsr.untrusted.json import Keys, Text, integer
 from endotsr.untrusted.toml import read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")
@@ -72,9 +72,9 @@ class SpecFile(Section, frozen=True, kw_only=True):
     iterations: Iteration | None = None
     lpips: Text | None = None
     keep_checkpoints: bool = True
-    settings: dict[str, Any] = msgspec.field(default_factory=dict)
+    settings: Keys = msgspec.field(default_factory=dict)
     simulator: SimulatorSettings = SimulatorSettings()
-    configurations: Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
+    configurations: Annotated[Keys, msgspec.Meta(min_length=1)]
 
 
 class Start(NamedTuple):
@@ -111,7 +111,7 @@ def read_spec(path: Path) -> Spec:
     return spec_of(read_toml(path), str(path), Path(path).absolute().parent)
 
 
-def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
+def spec_of(data: Keys, where: str, folder: Path) -> Spec:
     """A sweep from plain values.
 
     folder   base of relative paths
@@ -129,7 +129,7 @@ def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
     return Spec(sequences, file.seeds, splits, made, file.simulator, file.measures, lpips, file.keep_checkpoints)
 
 
-def split_settings(split: str) -> dict[str, Any]:
+def split_settings(split: str) -> Keys:
     """The settings of section `sequence` for a split: "blocks 4" -> {"split": "blocks", "block_length": 4}."""
     name, _, length = split.partition(" ")
     return {"split": name} | ({"block_length": int(length)} if length else {})
@@ -171,7 +171,7 @@ def _configuration(name: str, values: Any, file: SpecFile, where: str) -> Config
     return Configuration(name, config, keys.start)
 
 
-def _changed(config: Config, changes: dict[str, Any], where: str) -> Config:
+def _changed(config: Config, changes: Keys, where: str) -> Config:
     if "preset" in changes:
         raise InputError(f"{where}: settings.preset is not allowed; allowed: preset next to settings")
     changes = without_former_keys(changes, where, config.training.bridge_fraction)

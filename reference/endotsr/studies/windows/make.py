@@ -8,7 +8,6 @@ failed starts cold. Finished windows are kept; unfinished ones continue from the
 
 import contextlib
 from pathlib import Path
-from typing import Any
 
 from endotsr.clips.sequences.splits import split_frames
 from endotsr.clips.simulator.settings import SimulatorSettings
@@ -20,6 +19,7 @@ from endotsr.studies.sweeps.locks import file_lock
 from endotsr.studies.sweeps.place import Size
 from endotsr.studies.sweeps.sweep import Outcomes, Reporter, Watch, as_they_end
 from endotsr.studies.windows.carry import CarriedStart
+from endotsr.studies.windows.evaluation import WindowCost
 from endotsr.studies.windows.plan import Wanted, check_wanted, planned_windows
 from endotsr.studies.windows.record import FOLDER, Window, WindowsRecord, read_record, write_record
 from endotsr.studies.windows.survey import survey
@@ -223,7 +223,7 @@ def _line(job: Job, outcome: Outcome) -> str:
     return f"window {job.name} (frames {frames}): {trained['iterations']} iterations in {trained['seconds']:.0f} s"
 
 
-def window_cost(folder: Path) -> dict[str, Any]:
+def window_cost(folder: Path) -> WindowCost:
     """Start, iterations, iterations saved, seconds and peak memory in bytes (None: unknown) of a window's training."""
     record = open_run(folder).record()
     start = record.get("start") or {}

@@ -15,7 +15,7 @@ the model and for the recorded frames. Unlike `evaluation.measures.flicker`, it 
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from endotsr.results.evaluation.evaluate import (
 )
 from endotsr.results.evaluation.lpips import LpipsWeights
 from endotsr.results.evaluation.records import EvaluationRecord, FramesMeasured, FramesPart, LabelledFrames
+from endotsr.studies.windows.evaluation import Flicker, LeftOutRow, Seams, WindowedEvaluation, WindowRow
 from endotsr.studies.windows.make import window_cost
 from endotsr.studies.windows.scene import WindowedScene, WindowFrames
 
@@ -38,25 +39,28 @@ LEVELS = 255.0  # flicker is given in 8-bit grey levels
 LEAST_PIXELS = 100  # tissue pixels common to the three frames; frames with fewer are skipped
 
 
-def measure_windows(scene: WindowedScene, frames: WindowFrames, weights: LpipsWeights | None = None) -> dict[str, Any]:
+def measure_windows(
+    scene: WindowedScene, frames: WindowFrames, weights: LpipsWeights | None = None
+) -> WindowedEvaluation:
     """The metrics of a windowed run; renders every frame.
 
-    returns   the keys of `evaluate_model`, joined over the windows; `windows`: name, frames, cost (`window_cost`) and
-              mean held-out PSNR of each; `left_out`; `seams`: the flicker of `model` and `recorded`, each {"seams",
-              "inside", "ratio"} in grey levels, and the numbers of frames
+    returns   the keys of `evaluate_model`, joined over the windows, with those of `WindowedEvaluation`
     """
     found = [_measured(scene, frames, k, weights) for k in range(len(scene.plan.windows))]
     known = [entry for entry in found if entry is not None]
-    metrics: dict[str, Any] = dict(_joined(known)) if known else {"format": FORMAT}
-    metrics["windows"] = [
-        {"name": window.name, "first": window.first, "end": window.end}
-        | window_cost(folder.path)
-        | {"psnr_tissue": entry and entry["held_out"]["mean"].get("psnr_tissue")}
+    joined = _joined(known) if known else cast(EvaluationRecord, {"format": FORMAT})
+    rows: list[WindowRow] = [
+        {
+            "name": window.name,
+            "first": window.first,
+            "end": window.end,
+            **window_cost(folder.path),
+            "psnr_tissue": entry and entry["held_out"]["mean"].get("psnr_tissue"),
+        }
         for window, folder, entry in zip(scene.plan.windows, scene.folders, found)
     ]
-    metrics["left_out"] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
-    metrics["seams"] = _seams(scene, frames)
-    return metrics
+    gaps: list[LeftOutRow] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
+    return {**joined, "windows": rows, "left_out": gaps, "seams": _seams(scene, frames)}
 
 
 def _measured(
@@ -118,17 +122,21 @@ def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
     return evaluation_record(frames, held_out, training, baselines, parts[0]["lpips_reason"])
 
 
-def _seams(scene: WindowedScene, frames: WindowFrames) -> dict[str, Any]:
+def _seams(scene: WindowedScene, frames: WindowFrames) -> Seams:
     """Flicker at seams and inside; None where there is no frame."""
     squares: dict[str, dict[bool, list[float]]] = {name: {True: [], False: []} for name in ("model", "recorded")}
     for at_seam, model, recorded in _flickers(scene, frames):
         squares["model"][at_seam].append(model)
         squares["recorded"][at_seam].append(recorded)
-    counts = {"seam_frames": len(squares["model"][True]), "inside_frames": len(squares["model"][False])}
-    return counts | {name: _levels(found) for name, found in squares.items()}
+    return {
+        "seam_frames": len(squares["model"][True]),
+        "inside_frames": len(squares["model"][False]),
+        "model": _levels(squares["model"]),
+        "recorded": _levels(squares["recorded"]),
+    }
 
 
-def _levels(found: dict[bool, list[float]]) -> dict[str, float | None]:
+def _levels(found: dict[bool, list[float]]) -> Flicker:
     seams, inside = (float(np.sqrt(np.mean(v)) * LEVELS) if v else None for v in (found[True], found[False]))
     return {"seams": seams, "inside": inside, "ratio": seams / inside if seams and inside else None}
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from endotsr.clips.sequences.record import SequenceRecord
 from endotsr.method.kernels.arrays import FloatArray
@@ -12,6 +12,9 @@ from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.studies.windows.scene import WindowedScene, WindowFrames, open_windows
 from endotsr.training.runs.folder import RunFolder
+
+if TYPE_CHECKING:
+    from endotsr.studies.windows.evaluation import WindowedEvaluation
 
 
 @dataclass(eq=False, repr=False)
@@ -79,7 +82,7 @@ class WindowedRun:
         write_windows_page(path, self.scene, path.stem, WINDOW_KEYS, frames)
         return path
 
-    def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
+    def evaluate(self, *, lpips: str | Path | None = None) -> "WindowedEvaluation":
         """Held-out metrics of all windows, the cost of each window, and the flicker at seams.
 
         lpips     AlexNet LPIPS weights (.npz); without them LPIPS is None

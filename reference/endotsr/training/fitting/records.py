@@ -1,6 +1,8 @@
 """Records of a training: log entries, checkpoint headers, and the work on targets."""
 
-from typing import Any, NamedTuple, Required, TypedDict
+from typing import NamedTuple, Required, TypedDict
+
+from endotsr.untrusted.json import Keys
 
 
 class LogEntry(TypedDict, total=False):
@@ -43,11 +45,11 @@ class RngState(TypedDict):
 class CheckpointHeader(TypedDict, total=False):
     """Entries of a checkpoint besides arrays and counters; earlier versions have fewer."""
 
-    config: dict[str, Any]  # the settings, by section
+    config: Keys  # the settings, by section
     lambda_lap: float | None
     sequence: str | None  # fingerprint of the sequence
     coarse: bool
-    diverged: dict[str, Any]  # iteration, frame and term, in the dump of a diverged iteration
+    diverged: Keys  # iteration, frame and term, in the dump of a diverged iteration
 
 
 class Description(TypedDict):

@@ -11,6 +11,7 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
+from endotsr.untrusted.json import Keys
 from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.writing import replace_text
 
@@ -64,7 +65,7 @@ def write_json(path: Path, data: Any) -> None:
     replace_text(path, json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n")
 
 
-def read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
+def read_json(path: Path, needed: tuple[str, ...] = ()) -> Keys:
     """A JSON object. Raises InputError if it cannot be read or lacks a `needed` key, such as "input.source"."""
     data = json_files.read_json(path)
     for dotted in needed:

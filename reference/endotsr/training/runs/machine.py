@@ -5,12 +5,13 @@ import datetime
 import importlib.metadata
 import platform
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypedDict
 
 from endotsr import __version__
 from endotsr.method.kernels.machine import memory_of_machine, usable_cores
-from endotsr.untrusted.json import Count, Text
+from endotsr.untrusted.json import Count, Keys, Text
 
 
 class MachinePart(TypedDict, total=False):
@@ -62,9 +63,9 @@ def peak_memory_bytes() -> int | None:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
-def dated(result: dict[str, Any]) -> dict[str, Any]:
+def dated(result: Mapping[str, Any]) -> Keys:
     """The result with date, machine and versions."""
-    return {"date": now(), "machine": machine(), "versions": versions()} | result
+    return {"date": now(), "machine": machine(), "versions": versions(), **result}
 
 
 def now() -> str:

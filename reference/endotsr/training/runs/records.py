@@ -5,12 +5,12 @@ Every present key must have the type and range below. Any key may be missing, be
 """
 
 from pathlib import Path
-from typing import Annotated, Any, TypedDict, cast
+from typing import Annotated, TypedDict, cast
 
 import msgspec
 
 from endotsr.training.runs.machine import MachinePart
-from endotsr.untrusted.json import Count, Fraction, Side, Text, typed
+from endotsr.untrusted.json import Count, Fraction, Keys, Side, Text, typed
 
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
 
@@ -29,7 +29,7 @@ class InputPart(TypedDict, total=False):
     notes: list[Text]
     arrays_sha256: dict[Text, Text]
     files_sha256: dict[Text, Text]
-    simulator: dict[str, Any]
+    simulator: Keys
 
 
 class ResumedEntry(TypedDict, total=False):
@@ -77,7 +77,7 @@ class RunRecord(TypedDict, total=False):
     resumed: list[ResumedEntry]
     extended: list[ExtendedEntry]
     start: StartPart
-    effects: dict[str, Any]  # verdicts and plan of `--effects auto`
+    effects: Keys  # verdicts and plan of `--effects auto`
 
 
 REPORTED = (
@@ -88,7 +88,7 @@ REPORTED = (
 """Keys of run.json that a report needs."""
 
 
-def checked_run_record(record: dict[str, Any], path: Path) -> RunRecord:
+def checked_run_record(record: Keys, path: Path) -> RunRecord:
     """The checked content of run.json. Raises InputError naming file and key for a wrong type or range."""
     typed(record, RunRecord, path)
     return cast(RunRecord, record)  # keeps the keys of other versions
