@@ -4,62 +4,68 @@ A number in a sentence that has a record behind it carries a comment with its na
 
     flow predicts 39.83 dB<!--=flow.tissue--> on tissue
 
-The text before the comment, number and unit, is replaced by that of `FIGURES`. In the raw file the number stands where
-it is read, and a browser does not show the comment. Longer texts lie in blocks (`store.marks`).
+The number before the comment is replaced by that of `figure_table.FIGURES`; the unit stays. In the raw file the number
+stands where it is read, and a browser does not show the comment. Longer texts lie in blocks (`store.marks`). A figure
+is the mean of one number of records, a constant of the code, or a formula of other figures.
+
+`python tests/docs/bare_figures.py` lists the figures of the prose without such a comment.
 """
 
+import importlib
 import re
 import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.untrusted.writing import replace_file
+from pages.book.figure_table import FIGURES, Figure, Formula, Setting
 from pages.store.marks import read_json
 
 DOCS = Path(__file__).parents[2]
 RESULTS = DOCS / "results"
-PAGES = ("../*.md", "*.md", "guides/*.md", "specification/*.md", "results/*.md")
+PAGES = (
+    "../*.md",
+    "*.md",
+    "guides/*.md",
+    "specification/*.md",
+    "results/*.md",
+    "../notebooks/*.md",
+    "../notebooks/*.py",
+)
+UNITS = "dB|ms|us|s|seconds|min|minutes|hours|[KMG]i?B|px|pixels|%|times"
 MARK = re.compile(  # a number, its unit if any, and the name of the figure
-    r"(?P<number>[-+]?\d[\d.]*)(?P<unit> ?(?:dB|ms|s|minutes|GB|MB|px|%|times)?)<!--=(?P<key>[\w.]+)-->"
+    rf"(?P<number>[-+]?\d[\d.]*)(?P<unit>(?: ?(?:{UNITS}))?)<!--=(?P<key>[\w.]+)-->"
 )
 ANY = re.compile(r"<!--=.*?-->")
 
 
-class Figure(NamedTuple):
-    """The mean of one number of several records."""
-
-    records: str  # pattern of files of docs/results
-    path: str  # keys and indices, joined by dots
-    form: str
-    scale: float = 1.0
-
-
-PULLING, SHARP = "pulling_paper_seed0.json", "pulling_sharp_seed?.json"
-PAPER = "pulling_paper_seed?.json"
-ALONE = "clips.endonerf_pulling.every eighth frame.baselines"
-FIGURES: dict[str, Figure] = {
-    "flow_tissue.tissue": Figure("interpolation.json", f"{ALONE}.flow_interpolation_tissue.psnr_tissue", "{:.2f}"),
-    "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
-    "blend.tissue": Figure(PULLING, "baselines.two_neighbours.mean.psnr_tissue", "{:.2f}"),
-    "flow.full": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_full", "{:.2f}"),
-    "sharp.tissue": Figure(SHARP, "held_out.mean.psnr_tissue", "{:.2f}"),
-    "paper.tissue": Figure(PAPER, "held_out.mean.psnr_tissue", "{:.2f}"),
-    "sharp.full": Figure(SHARP, "held_out.mean.psnr_full", "{:.2f}"),
-    "paper.full": Figure(PAPER, "held_out.mean.psnr_full", "{:.2f}"),
-}
-
-
-def value(of: Figure, folder: Path = RESULTS) -> float:
-    """The mean over the records. Raises: InputError if there is none, or a key is missing."""
+def value(of: Figure | Setting | Formula, folder: Path = RESULTS) -> float:
+    """The number of a figure. Raises: InputError if it has no record, or a key or a name of the code is missing."""
+    if isinstance(of, Formula):
+        return of.of(*(value(FIGURES[key], folder) for key in of.keys))
+    if isinstance(of, Setting):
+        return of.scale * _constant(of.name)
     files = sorted(folder.glob(of.records))
     if not files:
         raise InputError(f"docs/results/{of.records}: no such record")
     return of.scale * float(np.mean([_at(read_json(file, of.records), of.path, file) for file in files]))
+
+
+def _constant(dotted: str) -> float:
+    """The value of MODULE:NAME, where NAME may have attributes and indices joined by dots."""
+    module, _, name = dotted.partition(":")
+    try:
+        found: Any = importlib.import_module(module)
+        for key in name.split("."):
+            found = found[int(key)] if key.isdigit() else getattr(found, key)
+    except (ImportError, AttributeError, IndexError):
+        raise InputError(f"docs/pages/book/figure_table.py: the code has no {dotted}") from None
+    return float(found)
 
 
 def _at(found: Any, path: str, file: Path) -> float:
@@ -76,7 +82,7 @@ def _at(found: Any, path: str, file: Path) -> float:
 def text(key: str) -> str:
     """A figure as text. Raises: InputError for an unknown name."""
     if key not in FIGURES:
-        raise InputError(f"docs/pages/book/figures.py: no figure {key!r}; use one of {', '.join(FIGURES)}")
+        raise InputError(f"docs/pages/book/figure_table.py: no figure {key!r}; use one of {', '.join(FIGURES)}")
     return FIGURES[key].form.format(value(FIGURES[key]))
 
 
