@@ -166,6 +166,7 @@ def test_the_quick_preset_is_sharp_with_another_length_and_a_budget():
         "initialisation.first_frame_points": 14_000,
         "initialisation.other_frame_points": 2000,
         "training.coarse_start": True,
+        "training.visits_per_frame": 29,
     }
 
 

@@ -331,7 +331,7 @@ QUICK = with_settings(
     # affordable for a first look at 640x512 pixels
     density={"growth": "budget", "maximum": 22_000},
     initialisation={"first_frame_points": 14_000, "other_frame_points": 2_000},
-    training={"coarse_start": True},
+    training={"coarse_start": True, "visits_per_frame": 29},  # 1600 iterations up to 55 training frames
 )
 DEMO = with_settings(
     with_iterations(SHARP, 1500),

@@ -14,7 +14,7 @@ from endotsr.cli.main import main
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions, of_length
-from endotsr.config import SHARP, Config, config_to_toml, lengthened, load_config, with_iterations
+from endotsr.config import PRESETS, SHARP, Config, config_to_toml, lengthened, load_config, with_iterations
 from endotsr.studies.sweeps.jobs import jobs_of
 from endotsr.studies.sweeps.spec import read_spec, spec_of
 from endotsr.training.runs.folder import open_run
@@ -89,6 +89,15 @@ def test_a_length_that_nobody_gives_follows_the_number_of_frames(frames, length,
     assert ablated(tmp_path, frames) == {length}
     assert trained([], frames).training.iterations == 6000  # `paper` has one length
     assert trained(["--preset", "demo"], frames).training.iterations == 1500
+
+
+@pytest.mark.parametrize("frames, length", [(8, 1600), (55, 1600), (56, 1624), (64, 1856), (136, 2697), (262, 3741)])
+def test_a_first_look_makes_29_visits_per_frame(frames, length):
+    """136 training frames count as 93, the rounded root of 64 x 136, and 262 as 129."""
+    found = trained(["--preset", "quick"], frames)
+    assert found.training.iterations == length
+    assert found.density.until == round(PRESETS["quick"].density.until * length / 1600)
+    assert trained(["--preset", "quick", "--iterations", "1600"], frames).training.iterations == 1600
 
 
 @pytest.mark.parametrize("frames, length", [(20, 4000), (47, 4700), (55, 5500), (100, 8000)])

@@ -12,6 +12,7 @@ from PIL import Image
 
 from endotsr.results.report import figures
 from endotsr.results.report.data import FramePictures, Preview, ReportData
+from endotsr.results.report.run_text import held_out_table, interpolation_sentence
 from endotsr.results.report.sections import report_html
 
 VOID = {"meta", "img", "source", "br"}
@@ -159,6 +160,34 @@ def test_temporal_gap_is_training_minus_held_out(page):
 
 def test_verdict_names_the_strongest_baseline(page):
     assert "0.75 dB below" in page and "blend of two" in page and "above 1 of 2 baselines" in page
+
+
+@pytest.mark.parametrize(
+    "blend, lpips, said",
+    [
+        (30.25, (None, None), ""),
+        (29.9, (0.02, 0.01), ""),
+        (30.26, (None, None), "Interpolation suffices {} reaches 30.26 dB on tissue, this model 30.25 dB."),
+        (
+            42.8,
+            (0.0366, 0.009),
+            "Interpolation suffices {} 42.80 dB on tissue, this model 30.25 dB (LPIPS 0.0090 and 0.0",
+        ),
+        (42.8, (0.009, 0.0366), "In PSNR, interpolation suffices {} this model 30.25 dB (LPIPS 0.0366 and 0.0090)."),
+    ],
+)
+def test_the_page_says_where_interpolation_suffices(blend, lpips, said):
+    """The rows of the report's own table decide: the blend against the model on tissue, and their LPIPS."""
+    data = made_up_data()
+    for entry, value, distance in (
+        (data.evaluation["held_out"], 30.25, lpips[0]),
+        (data.evaluation["baselines"]["two_neighbours"], blend, lpips[1]),
+    ):
+        entry["mean"] = metrics(value) | {"lpips": distance}
+    sentence = interpolation_sentence(data.evaluation)
+    assert all(part in sentence for part in said.split(" {} ")) and bool(sentence) == bool(said)
+    assert sentence in report_html(data) and ("suffices" in report_html(data)) == bool(said)
+    assert sentence in held_out_table(data.evaluation)
 
 
 def test_no_verdict_against_a_baseline_without_a_value():

@@ -55,6 +55,8 @@ def held_out_table(metrics: EvaluationRecord) -> str:
         lines.append(_means_table(f"{len(outside)} extrapolated", [(label, beyond) for label, _, beyond in means]))
     elif outside:
         lines.append("every held-out frame is extrapolated: no training frame is on its other side")
+    if sentence := interpolation_sentence(metrics):
+        lines.append(sentence)
     inside = metrics["training"]["mean"].get("psnr_tissue")
     run: RunPart | None = metrics.get("run")
     if run is not None or inside is not None:
@@ -77,6 +79,28 @@ def _means_table(head: str, rows: list[tuple[str, Means]]) -> str:
     columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
     cells = [[label, *(fixed(mean.get(key), digits) for key, _, digits in columns)] for label, mean in rows]
     return plain([head, *(label for _, label, _ in columns)], cells)
+
+
+def interpolation_sentence(metrics: EvaluationRecord) -> str:
+    """A sentence if the blend of the two neighbouring frames predicts the frames between better than the model.
+
+    Edges   "" if the model is level or above in PSNR of the tissue, or one of the two has no finite value. Where the
+            model has the lower LPIPS, the sentence is restricted to PSNR.
+    """
+    blend = metrics["baselines"].get("two_neighbours")
+    if blend is None:
+        return ""
+    ours, theirs = (held_out_means(metrics, entry)[0] for entry in (metrics["held_out"], blend))
+    model, best = ours.get("psnr_tissue"), theirs.get("psnr_tissue")
+    if model is None or best is None or model >= best:
+        return ""
+    perceived = [mean.get("lpips") for mean in (ours, theirs)]
+    values, scope = f"{best:.2f} dB on tissue, this model {model:.2f} dB", ""
+    if perceived[0] is not None and perceived[1] is not None:
+        values += f" (LPIPS {perceived[1]:.4f} and {perceived[0]:.4f})"
+        scope = "in PSNR, " if perceived[0] < perceived[1] else ""
+    sentence = f"{scope}interpolation suffices on this clip for the frames between: the blend of the two neighbouring"
+    return f"{sentence[0].upper()}{sentence[1:]} training frames reaches {values}."
 
 
 def trajectory_sentence(motion: MotionPart) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from endotsr.results.report import curves, figures, parts
 from endotsr.results.report.data import DECIDING, FramePictures, ReportData
 from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
-from endotsr.results.report.run_text import SHOWN, facts, pose_sentence, trajectory_sentence
+from endotsr.results.report.run_text import SHOWN, facts, interpolation_sentence, pose_sentence, trajectory_sentence
 from endotsr.results.report.tables import duration, html_table
 
 OPENED_FRAMES = 3  # the worst frames are unfolded
@@ -63,8 +63,13 @@ def _verdict(data: ReportData) -> str:
     return (
         f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the best '
         f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB). "
-        f"It is above {beaten} of {len(rows)} baselines. {ABOUT_BASELINES}</p>"
+        f"It is above {beaten} of {len(rows)} baselines. {ABOUT_BASELINES} {_interpolation(data)}</p>"
     )
+
+
+def _interpolation(data: ReportData) -> str:
+    """The sentence on clips where interpolation suffices, as HTML."""
+    return parts.text(interpolation_sentence(data.evaluation))
 
 
 def moving(data: ReportData) -> str:
