@@ -1,5 +1,6 @@
 """`endotsr masks`: instrument masks for a clip without masks, proposed or carried from a few key frames."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -14,9 +15,10 @@ from endotsr.errors import InputError
 class MasksOptions:
     """Propose instrument masks from metallic grey and from motion relative to the tissue, or carry drawn ones.
 
-    With --keys, the masks of a few frames, drawn in any program, are carried to all frames by dense flow from both
-    sides. The command names the frames whose two sides disagree, and the frame whose mask would help most: draw it, and
-    repeat the command with --replace.
+    --draw writes a page on which a person draws the masks of a few frames and saves them as keys.json. With --keys,
+    these masks, or those of any program, are carried to all frames by dense flow from both sides. The command names the
+    frames whose two sides disagree, and the frame whose mask would help most. --draw with --keys writes a page with
+    this frame: draw it, and repeat the command with --replace.
 
     Without --out, SEQUENCE is a folder from `endotsr prepare`, and the masks are added to it. With --out, SEQUENCE is
     any source of `prepare`; masks/ and the overlay are written to FOLDER and marked as a proposal. Inspect
@@ -29,8 +31,13 @@ class MasksOptions:
     """folder to create, instead of adding the masks to the sequence"""
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
-    keys: Annotated[Path | None, Option("FOLDER")] = None
-    """masks of key frames: PNG pictures named as their frames, white = instrument; all black where there is none"""
+    draw: Annotated[Path | None, Option("PAGE.html", written=True)] = None
+    """write the page to draw on, and no masks"""
+    key_frames: int = 5
+    """with --draw and without --keys: number of frames of the page"""
+    keys: Annotated[Path | None, Option("KEYS")] = None
+    """masks of key frames: keys.json of the page, or a folder of PNG pictures named as their frames, white =
+    instrument; all black where there is none"""
     margin: int = 2
     """with --keys: px by which the masks grow; 0 = the carried outline itself"""
     replace: bool = False
@@ -50,8 +57,8 @@ def run(words: list[str]) -> int:
 
     if options.margin < 0:
         raise InputError(f"masks: --margin {options.margin} is not allowed; use 0 or more pixels")
-    if options.keys is None and options.margin != 2:
-        raise InputError("masks: --margin needs --keys FOLDER; proposed masks have a margin of their own")
+    if options.draw is not None:
+        return _draw(options, options.draw)
     said: list[str] = []
     propose = None if options.keys is None else from_keys(options.keys, options.margin, said)
     if options.out is None:
@@ -74,4 +81,26 @@ def run(words: list[str]) -> int:
         print(f"warning: hardly any tissue is left in {len(proposal.without_tissue)} frames: {named}")
     print(*said, sep="\n", end="\n" if said else "")
     print(f"these masks are proposals: inspect {place / OVERLAY} before training")
+    return 0
+
+
+def _draw(options: MasksOptions, page: Path) -> int:
+    """Write the page to draw on."""
+    from endotsr.clips.sequences.layouts import describe
+    from endotsr.clips.sequences.make_masks import drawing_for
+    from endotsr.clips.sequences.source_options import SourceOptions
+    from endotsr.results.views.draw_page import check_draw_page, write_draw_page
+
+    check_draw_page(page)
+    clip = describe(options.sequence, SourceOptions(layout=options.layout))
+    drawing = drawing_for(clip, options.keys, options.key_frames)
+    command = f"endotsr masks {shlex.quote(str(options.sequence))} --keys keys.json --replace"
+    write_draw_page(page, drawing, f"Masks of {options.sequence.absolute().name}", command)
+    drafts = [frame for frame in drawing.frames if frame.draft]
+    write_result(
+        options.json, page=page, frames=[frame.frame for frame in drawing.frames],
+        drawn=[frame.frame for frame in drawing.frames if frame.key], drafts=[frame.frame for frame in drafts],
+    )  # fmt: skip
+    kind = f" ({drafts[0].draft.origin})" if drafts and drafts[0].draft else ""
+    print(f"{page}: {len(drawing.frames)} frames to draw, {len(drafts)} of them with a draft{kind}")
     return 0

@@ -129,9 +129,9 @@ def test_the_command_carries_the_masks_of_a_folder(tmp_path, capsys):
     assert main(words) == 2
     assert "other.png: is not the name of a frame; use names such as" in capsys.readouterr().err
     assert main(["masks", str(folder), "--keys", str(tmp_path / "none"), "--replace"]) == 2
-    assert "no PNG masks of key frames" in capsys.readouterr().err
+    assert "none: cannot be read" in capsys.readouterr().err
     assert main(["masks", str(folder), "--margin", "5"]) == 2
-    assert "--margin needs --keys" in capsys.readouterr().err
+    assert "--margin has no effect without --keys" in capsys.readouterr().err
 
 
 def rows_of_the_page(column: int) -> dict[int, tuple[float, float]]:

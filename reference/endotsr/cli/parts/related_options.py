@@ -46,6 +46,12 @@ DEPTH = (
     Excludes(("given", "flat"), OF_PAIRS, "it sets the matching of stereo pairs"),
     Excludes(("no-smooth",), ("confidence",), "the confidence is that of the smoothing"),
 )
+MASKS = (
+    Excludes(("draw",), ("out", "replace", "margin"), "the page writes no masks"),
+    Excludes(("key-frames",), ("keys",), "the keys and the next frames are shown"),
+    Needs(("key-frames",), ("draw",), "it is the number of frames of a page"),
+    Needs(("margin",), ("keys",), "proposed masks have a margin of their own"),
+)
 TRAIN = (
     Excludes(
         ("calibrate-only",),
@@ -140,10 +146,15 @@ EXPORT = (
 RELATIONS: dict[str, tuple[Relation, ...]] = {
     "prepare": PREPARE,
     "depth": DEPTH,
+    "masks": MASKS,
     "train": (*TRAIN, *(relation._replace(unless=("resume", "calibrate-only")) for relation in SETTINGS)),
     "render": RENDER,
     "export": EXPORT,
 }
 # Options that only permit something: without an occasion they change nothing.
-PERMISSIONS = {"prepare": ("replace", "trust-depth", "gaps"), "depth": ("replace", "trust-depth")}
+PERMISSIONS = {
+    "prepare": ("replace", "trust-depth", "gaps"),
+    "depth": ("replace", "trust-depth"),
+    "masks": ("replace",),
+}
 FACTS = {"prepare": "layout", "export": "format"}  # of a command: follows from its options, and the command checks it

@@ -183,6 +183,22 @@ def grown(mask: NDArray[np.bool_], pixels: float) -> NDArray[np.bool_]:
     return distance <= pixels
 
 
+def outlines(mask: NDArray[np.bool_], tolerance: float) -> list[tuple[NDArray[np.float64], bool]]:
+    """Outlines of the regions of a mask (H, W) as polygons (n, 2) in x and y, px, and whether each is that of a hole.
+
+    tolerance   px between an outline and its polygon
+
+    The centre of the first pixel is at (0.5, 0.5). OpenCV follows the centres of the outermost pixels; the mask is
+    therefore enlarged, so that the polygon passes within a quarter of a pixel of the edge between two pixels.
+    """
+    cv2, factor = _cv2(), 2
+    large = np.kron(mask, np.ones((factor, factor), bool)).astype(np.uint8)
+    found, tree = cv2.findContours(large, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    parents = [] if tree is None else [int(entry[3]) for entry in tree.reshape(-1, 4)]
+    polygons = [cv2.approxPolyDP(line, tolerance * factor, True).reshape(-1, 2) for line in found]
+    return [((points + 0.5) / factor, parent >= 0) for points, parent in zip(polygons, parents)]
+
+
 def sample_bilinear(image: Array, x: Array, y: Array) -> Array:
     """image[..., y, x] by bilinear interpolation. Outside the image, the nearest border value.
 

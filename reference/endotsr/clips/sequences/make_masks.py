@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import area_resize, read_png, write_png
 from endotsr.clips.sequences.carry_masks import carry_masks, motion_of
 from endotsr.clips.sequences.clip import Clip, Picture
+from endotsr.clips.sequences.drawing import Drawing, drawing_of
+from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts.common import describe_prepared
+from endotsr.clips.sequences.mask_shapes import shapes_of
 from endotsr.clips.sequences.masks import threshold_masks
 from endotsr.clips.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, read_sequence_file, sequence_text
@@ -67,32 +70,47 @@ def without_tissue(clip: Clip, proposal: Proposal) -> list[str]:
 Propose = Callable[[Clip], Proposal]
 
 
-def from_keys(folder: Path, margin: int, said: list[str]) -> Propose:
-    """Masks carried from those of a folder: one picture per key frame with the name of the frame, white = instrument.
+def from_keys(source: Path, margin: int, said: list[str]) -> Propose:
+    """Masks carried from those of a few key frames.
 
+    source   the file of the drawing page, or a folder with one picture per key frame with the name of the frame, white
+             = instrument
     margin   px by which the masks grow, see `carry_masks`
     said     receives a line for frames that are not trusted, and one for the frame to draw next
 
-    The function raises InputError for a folder without keys, a name that is no frame, and a picture that is no mask.
+    The function raises InputError for a folder without keys, a name that is no frame, a picture that is no mask, and a
+    file that `read_drawn` refuses.
     """
 
     def propose(clip: Clip) -> Proposal:
-        keys = read_keys(folder, clip)
-        carried = carry_masks(motion_of(list(left_pictures(clip))), keys, margin)
+        pictures = list(left_pictures(clip))
+        found = read_keys(source, clip, pictures[0])
+        carried = carry_masks(motion_of(pictures), found.keys, margin)
         if carried.distrusted:
             named = shortened([clip.names[i] for i in carried.distrusted])
             said.append(f"not trusted, look at these frames or draw one of them: {named}")
         if carried.next_key is not None:
             said.append(f"the mask that would help most: {clip.names[carried.next_key]}")
-        frames = f"{len(keys)} key frame{'s' if len(keys) != 1 else ''}"
-        return Proposal(carried.excluded, f"carried from {frames}, margin {margin} px")
+        frames = f"{len(found.keys)} key frame{'s' if len(found.keys) != 1 else ''}"
+        never = found.never
+        excluded = carried.excluded if never is None else [plane | never for plane in carried.excluded]
+        never_said = "" if never is None else f"; {never.mean():.1%} of the picture is never tissue"
+        return Proposal(excluded, f"carried from {frames}, margin {margin} px{never_said}")
 
     return propose
 
 
-def read_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
-    """Frame -> mask (H, W), True = instrument, of the pictures of a folder. Raises: see `from_keys`."""
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".png") if folder.is_dir() else []
+def read_keys(source: Path, clip: Clip, picture: Picture) -> KeyMasks:
+    """Masks of key frames from a file of the drawing page or from a folder. Raises: see `from_keys`."""
+    height, width = picture.shape[:2]
+    if source.is_dir():
+        return KeyMasks(_folder_keys(source, clip))
+    return key_masks(read_drawn(source, clip, width, height))
+
+
+def _folder_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
+    """Frame -> mask (H, W), True = instrument, of the pictures of a folder."""
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".png")
     if not files:
         raise InputError(f"{folder}: no PNG masks of key frames; name each as its frame, such as {clip.names[0]}.png")
     place = {name: i for i, name in enumerate(clip.names)}
@@ -102,6 +120,30 @@ def read_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
     pictures = [read_png(file) for file in files]
     planes = [picture if picture.ndim == 2 else picture.max(axis=2) for picture in pictures]
     return {place[f.stem]: threshold_masks([plane], [f.name], [])[0] for f, plane in zip(files, planes)}
+
+
+def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> Drawing:
+    """The content of the drawing page.
+
+    keys     the file of an earlier page, or a folder of masks, which become polygons; None: a first page, with drafts
+             by colour
+    wanted   number of frames of a first page
+
+    Raises:  InputError as `from_keys` and `drawing_of`.
+    """
+    pictures = list(left_pictures(clip))
+    if keys is None:
+        return drawing_of(clip, pictures, wanted, propose_masks(pictures).excluded)
+    height, width = pictures[0].shape[:2]
+    if keys.is_dir():
+        found = [
+            DrawnKey(frame=i, name=clip.names[i], shapes=shapes_of(mask, "drawn"))
+            for i, mask in sorted(_folder_keys(keys, clip).items())
+        ]
+        drawn = DrawnFile(format=FORMAT, frames=clip.count, width=width, height=height, keys=found)
+    else:
+        drawn = read_drawn(keys, clip, width, height)
+    return drawing_of(clip, pictures, wanted, [], drawn)
 
 
 def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = None) -> Proposal:

@@ -1,0 +1,128 @@
+"""What the drawing page shows: key frames with their shapes, drafts, and the motion between them.
+
+In: a clip and, after the first round, the file of the page. Out: a `Drawing`. In the first round the frames are evenly
+spaced and the drafts come from the colours. Later the frames of the file are shown with those whose mask would help
+most, and their drafts are the carried masks.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.clips.opencv import sample_bilinear
+from endotsr.clips.sequences.carry_masks import ClipFlows, carry_masks, motion_of
+from endotsr.clips.sequences.clip import Clip, Picture
+from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
+from endotsr.clips.sequences.mask_shapes import LARGEST, Origin, Shape, shapes_of
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+
+KEY_FRAMES, MOST_KEY_FRAMES = 5, 60  # frames of a first page
+PROPOSED = 3  # further frames of a later page
+STEP, MOST_COLUMNS = 16, 48  # px between the nodes of the grid of motion, at least, and nodes across
+
+
+class Draft(NamedTuple):
+    """Shapes that a person has not accepted yet."""
+
+    origin: Origin  # `colour` or `carried`
+    shapes: list[Shape]
+
+
+class DrawnFrame(NamedTuple):
+    """A frame of the page."""
+
+    frame: int
+    name: str
+    picture: Picture
+    shapes: list[Shape]
+    key: bool  # whether a person has drawn this frame, or stated that it shows no instrument
+    draft: Draft | None
+    ahead: FloatArray | None  # (2, m) px: displacement of the nodes to the next frame of the page
+    back: FloatArray | None  # (2, m) px: displacement to the previous one
+
+
+class Drawing(NamedTuple):
+    """All of the page."""
+
+    count: int  # frames of the clip
+    width: int
+    height: int
+    frames: list[DrawnFrame]
+    never: list[Shape]
+    step: int  # px between the nodes; the first one is at (step / 2, step / 2)
+    columns: int
+
+
+def even_frames(count: int, wanted: int) -> list[int]:
+    """`wanted` evenly spaced frames of `count`, the first and the last one included; one frame is the middle one."""
+    if wanted == 1:
+        return [count // 2]
+    return np.unique(np.linspace(0, count - 1, min(wanted, count)).round().astype(int)).tolist()
+
+
+def drawing_of(
+    clip: Clip, pictures: Sequence[Picture], wanted: int, colour: list[BoolArray], drawn: DrawnFile | None = None
+) -> Drawing:
+    """The content of the page.
+
+    pictures   (H, W, 3) of all frames
+    wanted     number of frames of a first page
+    colour     masks (H, W) by colour of all frames, True = instrument; empty: no drafts by colour
+    drawn      the file of an earlier page
+
+    Raises:  InputError for a number of frames that is not allowed, and for pictures that are too large.
+    """
+    if not 1 <= wanted <= MOST_KEY_FRAMES:
+        raise InputError(f"masks: --key-frames {wanted} is not allowed; use 1 to {MOST_KEY_FRAMES}")
+    height, width = pictures[0].shape[:2]
+    if max(height, width) > LARGEST:
+        raise InputError(f"{clip.where}: pictures of {width}x{height}; a page shows at most {LARGEST} pixels a side")
+    motion = motion_of(pictures)
+    keys = {key.frame: key for key in drawn.keys} if drawn else {}
+    if drawn and keys:
+        shown, drafts = _next_frames(motion, key_masks(drawn).keys)
+    else:
+        shown = even_frames(len(pictures), wanted)
+        drafts = {i: Draft("colour", shapes_of(colour[i], "colour")) for i in shown if colour}
+    step = max(STEP, math.ceil(width / MOST_COLUMNS))
+    nodes = np.stack(np.meshgrid(np.arange(step / 2, width, step), np.arange(step / 2, height, step)))
+    columns, points = nodes.shape[2], nodes.reshape(2, -1)
+    frames = []
+    for before, i, after in zip((None, *shown), shown, (*shown[1:], None)):
+        ahead, back = (None if k is None else displacement(motion, i, k, points) for k in (after, before))
+        frames.append(_frame(clip, pictures, i, keys.get(i), drafts.get(i))._replace(ahead=ahead, back=back))
+    return Drawing(len(pictures), width, height, frames, drawn.never if drawn else [], step, columns)
+
+
+def _frame(clip: Clip, pictures: Sequence[Picture], i: int, key: DrawnKey | None, draft: Draft | None) -> DrawnFrame:
+    shapes = key.shapes if key else []
+    usable = draft if key is None and draft and draft.shapes else None
+    return DrawnFrame(i, clip.names[i], pictures[i], shapes, key is not None, usable, None, None)
+
+
+def _next_frames(motion: ClipFlows, keys: dict[int, BoolArray]) -> tuple[list[int], dict[int, Draft]]:
+    """The key frames and up to PROPOSED further ones, in order, and the carried masks of these as drafts.
+
+    A further frame is the next key when the carried masks of the earlier ones count as drawn.
+    """
+    known, drafts = dict(keys), {}
+    for _ in range(PROPOSED):
+        carried = carry_masks(motion, known)
+        if carried.next_key is None:
+            break
+        mask = carried.excluded[carried.next_key]
+        known[carried.next_key] = mask
+        drafts[carried.next_key] = Draft("carried", shapes_of(mask, "carried"))
+    return sorted(known), drafts
+
+
+def displacement(motion: ClipFlows, source: int, target: int, points: FloatArray) -> FloatArray:
+    """Displacement (2, m) px of points (2, m) of one frame to another one, along the dense flows between them."""
+    at, way = points.astype(np.float64), 1 if target > source else -1
+    for i in range(source, target, way):
+        flow = motion.forward[i] if way > 0 else motion.backward[i - 1]
+        at = at + sample_bilinear(flow, at[0] - 0.5, at[1] - 0.5)
+    return at - points
