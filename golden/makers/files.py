@@ -15,8 +15,9 @@ import msgspec
 import numpy as np
 
 from endotsr.method.kernels.machine import compiled_for
-from endotsr.port.judge.format import SCHEMAS, Case, FileEntry, FlagNote, Manifest, read_struct, schema_text, to_json
+from endotsr.port.judge.format import Case, FileEntry, FlagNote, Manifest, read_struct, schema_text, to_json
 from endotsr.port.judge.npy import header_of, npy_bytes
+from endotsr.port.judge.schemas import SCHEMAS
 from makers.solve import Solved
 from makers.wrong import WrongPort
 

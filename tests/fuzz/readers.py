@@ -257,7 +257,8 @@ def read_log(path: Path) -> object:
 
 def golden_json(kind: str) -> Callable[[Path], object]:
     def read(path: Path) -> object:
-        from endotsr.port.judge.format import SCHEMAS, read_struct
+        from endotsr.port.judge.format import read_struct
+        from endotsr.port.judge.schemas import SCHEMAS
 
         return read_struct(path, SCHEMAS[kind])
 

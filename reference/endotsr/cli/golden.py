@@ -12,6 +12,7 @@ from endotsr.errors import InputError
 
 Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]
+Profile = Literal["", "renderer-forward", "renderer", "losses", "optimiser", "method", "training"]
 
 
 @dataclass
@@ -20,6 +21,8 @@ class _Reported:
     """claimed precision of the port"""
     level: Level = 5
     """level to judge; exit code 0 if it is complete"""
+    profile: Profile = ""
+    """judge this part of the method only; the level is then at most its last one"""
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder or archive of the golden cases (default: golden/ or archive at hand)"""
     json: JsonFile = None
@@ -53,6 +56,25 @@ class RunOptions(_Reported):
     """time limit of a call, seconds"""
     keep: Annotated[Path | None, Option("DIR")] = None
     """keep requests and outputs in this folder; replaces those of an earlier run"""
+    certificate: Annotated[Path | None, Option("FILE", written=True)] = None
+    """write a certificate if the level is complete"""
+    badge: Annotated[Path | None, Option("FILE", written=True)] = None
+    """write the badge of the certificate as SVG"""
+    name: str = ""
+    """name of the port in the certificate (default: the working folder)"""
+
+
+@dataclass
+class VerifyOptions:
+    """Judge a port again and compare with its certificate; exit code 1 if the certificate is not confirmed."""
+
+    certificate: Annotated[Path, Option("CERTIFICATE", positional=True)] = Path()
+    port: str = ""
+    """the command of the port; that of the certificate is shown and not run"""
+    golden: Annotated[Path | None, Option("DIR")] = None
+    """folder or archive of the golden cases (default: golden/ or archive at hand)"""
+    timeout: float = 600.0
+    """time limit of a call, seconds"""
 
 
 @dataclass
@@ -73,6 +95,7 @@ class ReferenceOptions:
 SUBCOMMANDS = {
     "judge": "judge a folder of outputs",
     "run": "call a port's command and judge its outputs",
+    "verify": "judge a port again and compare with its certificate",
     "reference": "write the reference's outputs in the same format",
 }
 
@@ -100,21 +123,44 @@ def _judge(words: list[str]) -> int:
         if not folder.is_dir():
             raise InputError(f"{folder}: not a folder")
     golden = read_golden(golden_folder(options.golden))
-    asked = {"level": options.level, "again": options.again, "only": options.only}
+    asked = {"level": options.level, "again": options.again, "only": options.only, "profile": options.profile}
     report = judge(golden, options.outdir, options.precision, **asked)
     return _report(report, golden, options.outdir, options)
 
 
 def _run(words: list[str]) -> int:
+    from endotsr.port.judge.badge import write_proof
     from endotsr.port.judge.call import called
+    from endotsr.port.judge.certificate import port_of
     from endotsr.port.judge.store import golden_folder, read_golden
 
     options = parse(RunOptions, words, "golden run")
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
-        asked = {"level": options.level, "only": options.only, "timeout": options.timeout}
+        asked = {"level": options.level, "only": options.only, "timeout": options.timeout, "profile": options.profile}
         report, outputs = called(golden, options.port, options.keep or Path(scratch), options.precision, **asked)
-        return _report(report, golden, outputs, options)
+        code = _report(report, golden, outputs, options)
+    if options.certificate or options.badge:
+        reason = write_proof(golden, report, port_of(options.port, options.name), options.certificate, options.badge)
+        print(reason, end="\n" if reason else "")
+        code = code or int(bool(reason))
+    return code
+
+
+def _verify(words: list[str]) -> int:
+    from endotsr.port.judge.certificate import read_certificate
+    from endotsr.port.judge.report import as_table
+    from endotsr.port.judge.store import golden_folder, read_golden
+    from endotsr.port.judge.verify import summary, verified
+
+    options = parse(VerifyOptions, words, "golden verify")
+    if options.certificate == Path():
+        raise InputError("golden verify: CERTIFICATE is missing")
+    given, golden = read_certificate(options.certificate), read_golden(golden_folder(options.golden))
+    with tempfile.TemporaryDirectory() as scratch:
+        report, _, found = verified(golden, given, options.port, Path(scratch), timeout=options.timeout)
+    print("\n".join([*([as_table(report)] if found else []), *summary(given, options.port, found)]))
+    return 1 if found else 0
 
 
 def _report(report, golden, outdir: Path, options: _Reported) -> int:

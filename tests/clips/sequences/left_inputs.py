@@ -8,8 +8,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import raw_sources
-from input_kinds import Row, close, folder_of, prepare, video
-from made_videos import picture
+from input_kinds import Row, close, prepare
 from raw_sources import scene_picture
 
 from endotsr.cli.main import main
@@ -168,15 +167,4 @@ POSE_ROWS = [
     Row("LLFF, axes of its own tool, training", llff_trained, "refused", "prepare --trajectory-axes llff"),
     Row("LLFF, --trajectory-axes llff", llff_prepared("--trajectory-axes", "llff"), "right", "", true_poses),
 ]  # fmt: skip
-TWICE = [picture(i // 2) for i in range(40)]
-PULLED_DOWN = [picture(i - i // 5) for i in range(40)]
-COPY_ROWS = [
-    Row("video, every picture twice, coded", video("a.mp4", TWICE, options={"crf": "28"}), "told",
-        "every second frame repeats the one before (20 of 40 frames"),
-    Row("video, every picture twice, --frames ::2", video("a.mp4", TWICE, "--frames", "::2"), "right", "",
-        close(TWICE[::2])),
-    Row("video, 24 a second stored as 30", video("a.mp4", PULLED_DOWN, options={"crf": "28"}), "told",
-        "1 of every 5 frames repeat"),
-    Row("pictures, every picture twice", folder_of(TWICE), "told", "without the copies: --frames ::2"),
-]  # fmt: skip
-LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS, *COPY_ROWS]
+LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS]

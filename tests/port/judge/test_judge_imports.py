@@ -8,7 +8,7 @@ from pathlib import Path
 import endotsr.port.judge
 
 ROOM = Path(endotsr.port.judge.__file__).parent
-OWN = ("endotsr.errors", "endotsr.port.judge", "endotsr.untrusted.files", "endotsr.untrusted.names")
+OWN = ("endotsr", "endotsr.errors", "endotsr.port.judge", "endotsr.untrusted.files", "endotsr.untrusted.names")
 LIBRARIES = {"numpy", "msgspec", "pytest"}  # pytest by the tests of ports in Python
 
 
@@ -48,5 +48,5 @@ def test_nothing_of_the_method_is_loaded_with_the_judge():
     script = f"import sys; import {', '.join(names)}; print(*sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = {name for name in done.stdout.split() if name.startswith("endotsr")}
-    assert loaded == {"endotsr", "endotsr.port", "endotsr.untrusted", *OWN, *names}
+    assert loaded == {"endotsr.port", "endotsr.untrusted", *OWN, *names}
     assert "numba" not in done.stdout.split()

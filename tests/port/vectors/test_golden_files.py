@@ -13,8 +13,9 @@ from endotsr.errors import InputError
 from endotsr.method.splatting.fast.blocks import supports
 from endotsr.port.contract import all_operations
 from endotsr.port.gradcheck import all_pairs
-from endotsr.port.judge.format import FLIP_BUDGET, SCHEMAS, Rule, schema_text
+from endotsr.port.judge.format import FLIP_BUDGET, Rule, schema_text
 from endotsr.port.judge.npy import npy_bytes
+from endotsr.port.judge.schemas import SCHEMAS
 from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.words import fnv1a, words
 from endotsr.port.reference import reference

@@ -9,11 +9,15 @@ import tempfile
 from pathlib import Path
 
 from endotsr.errors import InputError
+from endotsr.port.judge.badge import write_proof
 from endotsr.port.judge.call import called
+from endotsr.port.judge.certificate import port_of, read_certificate
 from endotsr.port.judge.format import LEVELS
+from endotsr.port.judge.profiles import PROFILES
 from endotsr.port.judge.report import as_html, as_json, as_table
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
 from endotsr.port.judge.verdict import Report, judge
+from endotsr.port.judge.verify import summary, verified
 
 NO_SEARCH = "the line of the definition that your port computes is searched by `endotsr golden` of the package endotsr"
 
@@ -23,7 +27,15 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="call a port's command and judge its outputs")
     run.add_argument("--port", required=True, help="the command, with {requests} and {outputs} for the folders")
-    run.add_argument("--timeout", type=float, default=600.0, help="time limit of a call, seconds")
+    run.add_argument("--certificate", type=Path, metavar="FILE", help="write a certificate if the level is complete")
+    run.add_argument("--badge", type=Path, metavar="FILE", help="write its badge as SVG")
+    run.add_argument("--name", default="", help="name of the port in the certificate; default: the working folder")
+    check = commands.add_parser("verify", help="judge again, and compare with a certificate")
+    check.add_argument("file", type=Path, metavar="CERTIFICATE")
+    check.add_argument("--port", default="", help="the command; that of the certificate is shown and not run")
+    check.add_argument("--golden", type=Path, metavar="DIR", help="folder or archive of the vectors")
+    for command in (run, check):
+        command.add_argument("--timeout", type=float, default=600.0, help="time limit of a call, seconds")
     run.add_argument("--keep", type=Path, metavar="DIR", help="keep requests and outputs in this folder")
     judged = commands.add_parser("judge", help="judge a folder of outputs")
     judged.add_argument("outdir", type=Path, metavar="OUTDIR")
@@ -31,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     for command in (run, judged):
         command.add_argument("--precision", choices=("float32", "float64"), default="float32")
         command.add_argument("--level", type=int, choices=tuple(LEVELS), default=5)
+        command.add_argument("--profile", default="", choices=("", *PROFILES), help="judge this part of the method")
         command.add_argument("--golden", type=Path, metavar="DIR", help="folder or archive of the vectors")
         command.add_argument("--only", default="", metavar="FAMILY[/CASE]", help="this part alone, without a claim")
         command.add_argument("--json", type=Path, metavar="FILE", help="also write the report as JSON")
@@ -40,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _judged(golden: Golden, options: argparse.Namespace, scratch: Path) -> tuple[Report, Path]:
-    asked = {"level": options.level, "only": options.only}
+    asked = {"level": options.level, "only": options.only, "profile": options.profile}
     if options.command == "run":
         root = options.keep or scratch
         return called(golden, options.port, root, options.precision, timeout=options.timeout, **asked)
@@ -50,12 +63,21 @@ def _judged(golden: Golden, options: argparse.Namespace, scratch: Path) -> tuple
     return judge(golden, options.outdir, options.precision, again=options.again, **asked), options.outdir
 
 
+def _verified(golden: Golden, options: argparse.Namespace, scratch: Path) -> int:
+    given = read_certificate(options.file)
+    report, _, found = verified(golden, given, options.port, scratch, timeout=options.timeout)
+    print("\n".join([*([as_table(report)] if found else []), *summary(given, options.port, found)]))
+    return 1 if found else 0
+
+
 def main(words: list[str]) -> int:
     """The command: exit code 0 if the level is complete, 1 if it is not, 2 if it cannot be judged."""
     options = _parser().parse_args(words)
     try:
         golden = read_golden(golden_folder(options.golden))
         with tempfile.TemporaryDirectory() as scratch:
+            if options.command == "verify":
+                return _verified(golden, options, Path(scratch))
             report, outputs = _judged(golden, options, Path(scratch))
             if report.first_wrong:
                 report.notes.append(NO_SEARCH)
@@ -64,6 +86,11 @@ def main(words: list[str]) -> int:
                 options.json.write_bytes(as_json(report))
             if options.html:
                 options.html.write_text(as_html(report, golden, outputs), encoding="utf-8", newline="\n")
+            if options.command == "run" and (options.certificate or options.badge):
+                port = port_of(options.port, options.name)
+                if reason := write_proof(golden, report, port, options.certificate, options.badge):
+                    print(reason)
+                    return 1
     except (InputError, OSError) as error:
         print(f"endotsr-golden: error: {error}", file=sys.stderr)
         return 2

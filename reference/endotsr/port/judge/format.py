@@ -255,9 +255,6 @@ class Requests(_Strict, frozen=True, kw_only=True):
             relative_path(name, "cases")
 
 
-SCHEMAS = {"case": Case, "manifest": Manifest, "request": Request, "requests": Requests}
-
-
 def to_json(value: msgspec.Struct) -> str:
     """Indented JSON text with a final newline; the same bytes for the same value."""
     return msgspec.json.format(msgspec.json.encode(value), indent=1).decode() + "\n"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from endotsr.port.judge.diagnose import made_of
 from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.npy import Refused, read_plain
+from endotsr.port.judge.profiles import lines_of
 from endotsr.port.judge.recognise import Suspect
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
@@ -51,13 +52,13 @@ def as_table(report: Report, *, everything: bool = False) -> str:
     lines += [""] + [
         f"level {k} ({LEVELS[k]}): {good} of {asked} outputs" for k, (good, asked) in report.levels.items()
     ]
-    return "\n".join([*lines, *report.notes, report.claim])
+    return "\n".join([*lines, *lines_of(report.profiles), *report.notes, report.claim])
 
 
 def answer(report: Report, *, everything: bool = False) -> list[str]:
     """The faults: how the port failed, the first wrong operation, its explanations and resemblances."""
     return [
-        *report.failures, *report.diagnosis[:1], *report.inside, *report.causes,
+        *report.failures, *report.needles, *report.diagnosis[:1], *report.inside, *report.causes,
         *_suspects(report, everything=everything), *report.diagnosis[1:],
     ]  # fmt: skip
 

@@ -14,7 +14,20 @@ from endotsr.errors import InputError
 from endotsr.port.judge.compare import Verdict, judged, misses
 from endotsr.port.judge.diagnose import diagnosis, first_wrong
 from endotsr.port.judge.format import LEVELS, Case, Output, Precision
+from endotsr.port.judge.needles import Off, only_needles
 from endotsr.port.judge.npy import Refused, read_plain, read_text
+from endotsr.port.judge.profiles import (
+    REVERSE,
+    WITHOUT,
+    Graded,
+    ProfileClaim,
+    claim_text,
+    complete_level,
+    last_level,
+    of_profile,
+    profile_claims,
+    without_reverse,
+)
 from endotsr.port.judge.recognise import NAMED, Evidence, Suspect, Taken, evidence_of, merged, suspects_of
 from endotsr.port.judge.relate import relations
 from endotsr.port.judge.store import Golden
@@ -22,6 +35,7 @@ from endotsr.port.judge.trajectory import FirstWrong, first_wrong_iteration
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations omitted by the port, one per line
 INSIDE = "inside"  # in that file: the port cannot write arrays inside its operations
+NO_REVERSE = "reverse"  # in that file: the port has no reverse pass
 LARGEST_RELATED = 20_000  # largest number of entries of an output that is searched for relations
 MISSING = "missing"  # the array reader's reason for a missing file
 MOST_FILES = 1000  # files of a case's folder that are searched for a misnamed output
@@ -90,8 +104,16 @@ class Report(msgspec.Struct, kw_only=True):
     """changes of the definition that reproduce the port's outputs of that operation; see port.search"""
     inside: list[str] = []
     """the first wrong array inside that operation, among the port's intermediate arrays; see port.search.inside"""
+    needles: list[str] = []
+    """if needles alone are wrong: how far, and how to mend it"""
     failures: list[str] = []
     """failures of the port as a program"""
+    profile: str = ""
+    """the profile that was asked for, "" = every case"""
+    profiles: list[ProfileClaim] = []
+    """what is right, by profile"""
+    seconds: float = 0.0
+    """of the calls of the port"""
 
     first_wrong: str = ""
     """the first operation with a refused output"""
@@ -108,15 +130,19 @@ class Report(msgspec.Struct, kw_only=True):
 
 
 def judge(
-    golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None, only: str = ""
-) -> Report:
+    golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None, only: str = "",
+    profile: str = "",
+) -> Report:  # fmt: skip
     """Compare OUTDIR/<family>/<case>/<name>.npy with the golden cases up to a level.
 
-    again   a second output folder of the same port, bitwise equal; without it level 5 is not complete
-    only    a family, or family/case: no other case is judged, and there is no claim
+    again     a second output folder of the same port, bitwise equal; without it level 5 is not complete
+    only      a family, or family/case: no other case is judged, and there is no claim
+    profile   one of `profiles.PROFILES`: only its outputs are judged, up to its last level
     """
-    golden = only_of(golden, only)
+    golden, level = asked_of(golden, only, profile, level)
     without, notes = declared(golden, outputs)
+    forward = not profile and NO_REVERSE in left_out(outputs)[0]
+    golden = without_reverse(golden) if forward else golden
     reports = [
         CaseReport(name=case.name, title=case.title, operation=case.operation, level=case.level, status="not ported")
         if case.operation in without
@@ -126,10 +152,26 @@ def judge(
     ]
     if level >= 5:
         reports.append(_not_repeated() if again is None else _repeated(golden, outputs, again, without))
-    report = conclude(golden, reports, precision, level, notes, without)
+    report = conclude(golden, reports, precision, level, notes, without, profile)
     if only:
-        report.claim = f"no claim: only {only} was judged"
+        report.claim, report.profiles = f"no claim: only {only} was judged", []
+    elif forward and report.level >= 0:
+        report.profiles = profile_claims(
+            [*_graded(reports), *(Graded(r.operation, REVERSE, 2, False) for r in reports)]
+        )
+        report.claim += f"{', ' if WITHOUT in report.claim else WITHOUT}reverse passes"
     return report
+
+
+def asked_of(golden: Golden, only: str, profile: str, level: int) -> tuple[Golden, int]:
+    """The cases of a part or a profile, and the level up to which they are asked. Raises InputError if unknown."""
+    golden = only_of(golden, only)
+    if not profile:
+        return golden, level
+    cases = of_profile(golden.cases, profile)
+    if not cases:
+        raise InputError(f"--profile {profile}: {only} is no part of it")
+    return golden._replace(cases=cases), min(level, last_level(profile))
 
 
 def only_of(golden: Golden, only: str) -> Golden:
@@ -148,7 +190,7 @@ def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]
     if refusal:
         return (), [f"{NOT_PORTED}: {refusal}; every operation is judged"]
     known = dict.fromkeys(case.operation for case in golden.cases)
-    unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - {*known, INSIDE})]
+    unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - {*known, INSIDE, NO_REVERSE})]
     return tuple(name for name in known if name in named), unknown[:5]
 
 
@@ -163,38 +205,54 @@ def left_out(outputs: Path) -> tuple[set[str], str]:
 
 def conclude(
     golden: Golden, reports: list[CaseReport], precision: Precision, level: int, notes: list[str],
-    without: tuple[str, ...] = (),
+    without: tuple[str, ...] = (), profile: str = "",
 ) -> Report:  # fmt: skip
-    """Levels, claim and suspects from the verdicts on all cases. An empty level is not complete."""
+    """Levels, claims and suspects from the verdicts on all cases. An empty level is complete in a profile alone."""
     counts = {k: _count(reports, k) for k in LEVELS if k <= level}
-    reached = -1
-    for k, (good, asked) in counts.items():
-        if good < asked or not asked:
-            break
-        reached = k
+    reached = complete_level(counts, gaps=bool(profile))
     _, first = first_wrong(golden.cases, reports)
     return Report(
         version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
-        claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
+        claim=_claim(golden, reached, precision, without, profile), levels=counts, cases=reports,
         suspects=suspects_of(golden, merged(r.evidence for r in reports)), notes=notes,
         diagnosis=diagnosis(golden.cases, reports), first_wrong=first.operation if first else "",
+        needles=only_needles(_off(golden, reports, precision)), profile=profile,
+        profiles=profile_claims(_graded(reports)),
     )  # fmt: skip
+
+
+def _graded(reports: list[CaseReport]) -> list[Graded]:
+    """Every verdict for the profiles; one that fails for an operation that the port leaves out."""
+    found = [
+        Graded(r.operation or "determinism", o.name, o.level, o.status == "passed") for r in reports for o in r.outputs
+    ]
+    return found + [Graded(r.operation, "", r.level, False) for r in reports if not r.outputs]
+
+
+def _off(golden: Golden, reports: list[CaseReport], precision: Precision) -> list[Off]:
+    """Every output that is not right, with its distance in tolerances."""
+    cases, found = {case.name: case for case in golden.cases}, []
+    for report in reports:
+        for output in (o for o in report.outputs if o.status != "passed"):
+            asked = cases[report.name].outputs.get(output.name) if report.name in cases else None
+            tolerance = getattr(asked.compare, precision) if asked else 0.0
+            ratio = output.distance / tolerance if tolerance and output.distance is not None else None
+            found.append(Off(report.name, output.name, ratio))
+    return found
 
 
 def without_claim(report: Report, reasons: list[str]) -> None:
     """Remove the claim: a port that fails has none, even if it wrote outputs before."""
     report.failures += reasons
-    report.level, report.claim = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}"
+    report.level, report.claim, report.profiles = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}", []
 
 
-def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[str, ...]) -> str:
+def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[str, ...], profile: str) -> str:
     """The claim that the port may publish, with the operations that it omits from these levels."""
     if reached < 0:
         return "no level is complete"
-    claim = f"golden {golden.short_version}, level {reached}, {precision}"
     asked = {case.operation for case in golden.cases if case.level <= reached}
-    missing = [name for name in without if name in asked]
-    return f"{claim}, without {', '.join(missing)}" if missing else claim
+    return claim_text(golden.manifest.version, profile, reached, precision, [n for n in without if n in asked])
 
 
 def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:

@@ -1,0 +1,70 @@
+"""Verification of a certificate: the judgement again, and every difference from what the certificate says.
+
+A certificate is a file of another person, so its command is shown and never run: the caller gives the command.
+"""
+
+from pathlib import Path
+
+from endotsr import __version__
+from endotsr.errors import InputError
+from endotsr.port.judge.call import called
+from endotsr.port.judge.certificate import Certificate, certified, manifest_hash, port_of
+from endotsr.port.judge.store import Golden
+from endotsr.port.judge.verdict import Report
+
+COMPARED = ("claim", "vectors", "manifest", "profile", "level", "precision", "without", "right", "cases", "outputs")
+
+
+def same_vectors(golden: Golden, given: Certificate) -> None:
+    """Raises InputError if the vectors at hand are not those of the certificate."""
+    if (golden.manifest.version, manifest_hash(golden)) != (given.vectors, given.manifest):
+        raise InputError(
+            f"verify: the certificate is of vectors {given.vectors} with manifest {given.manifest[:12]}, at hand are "
+            f"{golden.manifest.version} with {manifest_hash(golden)[:12]}; name those of the certificate with --golden"
+        )
+
+
+def verified(
+    golden: Golden, given: Certificate, command: str, root: Path, *, timeout: float = 600.0
+) -> tuple[Report, Path, list[str]]:
+    """Judge the port again as the certificate says. Returns the report, its outputs and the differences, one a line.
+
+    command   of the port, with {requests} and {outputs}
+    root      folder for requests and outputs
+
+    Raises: InputError without a command, with the one of the certificate in the message, and for other vectors.
+    """
+    if not command:
+        raise InputError(
+            "verify: a command out of a file is not run; read it and give it yourself, in the folder of the port: "
+            f"--port {given.port.command!r}"
+        )
+    same_vectors(golden, given)
+    asked = {"level": given.level, "profile": given.profile, "timeout": timeout}
+    report, outputs = called(golden, command, root, given.precision, **asked)
+    return report, outputs, differences(golden, given, report, command)
+
+
+def differences(golden: Golden, given: Certificate, report: Report, command: str) -> list[str]:
+    """What the certificate says and the judgement does not confirm."""
+    if not report.passed:
+        return [f"claim: the certificate says {given.claim!r}, the judge {report.claim!r}"]
+    now = certified(golden, report, port_of(command))
+    return [
+        f"{name}: the certificate says {getattr(given, name)!r}, the judge {getattr(now, name)!r}"
+        for name in COMPARED
+        if getattr(given, name) != getattr(now, name)
+    ]
+
+
+def summary(given: Certificate, command: str, found: list[str]) -> list[str]:
+    """The result for a terminal; another commit or command is named, but is no difference of the claim."""
+    now, notes = port_of(command), []
+    if given.port.commit != now.commit:
+        notes.append(f"commit: {given.port.commit or 'none'} in the certificate, {now.commit or 'none'} here")
+    if given.port.command != command:
+        notes.append(f"command: {given.port.command!r} in the certificate")
+    if given.judge != __version__:
+        notes.append(f"judge: endotsr {given.judge} in the certificate, {__version__} here")
+    result = "differs from the certificate" if found else f"confirmed: {given.claim}"
+    return [*found, *notes, result]

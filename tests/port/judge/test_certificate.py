@@ -1,0 +1,140 @@
+"""A certificate: written for a complete level alone, confirmed by a second judgement, refused if it is changed."""
+
+import json
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from endotsr.cli.golden import run
+from endotsr.errors import InputError
+from endotsr.port.judge.badge import badge
+from endotsr.port.judge.certificate import read_certificate
+from endotsr.port.judge.format import schema_text, to_json
+from endotsr.port.judge.schemas import SCHEMAS
+from endotsr.port.judge.store import golden_folder, read_golden
+
+THREE = Path(__file__).parents[1] / "delivery" / "three_functions.py"
+
+
+def port(script=THREE):
+    return f'"{sys.executable}" "{script}" {{requests}} {{outputs}}'
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("certificate")
+    words = ["run", "--port", port(), "--precision", "float64", "--level", "2", "--name", "three <functions>"]
+    assert run([*words, "--certificate", str(folder / "c.json"), "--badge", str(folder / "b.svg")]) == 0
+    return folder
+
+
+def test_a_certificate_says_what_was_judged(written, capsys):
+    found = read_certificate(written / "c.json")
+    capsys.readouterr()
+    assert found.claim.startswith("golden 4.") and ", level 2, float64, without " in found.claim
+    assert found.vectors == read_golden(golden_folder()).manifest.version and len(found.manifest) == 64
+    assert found.port.command == port() and found.port.name == "three <functions>" and found.port.commit
+    assert found.cases >= 6 and found.outputs >= 20 and 0 < found.seconds < 600
+    assert 0 <= found.tolerances.used <= 1 and found.tolerances.smallest <= found.tolerances.largest
+    assert "motion" not in found.without and "adam" in found.without
+
+
+def test_the_file_has_the_fields_of_its_schema(written):
+    schema = json.loads(schema_text(SCHEMAS["certificate"]))
+    record = schema["$defs"][schema["$ref"].rpartition("/")[2]]
+    data = json.loads((written / "c.json").read_text())
+    assert set(data) == set(record["properties"]) and record["additionalProperties"] is False
+
+
+def test_the_badge_is_xml_with_the_claim_as_its_title(written):
+    root = ET.fromstring((written / "b.svg").read_text())
+    found = read_certificate(written / "c.json")
+    assert root.find("{http://www.w3.org/2000/svg}title").text == found.claim
+    texts = [one.text for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert texts == ["endotsr golden", f"{found.vectors[:3]}, level 2, float64, in part"]
+    hostile = SCHEMAS["certificate"](
+        **{**{n: getattr(found, n) for n in found.__struct_fields__}, "vectors": "<b>.1.0"}
+    )
+    ET.fromstring(badge(hostile))
+
+
+def test_verify_judges_again(written, capsys):
+    words = ["verify", str(written / "c.json"), "--port"]
+    assert run([*words, port()]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("confirmed: golden 4.")
+    wrong = written / "wrong.py"
+    wrong.write_text(THREE.read_text().replace("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]"))
+    assert run([*words, port(wrong)]) == 1
+    said = capsys.readouterr().out
+    assert "claim: the certificate says 'golden" in said and said.endswith("differs from the certificate\n")
+    less = written / "less.py"
+    less.write_text(THREE.read_text().replace("frequencies, motion, exposure)", "frequencies, motion)"))
+    assert run([*words, port(less)]) == 1
+    assert "without: " in capsys.readouterr().out
+
+
+def test_a_command_out_of_a_file_is_shown_and_not_run(written):
+    with pytest.raises(InputError, match=r"not run.*three_functions"):
+        run(["verify", str(written / "c.json")])
+
+
+def test_an_incomplete_level_has_no_certificate(tmp_path, capsys):
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text(THREE.read_text().replace("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]"))
+    words = ["run", "--port", port(wrong), "--precision", "float64", "--level", "2", "--search", "0"]
+    assert run([*words, "--certificate", str(tmp_path / "c.json"), "--badge", str(tmp_path / "b.svg")]) == 1
+    assert "no certificate" in capsys.readouterr().out
+    assert not list(tmp_path.glob("c.json")) + list(tmp_path.glob("b.svg"))
+
+
+def test_a_part_has_no_certificate(tmp_path, capsys):
+    words = ["run", "--port", port(), "--precision", "float64", "--level", "2", "--only", "motion"]
+    assert run([*words, "--certificate", str(tmp_path / "c.json")]) == 1
+    assert "no certificate: no claim: only motion was judged" in capsys.readouterr().out
+    assert not (tmp_path / "c.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"level": 5}, "claim"),
+        ({"claim": "golden 4.1, level 5, float64"}, "claim"),
+        ({"without": []}, "claim"),
+        ({"profile": "everything"}, "profile"),
+        ({"level": 9}, "level"),
+        ({"format": 2}, "format"),
+        ({"more": 1}, "more"),
+        ({"cases": 0}, "count below 1"),
+        ({"seconds": -1.0}, "seconds"),
+        ({"date": "yesterday"}, "date"),
+        ({"date": "2026-11-26T16:31:03"}, "time zone"),
+        ({"tolerances": {"smallest": 0.0, "largest": 1.0, "used": 2.0}}, "beyond its tolerance"),
+        ({"port": {"name": "a\u202eb", "command": "x"}}, "control characters"),
+        ({"port": {"name": "a", "command": "x" * 501}}, "longer"),
+        ({"judge": "1\n2"}, "control characters"),
+    ],
+)
+def test_a_changed_certificate_is_refused(written, tmp_path, change, said):
+    data = json.loads((written / "c.json").read_text())
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps(data | change))
+    with pytest.raises(InputError, match=said):
+        read_certificate(path)
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"[]", b"\xff\xfe", b"null", b"[" * 100_000, b'{"claim": NaN}'])
+def test_a_damaged_certificate_is_refused(tmp_path, data):
+    path = tmp_path / "c.json"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="no certificate"):
+        read_certificate(path)
+
+
+def test_a_certificate_of_other_vectors_is_not_compared(written, tmp_path):
+    found = read_certificate(written / "c.json")
+    other = SCHEMAS["certificate"](**{**{n: getattr(found, n) for n in found.__struct_fields__}, "manifest": "0" * 64})
+    (tmp_path / "c.json").write_text(to_json(other))
+    with pytest.raises(InputError, match="at hand are"):
+        run(["verify", str(tmp_path / "c.json"), "--port", port()])

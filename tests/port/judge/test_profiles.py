@@ -1,0 +1,128 @@
+"""Profiles: a port of one part claims this part, in words; a part with a gap or a mistake claims less."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from endotsr.cli.golden import run
+from endotsr.errors import InputError
+from endotsr.port.judge.command import write_requests
+from endotsr.port.judge.npy import npy_bytes, read_plain
+from endotsr.port.judge.profiles import PROFILES, complete_level, of_profile
+from endotsr.port.judge.report import as_table
+from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.judge.verdict import asked_of, judge
+from endotsr.port.reference import answer_all
+
+CLAIMS = {name: max(profile.says) for name, profile in PROFILES.items()}
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(golden_folder())
+
+
+@pytest.fixture(scope="module")
+def answered(golden, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("float32")
+    answer_all(golden, folder, "float32")
+    return folder
+
+
+@pytest.fixture
+def port(answered, tmp_path):
+    """A copy of the outputs, to take something away."""
+    return shutil.copytree(answered, tmp_path / "port")
+
+
+def said(report):
+    return {one.profile: one.level for one in report.profiles}
+
+
+def test_every_operation_of_a_profile_has_cases_and_training_has_all_but_the_options(golden):
+    operations = {case.operation for case in golden.cases}
+    for profile in PROFILES.values():
+        assert set(profile.operations) <= operations
+    assert operations - set(PROFILES["training"].operations) == {"exposure", "pose", "registration"}
+
+
+def test_a_whole_port_claims_every_profile(golden, answered):
+    report = judge(golden, answered, "float32", again=answered)
+    assert said(report) == CLAIMS
+    assert "  renderer (forward), level 3: colour, depth and opacity images" in as_table(report).splitlines()
+    assert said(judge(golden, answered, "float32", level=2)) == {
+        "renderer-forward": 1, "renderer": 2, "losses": 2, "optimiser": 1, "method": 2,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profile_alone_has_its_last_level(golden, answered, name):
+    report = judge(golden, answered, "float32", profile=name, again=answered)
+    assert report.passed and report.level == CLAIMS[name]
+    assert report.claim == f"golden {golden.short_version}, {PROFILES[name].title}, level {report.level}, float32"
+
+
+def test_a_forward_renderer_claims_its_images(golden, port):
+    """Without the profile it has level 1; with the word `reverse` in not_ported.txt nothing is missing."""
+    for file in port.rglob("d_*.npy"):
+        file.unlink()
+    for case in golden.cases:
+        if case.operation not in PROFILES["renderer-forward"].operations:
+            shutil.rmtree(port / case.name, ignore_errors=True)
+    report = judge(golden, port, "float32", profile="renderer-forward")
+    assert report.passed and report.claim.endswith("renderer (forward), level 3, float32")
+    rest = {case.operation for case in golden.cases} - set(PROFILES["renderer-forward"].operations)
+    (port / "not_ported.txt").write_text("\n".join([*rest, "reverse"]))
+    report = judge(golden, port, "float32", level=3)
+    assert (said(report) == {"renderer-forward": 3, "renderer": 1} and not report.accepted) or report.level == 1
+    assert report.claim.endswith(", reverse passes") and not report.notes
+    assert not judge(golden, port, "float32", profile="renderer").passed
+
+
+def test_losses_alone(golden, port):
+    rest = {case.operation for case in golden.cases} - set(PROFILES["losses"].operations)
+    (port / "not_ported.txt").write_text("\n".join(rest))
+    assert said(judge(golden, port, "float32")) == {"losses": 2}
+
+
+def test_a_wrong_output_lowers_the_profiles_that_have_it(golden, port):
+    path = next((port / "masked_ssim").rglob("d_rendered.npy"))
+    path.write_bytes(npy_bytes(-read_plain(path)))
+    found = said(judge(golden, port, "float32", level=4))
+    assert found == {"renderer-forward": 3, "renderer": 3, "losses": 1, "optimiser": 1, "method": 1}
+
+
+def test_requests_of_a_profile_ask_for_its_outputs_alone(golden, tmp_path):
+    asked, level = asked_of(golden, "", "renderer-forward", 5)
+    write_requests(asked, tmp_path, "float32", level)
+    text = "".join(path.read_text() for path in tmp_path.rglob("request.json"))
+    assert level == 3 and '"colour_image"' in text and '"operation": "render"' in text and '"d_position"' not in text
+
+
+def test_only_needles_are_told_with_their_size_and_the_rewrite(golden, port):
+    folder = port / "render" / "long_needle"
+    for name in ("colour_image", "d_log_scale"):
+        array = np.array(read_plain(folder / f"{name}.npy"))
+        (folder / f"{name}.npy").write_bytes(npy_bytes(array * np.float32(1.5)))
+    lines = as_table(judge(golden, port, "float32", level=3)).splitlines()
+    assert lines[0].startswith("only needles fail: render/long_needle, ")
+    assert "times the tolerance (colour_image, d_log_scale)" in lines[0] and "page (B3)" in lines[1]
+    path = port / "motion" / "generic" / "translation.npy"
+    path.write_bytes(npy_bytes(-read_plain(path)))
+    assert "only needles" not in as_table(judge(golden, port, "float32", level=3))
+
+
+def test_levels_without_outputs_count_in_a_profile_alone():
+    counts = {0: (1, 1), 1: (2, 2), 2: (0, 0), 3: (4, 4), 4: (0, 0)}
+    assert (complete_level(counts), complete_level(counts, gaps=True)) == (1, 3)
+    assert complete_level({0: (1, 2), 1: (2, 2)}, gaps=True) == -1
+
+
+def test_an_unknown_profile_is_refused(golden, answered):
+    with pytest.raises(InputError, match="no such profile; allowed: renderer-forward"):
+        of_profile(golden.cases, "viewer")
+    with pytest.raises(InputError, match="motion is no part"):
+        judge(golden, answered, "float32", profile="renderer", only="motion")
+    with pytest.raises(InputError):
+        run(["judge", str(answered), "--profile", "viewer"])
