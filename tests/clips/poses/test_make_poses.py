@@ -10,6 +10,7 @@ from moving_clip import moving_sequence, moving_views, path_error, still_views
 import endotsr
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
+from endotsr.clips.poses.movement import STILL
 from endotsr.clips.sequences import make_poses
 from endotsr.clips.sequences.make_poses import PARTIAL, PoseProgress, enter_poses
 from endotsr.clips.sequences.sequence_file import CameraEntry, DepthEntry, SequenceFile, write_sequence_file
@@ -84,6 +85,17 @@ def test_a_still_scope_is_left_as_it_is(tmp_path, capsys):
     assert "still: left as it is" in capsys.readouterr().out
     assert (folder / "sequence.toml").read_bytes() == before
     assert json.loads((tmp_path / "a.json").read_text())["movement"]["answer"] == "still"
+
+
+def test_with_an_assumed_depth_nothing_is_called_still(tmp_path, capsys):
+    """A plane in place of the depth: a rigid motion leaves more of the flow than it does of a moving scope's."""
+    folder = written(tmp_path / "flat", moving_views()[0], depth=False)
+    assert main(["depth", str(folder), "--flat"]) == 0
+    capsys.readouterr()
+    main(["poses", str(folder), "--json", str(tmp_path / "a.json")])
+    said, found = capsys.readouterr().out, json.loads((tmp_path / "a.json").read_text())
+    assert found["movement"]["left"] > STILL and found["movement"]["answer"] == "unclear"
+    assert "cannot be told, as the depth is assumed (shape)" in said and "still, and" not in said
 
 
 def test_without_depth_it_says_what_to_run(tmp_path):

@@ -3,6 +3,10 @@
 argparse splits the words into options, values and positional arguments. Values are converted by the types of the
 options class; sections of settings are checked by msgspec. A mistake raises a one-line InputError with the option and
 the allowed values, never a message of argparse.
+
+Two libraries were tried in its place on `train`, `prepare` and `sweep`. tyro 1.0.17 ignores the limits of
+`msgspec.Meta`, so that a value out of range passes; cyclopts 5.5.2 does not read msgspec structures. Neither has the
+relations between options.
 """
 
 import argparse

@@ -40,6 +40,7 @@ class Movement(NamedTuple):
     flow: float  # pixels, median over pairs
     pairs: int
     drift: float  # of the width; NaN with depth
+    assumed: str = ""  # what of the depth is assumed; with any of it, a rigid motion cannot explain the flow
 
     @property
     def sentence(self) -> str:
@@ -55,9 +56,11 @@ class Movement(NamedTuple):
         words = {
             "moving": "the scope moves",
             "still": "the scope is still, and the tissue moves",
+            "assumed": f"whether the scope moves cannot be told, as the depth is assumed ({self.assumed})",
             "unclear": f"whether the scope moves is unclear ({MOVING:.0%} to {STILL:.0%} can be either)",
         }
-        return f"one rigid motion leaves {self.left:.0%} of the flow of {self.flow:.1f} pixels: {words[self.answer]}"
+        kind = "assumed" if self.assumed and self.answer == "unclear" else self.answer
+        return f"one rigid motion leaves {self.left:.0%} of the flow of {self.flow:.1f} pixels: {words[kind]}"
 
 
 def pairs_that_move(matcher: Matcher) -> list[FramePair]:
@@ -119,6 +122,18 @@ def movement(pairs: list[FramePair]) -> Movement:
     else:
         answer = "moving" if left < MOVING else "still" if left > STILL else "unclear"
     return Movement(answer, left, flow, len(pairs), float("nan"))
+
+
+def with_assumed_depth(moves: Movement, assumed: str) -> Movement:
+    """The answer where part of the depth is assumed: never `still` for what a rigid motion leaves.
+
+    The flow of a rigid scene seen from a moving scope depends on its depth. With the wrong depth, a rigid motion leaves
+    part of this flow, as it does where the tissue deforms.
+    """
+    if not assumed:
+        return moves
+    answer = "unclear" if moves.answer == "still" and moves.flow >= LEAST_FLOW else moves.answer
+    return moves._replace(answer=answer, assumed=assumed)
 
 
 def drift(matcher: Matcher) -> Movement:

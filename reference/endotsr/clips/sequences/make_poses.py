@@ -17,7 +17,7 @@ import numpy as np
 from endotsr.clips.poses.chain import Chain, Link
 from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, PathEstimate, estimated, movement_of
 from endotsr.clips.poses.matches import Matcher
-from endotsr.clips.poses.movement import FramePair, Movement
+from endotsr.clips.poses.movement import FramePair, Movement, with_assumed_depth
 from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences.camera import scene_factor
 from endotsr.clips.sequences.files import shortened
@@ -107,7 +107,8 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
     views, unit = views_of(clip, dataclasses.replace(clip, poses=None).cameras([0])[0]), clip.unit_in_words
     if views.count < 2:
         raise InputError(f"{folder}: one frame: there is no motion to estimate")
-    known = movement_of(views)
+    matcher, pairs, moves = movement_of(views)
+    known = matcher, pairs, with_assumed_depth(moves, clip.depth.assumed)
     if known[2].answer == "still" and not force:
         return PoseReport(False, known[2], None, unit)
     found = _resumed(folder, views, known, watch)
