@@ -103,7 +103,7 @@ assert contrast > 0.2 and moved > 0.2 and np.abs(frames).max() < beta
 #
 # A patch of tissue becomes paler and recovers, without moving. Component A represents this by a change of colour over
 # time. A model without A has constant colours. It can make a pixel brighter at one time by moving, turning or scaling
-# Gaussians; in the figure, a bright neighbour 4 px away is shifted so that the pixel has the same brightness at each
+# Gaussians; in the figure, a bright neighbour a few pixels away is shifted so that the pixel has the same brightness at each
 # time. The image at this pixel is right in both cases, but the geometry of the second is wrong by several pixels. The
 # paper gives colour and motion separate components.
 

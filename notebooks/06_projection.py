@@ -69,7 +69,7 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 # $W,\mathbf d$ are the camera pose, world to camera. Far off the axis the linear expansion grows without bound, so the
 # slope that enters $J$ is clamped, with $\kappa=1.3$ in the presets `paper` and `legacy`. In `exact` there is no clamp.
 # The centre is never clamped. $\varepsilon$ is the low-pass of 0.3 px². No splat then has a standard
-# deviation below 0.55 px in any direction.
+# deviation below $\sqrt{0.3}\approx0.55$ px in any direction.
 #
 # <!-- definition: endotsr.definition.projection.jacobian -->
 # ```python

@@ -70,7 +70,7 @@ rng = np.random.default_rng(12)
 #
 # **(12.1) Two averages.** Written out from $m=0$, the recursion is
 # $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$: an average of the gradients in which old ones fade. $v_k$ is the same
-# average of $g_j^2$; with $\beta_2$ they fade a hundred times more slowly.
+# average of $g_j^2$; with $\beta_2$ they fade more slowly, by the factor $0.1/0.001$.
 #
 # **(12.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with 0.
 # The division by $1-\beta_1^k$ makes it a weighted mean, and so does the division by $1-\beta_2^k$ for $v$.

@@ -90,7 +90,7 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 # %% [markdown]
 # ## The needle: digits lost in the inverse matrix
 #
-# Seen at an angle, a needle of 1000 pixels has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
+# Seen at an angle, a needle of $1000$ pixels has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
 # $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$: a difference of numbers near $10^{12}$, divided by $3\cdot10^5$, that should
 # give 1. The specification writes a sum of squares:
 #
@@ -354,8 +354,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass: a check that can fail
 #
-# The checker receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by 0.1
-# %, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
+# The checker receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by
+# one thousandth, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
 
 # %%
 pair = all_pairs()["matern_penalty"]

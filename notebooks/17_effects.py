@@ -90,7 +90,7 @@ assert abs(found["still"].noise.level / sigma - 1) < 0.15
 #
 # Even in a static scene the optical flow between two frames is not 0. The test therefore also measures the flow between
 # the reference frame and copies of it with new noise. A tile counts as moving if its flow exceeds twice this value and
-# 0.05 px.
+# 0.05 px<!--=effects.motion-->.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 3, figsize=(9.4, 5.2), layout="constrained")
@@ -128,7 +128,7 @@ assert (
 #
 # The beat of the second clip has five cycles. With 16 frames the same beat is found as motion, but not as a rate: the
 # verdict is *irregular*, and the plan switches off component S, which is the one made for it. In 14 training frames no
-# rate passes the test, which asks for a line at 1 % with the same wave in each third of the clip. The remedy is more
+# rate passes the test, which asks for a line at 1 %<!--=effects.rates--> with the same wave in each third of the clip. The remedy is more
 # frames of the same five beats.
 
 # %% tags=["hide-input"]

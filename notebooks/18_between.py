@@ -40,8 +40,8 @@ from endotsr.results.evaluation.trajectories import trajectory_error
 # ## The problem
 #
 # The clip is the one of {doc}`00_why` that breathes four times: 24 frames, three held out. It is trained twice with the
-# preset `paper`, shortened: once unchanged, and once with 70 % of the iterations at times between the frames, the
-# fraction of `sharp`. The simulator also renders the true picture at three times between any two frames.
+# preset `paper`, shortened: once unchanged, and once with 70 %<!--=sharp.bridged--> of the iterations at times
+# between the frames, the fraction of `sharp`. The simulator also renders the true picture at three times between any two frames.
 
 # %%
 FRAMES, MOMENTS, ITERATIONS = 24, 4, 500
@@ -115,7 +115,7 @@ assert swing[both] < swing[alone] - 2
 # ## The equation
 #
 # $I_0$ and $I_1$ are two successive training frames, with the flow $f$ from the first to the second and $g$ from the
-# second to the first. $a\in(0,1)$ is the intermediate time. $G_2$ is a Gaussian window of 2 px.
+# second to the first. $a\in(0,1)$ is the intermediate time. $G_2$ is a Gaussian window of 2 px<!--=between.window-->.
 #
 # $$
 # \begin{aligned}
@@ -296,7 +296,7 @@ variance = [np.var((1 - q) * errors[0] + q * errors[1]) for q in tried]
 assert abs(tried[np.argmin(variance)] - e_m / (e_m + e_s)) < 0.02
 
 # %% [markdown]
-# For step (18.8), the upper half of a picture moves by 8 px and the lower half is static, but the flow is 8 px
+# For step (18.8), the upper half of a picture moves by $8$ px and the lower half is static, but the flow is $8$ px
 # everywhere. The moved pair has the larger weight above, and the static pair below.
 
 # %%
@@ -378,7 +378,7 @@ for name, run in runs.items():
 # well. The motion itself is the subject of {doc}`19_tracked_motion`.
 #
 # On the real clip the target is closer to the held-out frames than either pair alone when four or more frames in a row
-# are missing; with every eighth frame held out the moved pair alone is 0.07 dB closer. The table is on the page of {eq}`eq-b14`. {doc}`/results/README` gives the
+# are missing; with every eighth frame held out the moved pair alone is a little closer. The table is on the page of {eq}`eq-b14`. {doc}`/results/README` gives the
 # effect of the targets on a training.
 #
 # ## The reverse pass
@@ -397,7 +397,7 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. The tissue moves by 6 px between two frames and the flow says 7. Use (18.1) to find where $J_0$ and $J_1$ are read
+# 1. The tissue moves by $6$ px between two frames and the flow says 7. Use (18.1) to find where $J_0$ and $J_1$ are read
 #    at $a=\frac12$, and how far apart the two pictures of the point are. Is their blend sharper or softer than a frame?
 # 2. Write `motion_between` from (18.2) to (18.5) and let the cells of this chapter judge it: assign your function to
 #    the name `motion_between` and run the cells below *The steps in numbers* again. No golden case contains a flow,

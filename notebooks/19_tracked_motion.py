@@ -116,13 +116,13 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # piece of tissue, and the test fails.
 #
 # **(19.3) Is it the same surface?** $x'$ and its four neighbours must be tissue with a prior depth, and the depth may
-# change by at most 20 %. An instrument in front of the tissue fails the first test, and a fold the second.
+# change by at most 20 %<!--=tracks.depth-->. An instrument in front of the tissue fails the first test, and a fold the second.
 #
 # **(19.4) A lost point** moves with the tissue around it: by the mean displacement of the 8 nearest followed points,
 # weighted by their inverse distance. Its $a_{pi}$ is 0.1.
 #
 # **(19.5) Found again.** A lost point is followed again from the first frame in which its pixel is tissue with a depth
-# within 2.5 % of its own. This limit is narrower than in (19.3), because the depth is the only evidence for the same
+# within 2.5 %<!--=tracks.again--> of its own. This limit is narrower than in (19.3), because the depth is the only evidence for the same
 # piece of tissue.
 #
 # <!-- definition: endotsr.clips.sequences.tracks._step -->
@@ -283,7 +283,7 @@ assert error[-1, one] > 1, "found again, on other tissue"
 # $r_i=0$. With 21 times for 17 unknowns the atoms alone would fit almost any track, with its noise.
 #
 # **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
-# is one atom of amplitude $A$ is fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. The weight $0.1$ costs 1 % at 20
+# is one atom of amplitude $A$ is fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. The weight $0.1$ costs $0.1/10.1$ of it at 20
 # times; $30\rho$ removes the fastest atoms. In this way the penalty {eq}`eq-4` acts before the training.
 #
 # <!-- definition: endotsr.training.scene.tracked_motion.with_tracked_motion -->

@@ -90,7 +90,7 @@ rng = np.random.default_rng(20)
 
 # %% [markdown]
 # The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. All
-# gradients are then multiplied by 3, as larger weights of the losses would do. At every call 5 % of the Gaussians have
+# gradients are then multiplied by 3, as larger weights of the losses would do. At every call a twentieth of the Gaussians have
 # faded and are pruned.
 
 
@@ -150,7 +150,7 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # ({eq}`eq-5`). A perfect fit to the frames of half size still misses the full frame by $P_1$, in the mean by $d$.
 #
 # **(20.5) The test.** While the fit error at half size is above the missing detail, $e>d$, the missing band is the
-# smaller of the two errors, and half size has only 25 % of the pixels. Once $e<d$, the finest band is the larger error,
+# smaller of the two errors, and half size has only a quarter of the pixels. Once $e<d$, the finest band is the larger error,
 # and the full frames are needed.
 #
 # **(20.6) The camera.** The edges of the picture stay aligned, so $u'=u/2$ for every point. With the centre of the first
@@ -332,7 +332,7 @@ assert report.passed
 # 1. There are 39 000 Gaussians, a budget of 22 000 and 34 densifications. How many does the first one add by (20.1)?
 #    How does the number ever reach the budget?
 # 2. Write `densify` with both kinds of growth and let the golden cases judge it: `--only density` ({doc}`index`).
-# 3. The cell below answers this one. Blur the frames of the clip with a Gaussian of 2 px. What happens to $d$, and to
+# 3. The cell below answers this one. Blur the frames of the clip with a Gaussian of $2$ px. What happens to $d$, and to
 #    the end of the coarse start?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]

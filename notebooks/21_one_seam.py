@@ -45,7 +45,7 @@ from endotsr.training.runs.folder import open_run
 # ## Two windows
 #
 # The recording has 56 frames with breathing, a beat and highlights. Two windows of 32 frames share frames 24 to 31. They
-# are trained twice: both cold, and the second one warm, in 40 % of the iterations.
+# are trained twice: both cold, and the second one warm, in 40 %<!--=window.warm--> of the iterations.
 
 # %%
 folder = Path(tempfile.mkdtemp())

@@ -280,7 +280,7 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. All depths are too large by 10 %. By which factor is the path of the scope too long, and what happens to the
+# 1. All depths are too large by a tenth. By which factor is the path of the scope too long, and what happens to the
 #    rotations? Use $(u,v)$ of $W\mathbf x+\mathbf d$.
 # 2. Write `registration_forward` from {eq}`eq-b19` and let the golden cases judge it: `--only registration`
 #    ({doc}`index`).

@@ -21,13 +21,15 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", "docs/*.md", "docs/guides/*.md", "docs/specification/*.md", "docs/results/*.md",
          "notebooks/*.md", "notebooks/*.py", "reference/endotsr/**/*.py")  # fmt: skip
-WRITTEN = ("equations.md", "golden_cases.md", "gradient_checks.md", "definition.md")  # when the book is built
+# Pages that a program writes as a whole: when the book is built, and `tests/mutation/page.py`.
+WRITTEN = ("equations.md", "golden_cases.md", "gradient_checks.md", "definition.md", "discrimination.md")
 
 COMPARED = r"times(?=[ \n](?:as|the|its|more|less|over|slow|fast|small|large|long|short|worse|better|too|far))"
 UNITS = rf"dB|ns|us|µs|ms|s|min|h|%|[KMG]i?B|px|fold|{COMPARED}"
 SPELT = rf"decibels?|seconds?|minutes?|hours?|per ?cent|percent|pixels?|{COMPARED}"
 WORDS = "half an?|one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|fifteen|twenty|thirty|a hundred"
 DIGITS = r"[-+±]?\d[\d.]*(?:e-?\d+)?(?:(?: \d{3})+)?"
+INDENTED = re.compile(r"(?<=\n\n)(?: {4,}[^\n]*\n)+")  # a formula or an example of a docstring
 MARKED = "\N{CURRENCY SIGN}"  # stands for a figure that has a mark
 JOINED = r"(?:,|[ \n](?:to|and|or))[ \n]"
 FIGURE = re.compile(
@@ -68,7 +70,9 @@ def prose(path: Path) -> str:
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         return text
-    return cells(text) if path.parent.name == "notebooks" else ast.get_docstring(ast.parse(text), clean=False) or ""
+    if path.parent.name == "notebooks":
+        return cells(text)
+    return INDENTED.sub(blank, ast.get_docstring(ast.parse(text), clean=False) or "")
 
 
 def cells(text: str) -> str:

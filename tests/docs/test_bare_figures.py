@@ -1,24 +1,34 @@
 """Every figure of the prose has a source: a record, the code, or a program that writes its block."""
 
-import tomllib
-from collections import Counter
-from pathlib import Path
+import re
 
 import bare_figures
 import pytest
 from bare_figures import bare
+from pages.book import figures
 
-LEFT = tomllib.loads((Path(__file__).parent / "bare_figures.toml").read_text(encoding="utf-8"))
+from endotsr.errors import InputError
+
+MARK = re.compile(r"<!--=([\w.]+)-->")
+KEPT = {"flow.full", "sharp.full", "paper.full"}  # for tests
 
 
 def test_no_figure_is_without_a_source():
-    """`bare_figures.toml` counts those that are still to be given one: a count only falls."""
-    found = bare_figures.bare_of(bare_figures.files())
-    counts = Counter(one.file for one in found)
-    more = [str(one) for one in found if counts[one.file] > LEFT.get(one.file, 0)]
-    assert not more, "substitute it from a record or the code (docs/pages/book/figures.py), or leave it out"
-    fewer = {name: counts[name] for name, count in LEFT.items() if counts[name] < count}
-    assert not fewer, "lower these counts in bare_figures.toml"
+    found = [str(one) for one in bare_figures.bare_of(bare_figures.files())]
+    assert not found, "substitute it from a record or the code (docs/pages/book/figures.py), or leave it out"
+
+
+def test_every_name_of_the_table_is_used_and_has_a_value():
+    used = {name for page in figures.pages() for name in MARK.findall(page.read_text(encoding="utf-8"))}
+    assert set(figures.FIGURES) - used <= KEPT
+    assert all(figures.text(name) for name in figures.FIGURES)
+
+
+def test_a_setting_that_the_code_has_not_is_refused():
+    with pytest.raises(InputError, match="the code has no endotsr.config:PAPER.gone"):
+        figures.value(figures.Setting("endotsr.config:PAPER.gone"))
+    double = figures.Formula(lambda one, other: one + other, ("flow.tissue", "flow.tissue"), "{:.2f}")
+    assert figures.value(double) == 2 * figures.value(figures.FIGURES["flow.tissue"])
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Chapter 0 quotes other pages: its numbers are those of their generated tables."""
+"""Chapter 0 quotes other pages: it says what their generated tables say."""
 
 import re
 from pathlib import Path
@@ -24,17 +24,17 @@ def row(table: str, *starts: str) -> list[str]:
 
 def test_the_loss_of_a_on_the_simulated_clip():
     change = float(row(block("claims", "claims:simulated_paper"), "A alone (ours)", "PSNR full, dB")[2])
-    assert change < 0 and f"A loses {-change:.2f} dB on held-out frames" in WORDS
+    assert change < 0 and "A loses PSNR on held-out frames" in WORDS
 
 
 def test_the_gain_of_a_on_the_real_clip():
     gain = float(row(block("claims", "claims:pulling"), "A added to S", "PSNR full, dB")[2])
-    assert f"adding A to S gains {gain:.2f} dB" in WORDS
+    assert gain > 0 and "adding A to S gains PSNR" in WORDS
 
 
 def test_the_gain_of_the_residuals_in_a_short_training():
     change = float(row(block("tradeoff", "tradeoff:training").split("**simulated**")[0], "no residuals")[2])
-    assert f"a model without residuals is {-change:.2f} dB worse" in WORDS
+    assert change < -1 and "a model without residuals is much worse" in WORDS
     assert "721 iterations" in WORDS and "scaled to 721 iterations" in block("tradeoff", "tradeoff:training")
 
 
@@ -47,6 +47,6 @@ def test_false_motion_is_the_same_with_and_without_a():
 def test_light_alone_has_the_same_picture_with_and_without_a():
     light = block("effects", "effects:truth").split("| Motion alone")[0]
     with_a, without = (row(light, name)[1] for name in ("`paper`", "`paper` without A"))
-    assert f"its PSNR is {with_a} dB with A and {without} dB without" in WORDS
+    assert "its PSNR is the same with A and without, within the interval" in WORDS
     (value, spread), (other, other_spread) = (map(float, cell.split(" ± ")) for cell in (with_a, without))
     assert abs(value - other) < min(spread, other_spread), "the same: less than the interval of either"

@@ -1,7 +1,7 @@
 """From mask files to tissue masks: thresholding, polarity, and checks of the polarity.
 
 The configuration states the polarity. It is never guessed, but a wrong statement is detected. Measured on a public
-sequence (63 frames, 34 % of the pixels without depth):
+sequence of 63 frames, a third of whose pixels have no depth:
 
 | masks folder | fraction without depth: tissue / excluded | redness R - B: tissue / excluded |
 |---|---|---|

@@ -8,8 +8,8 @@ No fast-math: sums keep their written order. The fast path may contract a*b+c in
 (`contract=True`), which stays bitwise reproducible on one machine.
 
 Kernels are serial; `endotsr.method.kernels.threads` calls one kernel for several ranges at once. Numba's own parallel
-loops compile their body several times, and its OpenMP layer spins at every barrier: with one other busy process on two
-cores, an iteration took 650 ms instead of 300.
+loops compile their body several times, and its OpenMP layer spins at every barrier: with another busy process, an
+iteration takes longer.
 
 Numba's disk cache detects an edit of a kernel's own file, but not of the files that the kernel calls. The name of the
 cache folder therefore contains a hash of all kernel sources: an edited kernel is never stale.

@@ -4,9 +4,9 @@ A kernel `kernel(first, stop, *arguments)` handles the tasks first ... stop - 1.
 that releases the interpreter lock. Python threads call it for ranges of tasks. No two tasks write to the same cell, so
 results are bitwise independent of the number of threads and of the ranges.
 
-Numba's `parallel=True` is not used. It compiles the body of a loop about five times (4.4 s instead of 0.9 s for the
-similarity kernel, three times as long for a cold start). Its regions cost 130 us each instead of 15 us. Its static
-split makes every thread wait for the slowest one when the machine has other work.
+Numba's `parallel=True` is not used. It compiles the body of a loop several times, which makes a cold start longer, and
+its regions take longer to start. Its static split makes every thread wait for the slowest one when the machine has
+other work.
 """
 
 import os

@@ -1,7 +1,7 @@
 """A small line chart as SVG text, for a page that is rewritten frequently.
 
-It takes about 1 ms; matplotlib, which draws the charts of a finished run (`curves.py`), takes about 200 ms. The
-surrounding page defines the colours, in a light and a dark scheme.
+Matplotlib, which draws the charts of a finished run (`curves.py`), would take too long for this. The surrounding page
+defines the colours, in a light and a dark scheme.
 """
 
 import math

@@ -2,9 +2,9 @@
 
 In: the stages reported by the training (`endotsr.method.kernels.timer`). Out: seconds by stage, one entry per repeat.
 Stages may nest; the time of an inner stage is not part of the outer one. Concurrent stages split the elapsed time
-equally. The remainder (log entry, additions between stages) is "rest". Overhead: about 2 us per stage, for about twenty
-stages per iteration. Results are medians and quartiles, because the largest disturbance dominates a mean on a shared
-machine.
+equally. The remainder (log entry, additions between stages) is "rest". An iteration has about twenty stages, and the
+timer costs each of them a few calls of the clock. Results are medians and quartiles, because the largest disturbance
+dominates a mean on a shared machine.
 """
 
 import threading

@@ -2,10 +2,11 @@
 
 In: the surveyed frames, the requested length, and the split. Out: windows, and the left-out frames with reasons.
 
-A stretch is divided into m windows. Frame i has the window density d_i = max(1 / (96 - o), motion_i / 0.1), where o is
-the overlap, or 1 / (n - o) for a given length of n frames. A window then spans at most about 96 frames, and its motion
-adds up to about 10 % of the picture's width. m is the sum of the densities rounded up. Window k begins where the
-running sum of the densities reaches k / m of the total, so windows are shorter where the tissue moves more.
+A stretch is divided into m windows. Frame i has the window density d_i = max(1 / (MOST_WINDOW - o), motion_i / PATH),
+where o is the overlap, or 1 / (n - o) for a given length of n frames. A window then spans at most about `MOST_WINDOW`
+frames, and its motion adds up to about `PATH` of the picture's width. m is the sum of the densities rounded up. Window
+k begins where the running sum of the densities reaches k / m of the total, so windows are shorter where the tissue
+moves more.
 
 Windows begin at multiples of the split's period, counted from the start of the stretch. A frame in two windows is
 therefore held out in both (ruling in the specification).

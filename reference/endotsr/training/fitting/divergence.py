@@ -1,8 +1,8 @@
 """Divergence checks: a non-finite number stops a training before any parameter update; a rising loss gives a warning.
 
 In: gradients and losses of an iteration. Out: the exception `Diverged` with iteration, frame and term, and warnings
-with advice. The checks change no number of the training and cost less than 0.5 % of an iteration: a search in eleven
-numbers per Gaussian, and every hundred iterations the distances of the centres.
+with advice. The checks change no number of the training. They search eleven numbers per Gaussian, and every hundred
+iterations the distances of the centres.
 """
 
 import math

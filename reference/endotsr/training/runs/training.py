@@ -4,10 +4,10 @@ In: a sequence, settings, and an observer called at every iteration. Out: the ru
 run.json. After a signal, the current iteration is completed and a checkpoint is written; the error message explains how
 to continue. This module prints nothing itself.
 
-A checkpoint is written at least every `training.checkpoint_every` iterations, and whenever 10 % of the training time
-(between `FEWEST_SECONDS` and `MOST_SECONDS`) has passed since the last one. A kill therefore costs about 10 % of the
-training at most. Slow checkpoints are written less often, to take at most `LARGEST_FRACTION` of the time. Results do
-not depend on when checkpoints are written.
+A checkpoint is written at least every `training.checkpoint_every` iterations, and whenever `LARGEST_LOSS` of the
+training time (between `FEWEST_SECONDS` and `MOST_SECONDS`) has passed since the last one. A kill therefore costs at
+most about that part of the training. Slow checkpoints are written less often, to take at most `LARGEST_FRACTION` of the
+time. Results do not depend on when checkpoints are written.
 """
 
 import contextlib

@@ -1,8 +1,8 @@
-"""The common workload: N Gaussians on a wavy, tissue-like surface, seen at 640x512 by one camera, focal length 570 px.
+"""The common workload: N Gaussians on a wavy, tissue-like surface, seen by one camera.
 
-The Gaussians are flat discs, most of which face the camera. The mean projected sigma is 3.6, 2.4 and 1.7 px at 20 000,
-60 000 and 150 000 Gaussians. 55 % are nearly opaque (0.6 to 0.98), the rest faint (0.03 to 0.5). The surface extends
-beyond each image border by 4 % of the image. All draws are seeded: equal arguments give equal arrays. Scene units are
+The Gaussians are flat discs, most of which face the camera. `SIGMA_PIXELS` is their mean projected sigma by number. The
+part `OPAQUE_FRACTION` is nearly opaque (0.6 to 0.98), the rest faint (0.03 to 0.5). The surface extends beyond each
+image border by `BORDER` of the image. All draws are seeded: equal arguments give equal arrays. Scene units are
 arbitrary; the depth is about 4.
 """
 

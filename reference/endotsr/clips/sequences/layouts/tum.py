@@ -1,7 +1,7 @@
 """TUM RGB-D folders: `rgb.txt`, `rgb/`, and optionally `depth.txt`, `depth/` and `groundtruth.txt`.
 
 `rgb.txt` and `depth.txt` have one line per picture, `time file`. `groundtruth.txt` is a camera-to-world trajectory in
-seconds and metres. Depth has 5000 steps per metre. Pictures, depth and poses are matched within 0.02 s.
+seconds and metres. Depth has 5000 steps per metre. Pictures, depth and poses are matched by time, to `LONGEST`.
 """
 
 from pathlib import Path

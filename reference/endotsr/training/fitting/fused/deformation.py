@@ -1,8 +1,8 @@
 """Fast path of training: the reverse pass of the deformation, its Adam step and the next forward pass in one sweep.
 
-The gradient of the FDM, (3, 10, B, N), is 75 % of all gradients and is used once. This module computes it for one piece
-of one row at a time, in the second-level cache. There it also computes the offsets of the next iteration from the
-updated numbers, so the arrays are read from memory only once. The operations and their order are those of
+The gradient of the FDM, (3, 10, B, N), is the largest of all and is used once. This module computes it for one piece of
+one row at a time, in the second-level cache. There it also computes the offsets of the next iteration from the updated
+numbers, so the arrays are read from memory only once. The operations and their order are those of
 `deformation_reverse`, `adam_update` and `deformation_forward`: results are bitwise equal (tested).
 """
 
