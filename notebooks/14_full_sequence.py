@@ -445,7 +445,7 @@ plt.show()
 
 # %% [markdown]
 # At the small size the model loses, even to a copy of the nearest frame. A thumbnail of 48x38 pixels and 240 iterations
-# are no fair trial, but a defeat is possible at full size too: `paper` is below the blend on a recorded clip with
+# are no fair trial, but a defeat is possible at full size too: `paper` is 1.5 dB<!--=paper.below_blend--> below the blend on a recorded clip with
 # little noise ({doc}`/full_size`). Its worst frame on a simulated clip shows how. Every vessel appears twice, as in the blend: the model fades one training frame into the next.
 #
 # ![The worst held-out frame of paper: truth, model, copy, blend and flow](/results/full_size/paper_eighth_worst.webp)

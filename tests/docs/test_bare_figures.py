@@ -10,7 +10,6 @@ from pages.book import figures
 from endotsr.errors import InputError
 
 MARK = re.compile(r"<!--=([\w.]+)-->")
-KEPT = {"flow.full", "sharp.full", "paper.full"}  # for tests
 
 
 def test_no_figure_is_without_a_source():
@@ -20,12 +19,12 @@ def test_no_figure_is_without_a_source():
 
 def test_every_name_of_the_table_is_used_and_has_a_value():
     used = {name for page in figures.pages() for name in MARK.findall(page.read_text(encoding="utf-8"))}
-    assert set(figures.FIGURES) - used <= KEPT
+    assert set(figures.FIGURES) == used
     assert all(figures.text(name) for name in figures.FIGURES)
 
 
 def test_a_setting_that_the_code_has_not_is_refused():
-    with pytest.raises(InputError, match="the code has no endotsr.config:PAPER.gone"):
+    with pytest.raises(InputError, match=r"the code has no endotsr\.config:PAPER\.gone"):
         figures.value(figures.Setting("endotsr.config:PAPER.gone"))
     double = figures.Formula(lambda one, other: one + other, ("flow.tissue", "flow.tissue"), "{:.2f}")
     assert figures.value(double) == 2 * figures.value(figures.FIGURES["flow.tissue"])

@@ -1,6 +1,7 @@
 """Every figure of the prose by the name that its mark has: `39.83 dB<!--=flow.tissue-->`, see `figures`."""
 
 from collections.abc import Callable
+from operator import sub
 from typing import NamedTuple
 
 
@@ -37,11 +38,9 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "flow_tissue.tissue": Figure("interpolation.json", f"{ALONE}.flow_interpolation_tissue.psnr_tissue", "{:.2f}"),
     "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
     "blend.tissue": Figure(PULLING, "baselines.two_neighbours.mean.psnr_tissue", "{:.2f}"),
-    "flow.full": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_full", "{:.2f}"),
     "sharp.tissue": Figure(SHARP, "held_out.mean.psnr_tissue", "{:.2f}"),
     "paper.tissue": Figure(PAPER, "held_out.mean.psnr_tissue", "{:.2f}"),
-    "sharp.full": Figure(SHARP, "held_out.mean.psnr_full", "{:.2f}"),
-    "paper.full": Figure(PAPER, "held_out.mean.psnr_full", "{:.2f}"),
+    "paper.below_blend": Formula(sub, ("blend.tissue", "paper.tissue"), "{:.1f}"),
     "flow.frame1": Figure(PULLING, "baselines.flow_interpolation.per_frame.0.psnr_tissue", "{:.2f}"),
     "workload.focal": Setting("endotsr.training.scene.workload:FOCAL"),
     "diverged.rise": Setting("endotsr.training.fitting.divergence:RISE"),
