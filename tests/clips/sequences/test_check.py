@@ -388,7 +388,7 @@ def test_the_work_that_is_left_adds_up():
     growing = work_left(config, full, Standing(2100, 60_000)) - work_left(config, full, Standing(4000, 120_000))
     assert growing == pytest.approx(1900 * 1.25, rel=1e-3)
     early = work_left(config, full, Standing(0, 120_000)) - work_left(config, full, Standing(2100, 120_000))
-    assert early == pytest.approx(2100 * 1.5 * (0.65 + 1) / 2, rel=1e-3)
+    assert early == pytest.approx(2100 * 1.5 * (0.77 + 1) / 2, rel=1e-3)
 
 
 def test_a_clip_that_fits_nowhere_is_refused_before_reading(sequence, tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ from endotsr.clips.sequences.checks.duration import (
 from endotsr.training.fitting.records import NOTHING_MADE, Making
 
 LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
-SPIKE = 10.0  # medians; longer iterations compiled or loaded code and are left out
+SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left out; a coarse check takes three
 
 
 class TimeLeft:
@@ -28,7 +28,8 @@ class TimeLeft:
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)  # per unit of work
+        self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)  # per unit of work, without waiting
+        self._waited: deque[float] = deque(maxlen=LEAST_ITERATIONS)  # per unit of work, of iterations that waited
         self._coarse, self._making = False, NOTHING_MADE
 
     def add(self, standing: Standing, seconds: float, making: Making) -> None:
@@ -42,12 +43,13 @@ class TimeLeft:
         seconds -= making.waited - before.waited + (making.beside - before.beside) / self._plan.threads
         progress = standing.iteration / self._plan.config.training.iterations
         work = iteration_work(standing.gaussians, self._seen(standing.coarse), progress)
-        self._seconds.append(max(seconds, 0.0) / float(work))
+        waited = making.waited > before.waited  # such an iteration finds cold caches
+        (self._waited if waited else self._seconds).append(max(seconds, 0.0) / float(work))
 
     @property
     def unit(self) -> float | None:
         """Seconds per unit of work; None = too few iterations."""
-        return unit_seconds(self._seconds)
+        return unit_seconds(self._seconds) or unit_seconds(self._waited)
 
     def seconds(self, standing: Standing) -> float | None:
         """Seconds from here to the end of the iterations; None = too few iterations."""

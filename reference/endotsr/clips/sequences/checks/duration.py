@@ -1,12 +1,12 @@
 """Seconds of the parts of `endotsr train`, estimated from the settings, the frames and the speed of the machine.
 
-    work(N, P, u) = (0.1 + 0.4 P / (640 * 512) + 0.5 N / 60 000) (0.65 + 0.35 min(u / 0.35, 1))
+    work(N, P, u) = (0.1 + 0.4 P / (640 * 512) + 0.5 N / 60 000) (0.77 + 0.23 min(u / 0.35, 1))
 
 is the work of an iteration with N Gaussians and P pixels at the fraction u of the run. Its unit is a late iteration of
 the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing. The
 first factor was measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256 pixels, the second
-on logs of `sharp` and `quick`: early iterations have small Gaussians, colours of degree 0 and mostly inactive time
-bases.
+on `quick` with and without its coarse start, on both EndoNeRF clips: early iterations have small Gaussians, colours of
+degree 0 and mostly inactive time bases.
 
 The constants of the other parts are in units of one thread at 640x512 pixels. They were measured on the two EndoNeRF
 clips together with the unit itself, as processor time of one thread. Nothing is timed here.
@@ -24,7 +24,7 @@ from endotsr.method.kernels.arrays import IndexArray
 
 PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
 BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration
-EARLY, LATE_FROM = 0.65, 0.35  # first over late iteration; fraction of the run before late ones
+EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
 # Assumed growth for `density.growth = "threshold"`, whose final number is not known in advance: a larger weight of the
 # similarity gives larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
