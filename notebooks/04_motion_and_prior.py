@@ -321,8 +321,8 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # ## Interactive figure: correlation length and penalty
 #
 # A trajectory is fitted to noisy frames: the mean squared error plus $\lambda_{\mathrm{msp}}\mathcal L_{\mathrm{msp}}$ of
-# {eq}`eq-4` is minimal. A small weight fits the noise; a large one removes the beat. A longer correlation length moves
-# weight to the high frequencies.
+# {eq}`eq-4` is minimal. Before you move a slider: what is left of the curve at the largest weight, a straight line, the
+# slow wave, or the beat?
 #
 # <div class="widget" data-widget="matern">The figure is live in the built book.</div>
 

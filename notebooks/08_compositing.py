@@ -458,8 +458,9 @@ np.testing.assert_allclose(
 # %% [markdown]
 # ## Interactive figure: three opacities
 #
-# Drag the orange handles. The grey box is the light that reaches a Gaussian, and the coloured part is the light that it
-# absorbs. The loss is half the squared distance to the target colour. Set one opacity to 1 and compare with (8.3).
+# The grey box is the light that reaches a Gaussian, and the coloured part is the light that it absorbs. The loss is half
+# the squared distance to the target colour. Before you drag a handle: if the second opacity becomes 1, which gradients
+# become 0, that of the first, of the second or of the third? Derive it from (8.3), then try.
 #
 # <div class="widget" data-widget="compositing">The figure is live in the built book.</div>
 

@@ -299,9 +299,9 @@ for rule in ("co_sited", "half_pixel"):
 # %% [markdown]
 # ## Interactive figure: paint an instrument
 #
-# Paint excluded pixels in the first panel. The other panels show the values of each band that do not depend on an
-# excluded pixel. One excluded pixel removes a neighbourhood of values, whose width in pixels about doubles from band to
-# band.
+# Paint excluded pixels in the first panel, with the pointer or with arrow keys and space. The other panels show the values
+# of each band that do not depend on an excluded pixel. Before you paint: a single excluded pixel in the middle removes a
+# neighbourhood of values, whose width in pixels about doubles from band to band. What fraction of band 3 does it remove?
 #
 # <div class="widget" data-widget="masks">The figure is live in the built book.</div>
 

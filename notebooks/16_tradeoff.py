@@ -277,8 +277,9 @@ plt.show()
 # %% [markdown]
 # ## Interactive figure: cutoff and stop
 #
-# 160 Gaussians are blended from front to back. Move the cutoff below 1e-5: the error vanishes while the visits grow.
-# Move the stop above 1e-2: the picture loses the Gaussians at the back.
+# 160 Gaussians are blended from front to back. Before you move a slider: at which cutoff will the largest error be half a
+# level, and what fraction of the visits is left there? Then raise the stop above 1e-2, and look for what the picture
+# loses first.
 #
 # <div class="widget" data-widget="cutoff">The figure is live in the built book.</div>
 

@@ -153,9 +153,9 @@ assert values[2] > max(values[:2])
 # %% [markdown]
 # ## Interactive figure: the length of the overlap
 #
-# Two windows differ by 6 levels, and their errors are of equal size. Lengthen the overlap: the largest step becomes
-# smaller (21.2), and the recording needs more windows. Raise the correlation of the errors: the gain in the middle goes
-# to 0 (21.3).
+# Two windows differ by 6 levels, and their errors are of equal size. Before you move a slider: what is the largest step
+# with an overlap of 12 frames, by (21.2)? How many more windows does the recording need? And what is left of the gain in
+# the middle, (21.3), if the errors of the two windows are equal?
 #
 # <div class="widget" data-widget="seam">The figure is live in the built book.</div>
 

@@ -50,11 +50,12 @@
       if (first) held = Math.floor(x / 140);
       if (held < 0 || held > 2) return;
       alpha[held] = Math.min(1, Math.max(0, (floor - y) / 150));
-      draw();
+      sliders[held].value = alpha[held];
+      sliders[held].dispatchEvent(new Event("input"));
     };
     let held = -1;
-    const pen = canvas(box, width, height, "three opacities, drag them up or down", set);
-    const words = make(box, "p");
+    const pen = canvas(box, width, height, "three opacities; the sliders below set them too", set);
+    const words = make(box, "p", {"aria-live": "polite"}), row = make(box, "div", {class: "widget-row"});
     const draw = () => {
       const T = [1];
       for (const a of alpha) T.push(T[T.length - 1] * (1 - a));
@@ -62,8 +63,9 @@
       const behind = [null, null, null, background];
       for (let k = 2; k >= 0; k--) behind[k] = mix(alpha[k], colours[k], behind[k + 1]);
       const upstream = behind[0].map((v, c) => v - target[c]);
+      const loss = dot(upstream, upstream) / 2;
       const g = alpha.map((_, k) => T[k] * dot(colours[k].map((v, c) => v - behind[k + 1][c]), upstream));
-      box.state = {alpha: [...alpha], T, g, colour: behind[0]};
+      box.state = {alpha: [...alpha], T, g, loss, colour: behind[0]};
       pen.clearRect(0, 0, width, height);
       pen.font = "17px sans-serif";  // 11 px on a telephone of 390 px
       for (let k = 0; k < 3; k++) {
@@ -88,9 +90,11 @@
       pen.fillStyle = "#777";
       pen.fillText("pixel above,", 440, floor + 20);
       pen.fillText("target below", 440, floor + 41);
-      words.textContent = `Light that reaches the background: T₃ = ${T[3].toFixed(3)}. ` +
+      words.textContent = `Loss ${loss.toFixed(4)}. Light that reaches the background: T₃ = ${T[3].toFixed(3)}. ` +
         (alpha.some((a) => a === 1) ? "Behind an opacity of 1 all gradients are 0." : "");
     };
+    const sliders = alpha.map((value, k) =>
+      slider(row, `opacity ${k + 1}`, 0, 1, "any", value, (v) => v.toFixed(2), (v) => { alpha[k] = v; draw(); }));
     draw();
   };
 
@@ -171,7 +175,7 @@
   };
   const masks = (box) => {
     const W = 40, H = 32, mask = Array.from({length: H}, () => Array(W).fill(true));
-    let paints = false;
+    let paints = false, cursor = null;  // the cell of the keyboard, [column, row]
     const paint = (x, y, first) => {
       const column = Math.floor(x / 7), row = Math.floor(y / 7);
       if (column < 0 || row < 0 || column >= W || row >= H) return;
@@ -186,7 +190,7 @@
       make(cell, "figcaption", {}, name);
       return pen;
     });
-    const words = make(box, "p"), clear = make(box, "button", {type: "button"}, "Clear");
+    const words = make(box, "p", {"aria-live": "polite"}), clear = make(box, "button", {type: "button"}, "Clear");
     clear.addEventListener("click", () => { mask.forEach((line) => line.fill(true)); draw(); });
     const show = (pen, grid) => {
       const size = (W * 7) / grid[0].length;
@@ -196,11 +200,30 @@
         pen.fillRect(x * size, y * size, size - 0.6, size - 0.6);
       }));
     };
+    const field = pens[0].canvas, steps = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+    field.tabIndex = 0;
+    field.setAttribute("role", "application");
+    field.setAttribute("aria-label", "mask: arrow keys move, space excludes a pixel or includes it again");
+    field.addEventListener("focus", () => { cursor = cursor || [W / 2, H / 2]; draw(); });
+    field.addEventListener("blur", () => { cursor = null; draw(); });
+    field.addEventListener("keydown", (event) => {
+      const move = steps[event.key], at = cursor || [W / 2, H / 2];
+      if (!move && event.key !== " ") return;
+      event.preventDefault();  // the page would scroll
+      if (move) cursor = [(at[0] + move[0] + W) % W, (at[1] + move[1] + H) % H];
+      else mask[at[1]][at[0]] = !mask[at[1]][at[0]];
+      draw();
+    });
     const count = (grid) => grid.flat().filter(Boolean).length;
     const draw = () => {
       const bands = supports(mask);
       box.state = {mask: mask.map((line) => line.map(Number)), bands: bands.map(count)};
       show(pens[0], mask);
+      if (cursor) {
+        pens[0].strokeStyle = "#d08000";
+        pens[0].lineWidth = 3;
+        pens[0].strokeRect(7 * cursor[0], 7 * cursor[1], 7, 7);
+      }
       bands.forEach((band, k) => show(pens[k + 1], band));
       const part = (grid) => `${((100 * count(grid)) / (grid.length * grid[0].length)).toFixed(1)} %`;
       words.textContent = `Valid: ${part(mask)} of the pixels; ${bands.map((b, k) => `${part(b)} of band ${k + 1}`).join(", ")}.`;

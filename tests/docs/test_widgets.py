@@ -59,6 +59,13 @@ async function visit(page) {
   slide("overlap, frames", 20);
   slide("correlation of the errors", 0.5);
   say(page, "moved");
+  slide("opacity 2", 0.25);
+  const field = frame.contentDocument.querySelector("[data-widget=masks] canvas");
+  frame.contentWindow.focus();
+  field.focus();
+  for (const key of ["ArrowLeft", " ", "ArrowUp", " ", "ArrowUp", " ", " "])
+    field.dispatchEvent(new frame.contentWindow.KeyboardEvent("keydown", {key, cancelable: true}));
+  say(page, "keys");
 }
 """
 
@@ -98,8 +105,17 @@ def test_a_drag_of_an_opacity_changes_light_and_gradients(states):
 
     for state in (before, after):
         alpha, step = np.array(state["alpha"]), 1e-6
+        np.testing.assert_allclose(state["loss"], loss(alpha), rtol=1e-12)
         differences = [(loss(alpha + step * e) - loss(alpha - step * e)) / (2 * step) for e in np.eye(3)]
         np.testing.assert_allclose(state["g"], differences, atol=1e-9)
+
+
+def test_keys_do_what_a_drag_does(states):
+    """The sliders set the opacities; in the mask, arrow keys move a cursor and space changes a pixel."""
+    before, after = (states[key]["states"] for key in ("moved", "keys"))
+    np.testing.assert_allclose(after["compositing"]["alpha"], [0.3, 0.25, 0.5])
+    changed = np.argwhere(np.array(before["masks"]["mask"]) != np.array(after["masks"]["mask"]))
+    assert changed.tolist() == [[15, 19], [16, 19]], "a pixel that was changed twice is as it was"
 
 
 def test_correlation_length_and_penalty_change_the_trajectory(states):

@@ -17,7 +17,7 @@ def cases_in(file: Path) -> set[str]:
 
 
 TESTED = {file.relative_to(TESTS).as_posix(): cases_in(file) for file in sorted(TESTS.rglob("test_*.py"))}
-CATALOGUE = {case: cells for case, *cells in ROW.findall(PAGE.read_text(encoding="utf-8"))}
+CATALOGUE = {case: cells for case, *cells in ROW.findall(PAGE.read_text(encoding="utf-8").replace("`", ""))}
 
 
 @pytest.mark.parametrize("case", CATALOGUE)
