@@ -344,8 +344,9 @@ assert all(report.passed for report in reports)
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1:
-# the quaternion product q (1, 1, 1, 1)/2. There are 24 proper rotations of a box onto itself
-# up to permuting its axes; each has two quaternions, so 48 sets (times all lengths).
+# the quaternion product q (1, 1, 1, 1)/2. A right-handed frame can be laid along the
+# three axes in 24 ways, the rotations of a cube; each has two quaternions, so 48 sets (times
+# all lengths).
 w, x, y, z = q[:, 0]
 p = np.array([0.5, 0.5, 0.5, 0.5])
 product = np.array(

@@ -137,7 +137,7 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # %% [markdown]
 # ## The rates
 #
-# By (12.3) the rate is the size of a step. A training needs large steps at first and small ones at the end.
+# By (12.3) the rate is the size of a step. Training needs large steps at first and small ones at the end.
 #
 # **(12.5) Exponential decay.** The rates of position, deformation and residuals fall to $\varphi=0.01$ of their start.
 # Every iteration multiplies them by the same factor, $\varphi^{1/T}$. The decay of the residuals starts at $K_s$:

@@ -140,7 +140,7 @@ def objective_text(i, terms, config):
 
 # %%
 def train(sequence, config):
-    """A training as the command runs it, without files: (state, constants, log)."""
+    """Train as the command does, without files: (state, constants, log)."""
     constants, state, log = (
         training_constants(sequence, config),
         new_training(sequence, config),

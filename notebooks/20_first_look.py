@@ -245,7 +245,7 @@ np.testing.assert_allclose(ratios, [2.0, 0.5, 1.0], rtol=0.1)
 # ## Figure: the end of a coarse start, and the growth to a budget
 #
 # The scene of the demonstration at 128x96 pixels is trained twice for 400 iterations with the preset `paper`,
-# shortened: with a coarse start and without one. The work of a training is the number of pixels that it compares with a
+# shortened: with a coarse start and without one. The work of a run is the number of pixels that it compares with a
 # frame. The curve of $e$ in the figure is from a third training, which stays at half size to the end.
 
 # %% tags=["hide-input"]

@@ -228,7 +228,7 @@ assert losses["warm"].size == 0.4 * losses["cold"].size
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: the blend is not part of any loss, and the inherited state is only the start of a training.
+# There is none: the blend is not part of any loss, and the inherited state is only the start of a training run.
 # The pair to check is the motion {eq}`eq-3` whose coefficients (21.5) fits.
 
 # %%

@@ -64,6 +64,19 @@ constant of training
 derivative by
 float32 ends and
 the rest of the house
+the trainings
+a training repeats
+a training prints
+zero by accident
+one word for each thing
+a radix sort does not
+right values are on the wrong
+up to permuting its axes
+step uses the moment after
+is not examined here* means
+first form of this target
+smaller differences are noise
+seen with 80 %
 """.split("\n")[1:-1]
 
 

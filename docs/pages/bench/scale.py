@@ -78,7 +78,7 @@ def draw(path: Path) -> None:
 
 def parts() -> dict[str, str]:
     """The generated parts of the page."""
-    picture = f"![Minutes and memory of a training against its number of frames](results/{PICTURE.name})"
+    picture = f"![Minutes and memory of a training run against its number of frames](results/{PICTURE.name})"
     return {"minutes": "\n\n".join((picture, table(), measured()))}
 
 

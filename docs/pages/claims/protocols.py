@@ -40,7 +40,7 @@ SINGLE = (  # statement, coefficients, with a common spread of the configuration
 MOVED = "left picture moved by the prior depth"  # needs no model, and no other frame
 FRAMES = 63  # of pulling
 UNMEASURED = ["not measured", "-", "-", "-"]
-HEADS = ("ours", "compared", "verdict", "mean", "95 % interval", "seen with 80 %")
+HEADS = ("ours", "compared", "verdict", "mean", "95 % interval", "detectable with 80 % power")
 
 
 def ours(found: dict[str, Record | None], half: list[Record | None]) -> str:
@@ -93,7 +93,7 @@ def visits() -> str:
         trained = len(split_frames(FRAMES, split, of)[0])
         shown.append(f"{length / trained:.0f} visits to each of {trained} frames with {label} held out")
     published = full / len(split_frames(FRAMES, "every_eighth", 0)[0])
-    return f"{length} iterations make {'; '.join(shown)}. A full training makes {published:.0f} visits to each frame."
+    return f"{length} iterations make {'; '.join(shown)}. A full run makes {published:.0f} visits to each frame."
 
 
 def protocol_rows(half: list[Record | None]) -> list[list[str]]:

@@ -134,8 +134,8 @@ def summary(result: dict[str, Any]) -> list[str]:
     if "float64" in ends:
         chance = abs(ends["float64"][1] - ends["base"][1])
         lines.append(
-            "Noise: each training has one seed. `float64` differs from `base` only by rounding and ends "
-            f"{chance:.2f} dB from it. Smaller differences are noise."
+            "Noise: each run has one seed. `float64` differs from `base` only by rounding and ends "
+            f"{chance:.2f} dB from it. Read nothing into smaller differences."
         )
     for name, (seconds, psnr) in ends.items():
         better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
