@@ -49,7 +49,7 @@ html_theme = "sphinx_book_theme"
 html_title = "endotsr"
 html_static_path = ["_static"]
 html_css_files = ["endotsr.css"]
-html_search_scorer = "_static/scorer.js"
+html_search_scorer = str(HERE / "_static" / "scorer.js")
 html_js_files = [("widgets.js", {"defer": "defer"})]
 # The whole tree of pages beside every page would take most of the time of a build.
 html_theme_options = {"show_toc_level": 2, "home_page_in_toc": True, "collapse_navigation": True}

@@ -379,7 +379,7 @@ for name, run in runs.items():
 #
 # On the real clip the target is closer to the held-out frames than either pair alone when four or more frames in a row
 # are missing; with every eighth frame held out the moved pair alone is a little closer. The table is on the page of {eq}`eq-b14`. {doc}`/results/README` gives the
-# effect of the targets on a training.
+# effect of the targets on training.
 #
 # ## The reverse pass
 #
