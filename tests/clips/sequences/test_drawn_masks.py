@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from endotsr.clips.sequences.carry_masks import ClipFlows
+from endotsr.clips.sequences.carry_masks import ClipFlows, carry_masks
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.drawing import displacement, drawing_of, even_frames
+from endotsr.clips.sequences.drawing import displacement, drawing_of, even_frames, plausible_drafts
 from endotsr.clips.sequences.drawn_masks import FORMAT, MOST_POINTS, key_masks, read_drawn
 from endotsr.clips.sequences.mask_shapes import Shape, filled, inside_polygon, near_line, shapes_of
 from endotsr.errors import InputError
@@ -153,10 +153,9 @@ def test_points_are_followed_in_both_directions():
 
 def test_the_first_page_shows_even_frames_and_a_later_one_the_next(tmp_path):
     assert even_frames(63, 5) == [0, 16, 31, 46, 62] and even_frames(3, 5) == [0, 1, 2] and even_frames(9, 1) == [4]
-    rng = np.random.default_rng(0)
-    pictures = [rng.integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8) for _ in range(3)]
+    pictures = 3 * [np.random.default_rng(0).integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)]
     colour = [np.zeros((HEIGHT, WIDTH), bool) for _ in range(3)]
-    colour[0][10:20, 10:20] = True
+    colour[0][10:20, 10:20] = colour[1][10:20, 10:20] = True
     first = drawing_of(clip(), pictures, 2, colour)
     assert [(f.frame, f.key, f.draft and f.draft.origin) for f in first.frames] == [
         (0, False, "colour"),
@@ -167,9 +166,30 @@ def test_the_first_page_shows_even_frames_and_a_later_one_the_next(tmp_path):
     later = drawing_of(clip(), pictures, 2, [], file)
     assert [(f.frame, f.key, f.draft and f.draft.origin) for f in later.frames] == [
         (0, True, None),
-        (1, False, "carried"),
         (2, False, "carried"),
     ]
     for wanted in (0, 61):
         with pytest.raises(InputError, match="use 1 to 60"):
             drawing_of(clip(), pictures, wanted, [])
+
+
+def test_a_draft_that_its_neighbours_lack_is_not_offered():
+    still = ClipFlows([np.zeros((2, HEIGHT, WIDTH), np.float32)] * 4, [np.zeros((2, HEIGHT, WIDTH), np.float32)] * 4)
+    colour = [np.zeros((HEIGHT, WIDTH), bool) for _ in range(5)]
+    for i in (0, 1, 2, 4):
+        colour[i][5:25, 5:30] = True
+    assert plausible_drafts(still, colour) == {0, 1}
+    colour[2][5:25, 5:15] = False  # 60 % of the area is left
+    assert plausible_drafts(still, colour) == {0, 1}
+    assert plausible_drafts(ClipFlows([], []), colour[:1]) == set() and plausible_drafts(still, []) == set()
+
+
+def test_a_further_key_leaves_the_other_gaps():
+    motion, gaps = moving(9), {}
+    keys = {0: np.zeros((HEIGHT, WIDTH), bool), 4: np.zeros((HEIGHT, WIDTH), bool), 8: np.ones((HEIGHT, WIDTH), bool)}
+    first = carry_masks(motion, keys, known=gaps)
+    kept = gaps[0, 4]
+    again = carry_masks(motion, keys | {6: keys[8]}, 2, known=gaps)
+    assert gaps[0, 4] is kept and (4, 6) in gaps and first.next_key in (5, 6, 7) and first.gain > 0.1
+    alone = carry_masks(motion, keys | {6: keys[8]}, 2)
+    assert again.agreement == alone.agreement and all(map(np.array_equal, again.excluded, alone.excluded))

@@ -275,7 +275,9 @@ def test_the_page_needs_nothing_else():
 
 
 def test_the_commands_draw_carry_and_draw_again(tmp_path, capsys):
+    from endotsr.api import load_sequence
     from endotsr.cli.main import main
+    from endotsr.clips.sequences.sequence_file import read_sequence_file
 
     sys.path.insert(0, str(Path(__file__).parents[2] / "clips" / "sequences"))
     from common_folder import written
@@ -294,6 +296,15 @@ def test_the_commands_draw_carry_and_draw_again(tmp_path, capsys):
     assert main(["masks", str(folder), "--keys", str(keys), "--margin", "0", "--replace"]) == 0
     assert "of the picture is never tissue" in capsys.readouterr().out
     mask = read_png(folder / "masks" / f"{drawn[0]['name']}.png") > 0
+    origin = read_sequence_file(folder).masks.origin
+    share = (w // 2) * (h - 4) / (w * h) / about["count"]
+    assert origin.startswith(f"never tissue {4 / h:.1%}, drawn on 2 frames {2 * share:.1%}, carried ")
+    assert f"masks: excluded pixels {origin}" in load_sequence(folder).notes
+    assert main(["check", str(folder), "--html", str(tmp_path / "check.html")]) in (0, 1)
+    assert f"excluded pixels {origin}" in (tmp_path / "check.html").read_text(encoding="utf-8")
+    assert main(["prepare", str(folder), "--out", str(tmp_path / "copy")]) == 0
+    assert read_sequence_file(tmp_path / "copy").masks.origin == origin
+    capsys.readouterr()
     wanted = np.zeros((h, w), bool)
     wanted[:, : w // 2] = wanted[h - 4 :] = True
     np.testing.assert_array_equal(mask, wanted)

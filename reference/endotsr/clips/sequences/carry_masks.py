@@ -16,7 +16,9 @@ side knows it. A check of the flow there and back finds such pixels, and many ot
 mean intersection over union from 0.94 to at most 0.91 with a key every five frames. It is not used.
 
 The agreement of a frame is the intersection over union of the two sides. A frame below LEAST_AGREEMENT is not trusted
-and is named. The frame to draw next lies where the sides disagree most.
+and is named. The frame to draw next lies in the gap between keys that loses most agreement, where the sides disagree
+far from both keys. Its expected gain is that loss, averaged over all frames: what a perfect gap would add to the mean
+agreement. Below LEAST_GAIN no frame is named.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,6 +26,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.clips.opencv import dense_flow, gaussian_blur, grown, warp_mask
 from endotsr.clips.sequences.clip import Picture
@@ -35,7 +38,7 @@ INSIDE = 2  # px by which the inside is smaller than the mask
 SPREAD = 4.0  # px, standard deviation of the average of the flow inside
 LEAST_PIXELS = 50  # a smaller inside has no flow of its own
 LEAST_AGREEMENT = 0.5  # of the two sides; a guess: no frame of the two EndoNeRF clips is below, at 20 frames a key
-LEAST_GAIN = 0.02  # of the agreement, averaged over the frames between two keys, that another key must promise
+LEAST_GAIN = 0.02  # of the mean agreement of all frames, that another key must promise
 
 
 class Carried(NamedTuple):
@@ -44,11 +47,22 @@ class Carried(NamedTuple):
     excluded: list[BoolArray]  # (H, W) per frame, True = instrument
     agreement: list[float]  # per frame: intersection over union of the two sides; 1 at keys and where both are empty
     next_key: int | None  # frame whose mask would help most; None if the expected gain is below LEAST_GAIN
+    gain: float  # expected gain of the mean agreement from the mask of the best frame, at most
 
     @property
     def distrusted(self) -> list[int]:
         """Frames whose two sides disagree."""
         return [i for i, agreement in enumerate(self.agreement) if agreement < LEAST_AGREEMENT]
+
+
+class Gap(NamedTuple):
+    """The frames between two keys, or between a key and an end of the clip, without the keys."""
+
+    blend: list[NDArray[np.uint8]]  # (H, W) 255 times the blend c_i of both sides
+    agreement: list[float]
+
+
+Gaps = dict[tuple[int, int], Gap]  # (key before or -1, key after or number of frames) -> its frames
 
 
 class ClipFlows(NamedTuple):
@@ -65,37 +79,51 @@ def motion_of(pictures: Sequence[Picture]) -> ClipFlows:
     return ClipFlows([dense_flow(a, b) for a, b in pairs], [dense_flow(b, a) for a, b in pairs])
 
 
-def carry_masks(motion: ClipFlows, keys: Mapping[int, BoolArray], margin: int = 0) -> Carried:
+def carry_masks(
+    motion: ClipFlows, keys: Mapping[int, BoolArray], margin: int = 0, known: Gaps | None = None
+) -> Carried:
     """Masks of all frames from those of the key frames.
 
     motion    of `motion_of`
     keys      frame -> (H, W), True = instrument; a key may be empty or full
     margin    px by which the masks grow; above 0, the blend is cut at 1/4 in place of 1/2
+    known     gaps of an earlier call with equal masks, to which those of this call are added: a further key costs the
+              time of its own gap
 
     Edges:    before the first key and after the last one there is one side, whose agreement counts as 0, so that these
               frames are named.
     Raises:   InputError without keys, and for a key outside of the clip or of another size.
     """
-    count = len(motion.forward) + 1
+    count, gaps = len(motion.forward) + 1, {} if known is None else known
     _check_keys(keys, count, motion)
-    order = sorted(keys)
-    ahead = _carried(keys, motion.backward, range(count))
-    back = _carried(keys, motion.forward, range(count - 1, -1, -1))
-    masks, agreement = [], []
-    for i in range(count):
-        before = max((k for k in order if k <= i), default=None)
-        after = min((k for k in order if k >= i), default=None)
-        one, other = ahead.get(i), back.get(i)
-        if one is None or other is None or before is None or after is None:
-            soft = one if one is not None else other
-            assert soft is not None
-            masks.append(_excluded(soft, margin))
-            agreement.append(0.0)
-            continue
-        s = (i - before) / (after - before) if after > before else 0.0
-        masks.append(_excluded(np.float32(1 - s) * one + np.float32(s) * other, margin))
-        agreement.append(1.0 if i in keys else _overlap(one > 0.5, other > 0.5))
-    return Carried(masks, agreement, _next_key(agreement, order))
+    masks, agreement, lost = [], [], []
+    ends = [-1, *sorted(keys), count]
+    for before, after in pairwise(ends):
+        if (before, after) not in gaps:
+            gaps[before, after] = _gap(motion, keys, before, after)
+        gap = gaps[before, after]
+        masks += [_excluded(blend, margin) for blend in gap.blend]
+        agreement += gap.agreement
+        lost.append(sum(1 - value for value in gap.agreement))
+        if after < count:
+            masks.append(_excluded(_levels(keys[after]), margin))
+            agreement.append(1.0)
+    widest = int(np.argmax(lost))
+    gain = lost[widest] / count
+    best = _best_frame(agreement, ends[widest], ends[widest + 1], count) if gain >= LEAST_GAIN else None
+    return Carried(masks, agreement, best, gain)
+
+
+def _gap(motion: ClipFlows, keys: Mapping[int, BoolArray], before: int, after: int) -> Gap:
+    """The frames between two keys; -1 and the number of frames stand for the ends of the clip."""
+    frames = range(before + 1, after)
+    ahead = _carried(keys[before], motion.backward, frames, 1) if before in keys else []
+    back = _carried(keys[after], motion.forward, frames[::-1], 0)[::-1] if after in keys else []
+    if not ahead or not back:
+        return Gap([_levels(soft) for soft in ahead or back], [0.0] * len(frames))
+    weights = [np.float32((i - before) / (after - before)) for i in frames]
+    blend = [_levels((1 - s) * one + s * other) for s, one, other in zip(weights, ahead, back)]
+    return Gap(blend, [overlap_of(one > 0.5, other > 0.5) for one, other in zip(ahead, back)])
 
 
 def _check_keys(keys: Mapping[int, BoolArray], count: int, motion: ClipFlows) -> None:
@@ -109,17 +137,16 @@ def _check_keys(keys: Mapping[int, BoolArray], count: int, motion: ClipFlows) ->
             raise InputError(f"masks: key {frame} is {mask.shape[1]}x{mask.shape[0]}, the pictures {width}x{height}")
 
 
-def _carried(keys: Mapping[int, BoolArray], to_last: list[FloatArray], frames: range) -> dict[int, FloatArray]:
-    """Frame -> soft mask carried from the last key on the way; frames before the first key are missing.
+def _carried(mask: BoolArray, to_last: list[FloatArray], frames: range, lag: int) -> list[FloatArray]:
+    """Soft masks of the frames on the way from a key.
 
-    to_last   flow between frames i and i + 1, from the frame that comes later on the way to the earlier one
+    to_last   flows between neighbouring frames, from the one that comes later on the way to the earlier one
+    lag       entry i - lag belongs to frame i
     """
-    found: dict[int, FloatArray] = {}
-    for last, i in zip((None, *frames), frames):
-        if i in keys:
-            found[i] = keys[i].astype(np.float32)
-        elif last is not None and last in found:
-            found[i] = carried_once(found[last], to_last[min(last, i)])
+    soft, found = mask.astype(np.float32), []
+    for i in frames:
+        soft = carried_once(soft, to_last[i - lag])
+        found.append(soft)
     return found
 
 
@@ -135,29 +162,27 @@ def carried_once(mask: FloatArray, flow: FloatArray) -> FloatArray:
     return np.where(edge, warp_mask(mask, np.where(edge, own, flow)), moved)
 
 
-def _excluded(blend: FloatArray, margin: int) -> BoolArray:
-    return blend > 0.5 if margin == 0 else grown(blend > 0.25, margin)
+def _levels(blend: FloatArray | BoolArray) -> NDArray[np.uint8]:
+    return (blend * np.float32(255) + np.float32(0.5)).astype(np.uint8)
 
 
-def _overlap(one: BoolArray, other: BoolArray) -> float:
+def _excluded(levels: NDArray[np.uint8], margin: int) -> BoolArray:
+    return levels >= 128 if margin == 0 else grown(levels >= 64, margin)
+
+
+def overlap_of(one: BoolArray, other: BoolArray) -> float:
     """Intersection over union; 1 if both are empty."""
     union = np.count_nonzero(one | other)
     return np.count_nonzero(one & other) / union if union else 1.0
 
 
-def _next_key(agreement: list[float], keys: list[int]) -> int | None:
-    """The frame to draw: in the gap that loses most agreement, where loss times distance to the nearer key is largest.
+def _best_frame(agreement: list[float], before: int, after: int, count: int) -> int:
+    """The frame of a gap to draw: where the lost agreement times the distance to the nearer key is largest.
 
     Next to a key the two sides disagree because the other one comes from far, and a new key would help little.
     """
-    ends = [-1, *keys, len(agreement)]
-    gaps = [range(a + 1, b) for a, b in pairwise(ends) if b - a > 1]
-    lost = [sum(1 - agreement[i] for i in gap) for gap in gaps]
-    if not gaps or max(lost) < LEAST_GAIN * len(agreement):
-        return None
-    gap = gaps[int(np.argmax(lost))]
-    if gap.start == 0:
+    if before < 0:
         return 0
-    if gap.stop == len(agreement):
-        return len(agreement) - 1
-    return max(gap, key=lambda i: ((1 - agreement[i]) * min(i - gap.start + 1, gap.stop - i), -i))
+    if after == count:
+        return count - 1
+    return max(range(before + 1, after), key=lambda i: ((1 - agreement[i]) * min(i - before, after - i), -i))

@@ -42,6 +42,7 @@ class Masks:
     excluded_value: str = "white"  # of the files; `white` or `black`
     stated_in: str = ""  # the file that states this value; "": a setting or an option does
     proposed: bool = False  # a program made the masks, and no person has checked them
+    origin: str = ""  # where the excluded pixels come from, in words; "": not stated
 
     def __call__(self, i: int) -> NDArray[np.bool_] | None:
         return self.read(i)

@@ -12,7 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.opencv import sample_bilinear
-from endotsr.clips.sequences.carry_masks import ClipFlows, carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import (
+    LEAST_AGREEMENT,
+    ClipFlows,
+    carried_once,
+    carry_masks,
+    motion_of,
+    overlap_of,
+)
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
 from endotsr.clips.sequences.mask_shapes import LARGEST, Origin, Shape, shapes_of
@@ -86,7 +93,8 @@ def drawing_of(
         shown, drafts = _next_frames(motion, key_masks(drawn).keys)
     else:
         shown = even_frames(len(pictures), wanted)
-        drafts = {i: Draft("colour", shapes_of(colour[i], "colour")) for i in shown if colour}
+        offered = plausible_drafts(motion, colour)
+        drafts = {i: Draft("colour", shapes_of(colour[i], "colour")) for i in shown if i in offered}
     step = max(STEP, math.ceil(width / MOST_COLUMNS))
     nodes = np.stack(np.meshgrid(np.arange(step / 2, width, step), np.arange(step / 2, height, step)))
     columns, points = nodes.shape[2], nodes.reshape(2, -1)
@@ -95,6 +103,21 @@ def drawing_of(
         ahead, back = (None if k is None else displacement(motion, i, k, points) for k in (after, before))
         frames.append(_frame(clip, pictures, i, keys.get(i), drafts.get(i))._replace(ahead=ahead, back=back))
     return Drawing(len(pictures), width, height, frames, drawn.never if drawn else [], step, columns)
+
+
+def plausible_drafts(motion: ClipFlows, colour: list[BoolArray]) -> set[int]:
+    """Frames whose draft is offered: the dense flow carries it to the draft of each neighbour.
+
+    Tissue that looks like metal is marked in some frames and not in their neighbours. An instrument stays.
+
+    Edges:   frames without marked pixels, and a clip of one frame, have no draft.
+    """
+    pairs = [
+        overlap_of(carried_once(a.astype(np.float32), flow) > 0.5, b) >= LEAST_AGREEMENT
+        for a, b, flow in zip(colour, colour[1:], motion.backward)
+    ]
+    sides = [pairs[max(i - 1, 0) : i + 1] for i in range(len(colour))]
+    return {i for i, plane in enumerate(colour) if plane.any() and sides[i] and all(sides[i])}
 
 
 def _frame(clip: Clip, pictures: Sequence[Picture], i: int, key: DrawnKey | None, draft: Draft | None) -> DrawnFrame:
@@ -108,9 +131,9 @@ def _next_frames(motion: ClipFlows, keys: dict[int, BoolArray]) -> tuple[list[in
 
     A further frame is the next key when the carried masks of the earlier ones count as drawn.
     """
-    known, drafts = dict(keys), {}
+    known, drafts, gaps = dict(keys), {}, {}
     for _ in range(PROPOSED):
-        carried = carry_masks(motion, known)
+        carried = carry_masks(motion, known, known=gaps)
         if carried.next_key is None:
             break
         mask = carried.excluded[carried.next_key]

@@ -187,6 +187,10 @@ def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Cli
     names = ", ".join(folder.name for folder in folders)
     return replace(
         clip,
-        masks=Masks(mask, proposed=any(one.proposed for one in every)),
+        masks=Masks(
+            mask,
+            proposed=any(one.proposed for one in every),
+            origin="; ".join([*(one.origin for one in every if one.origin), f"united with {names}"]),
+        ),
         notes=[*clip.notes, f"masks: united with {names}"],
     )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, read_png, write_png
-from endotsr.clips.sequences.carry_masks import carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carry_masks, motion_of
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.drawing import Drawing, drawing_of
 from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
@@ -30,6 +30,7 @@ from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
 
 OVERLAY = "proposed_masks.png"
 MOST_WITHOUT = 0.5  # of the frames; a proposal that leaves more frames without tissue is wrong
+OTHER_COLOUR, DRAWN_COLOUR, NEVER_COLOUR = (0, 255, 0), (0, 110, 255), (255, 150, 0)  # of the overlay
 SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, per row, and their largest width
 
 
@@ -90,12 +91,16 @@ def from_keys(source: Path, margin: int, said: list[str]) -> Propose:
             named = shortened([clip.names[i] for i in carried.distrusted])
             said.append(f"not trusted, look at these frames or draw one of them: {named}")
         if carried.next_key is not None:
-            said.append(f"the mask that would help most: {clip.names[carried.next_key]}")
+            named, gain = clip.names[carried.next_key], f"{carried.gain:.3f}"
+            said.append(f"the mask that would help most: {named} (expected gain of the mean agreement at most {gain})")
+        else:
+            said.append(f"no further key is expected to raise the mean agreement by {LEAST_GAIN}")
         frames = f"{len(found.keys)} key frame{'s' if len(found.keys) != 1 else ''}"
         never = found.never
         excluded = carried.excluded if never is None else [plane | never for plane in carried.excluded]
         never_said = "" if never is None else f"; {never.mean():.1%} of the picture is never tissue"
-        return Proposal(excluded, f"carried from {frames}, margin {margin} px{never_said}")
+        said_of = f"carried from {frames}, margin {margin} px{never_said}"
+        return Proposal(excluded, said_of, kind="carried", drawn=tuple(sorted(found.keys)), never=never)
 
     return propose
 
@@ -168,7 +173,8 @@ def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = N
         return proposal
     with replacing_folder(folder / MASKS) as place:
         _write_masks(place, clip.names, proposal)
-    found = msgspec.structs.replace(read_sequence_file(folder), masks=MaskEntry(proposed=True))
+    entry = MaskEntry(proposed=True, origin=origin_of(proposal, static))
+    found = msgspec.structs.replace(read_sequence_file(folder), masks=entry)
     replace_text(folder / FILE_NAME, sequence_text(found))
     write_png(folder / OVERLAY, overlays(clip, proposal))
     return proposal
@@ -189,6 +195,7 @@ def write_proposal(clip: Clip, out: Path, propose: Propose | None = None) -> Pro
         _write_masks(place / MASKS, clip.names, proposal)
         write_png(place / OVERLAY, overlays(clip, proposal))
         about = {"source": clip.where.name, "proposed": True, "excluded_value": "white", "found": proposal.reason}
+        about |= {"origin": origin_of(proposal)}
         (place / PROPOSAL).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8", newline="\n")
     return proposal
 
@@ -198,12 +205,36 @@ def _write_masks(folder: Path, names: list[str], proposal: Proposal) -> None:
         write_png(folder / f"{name}.png", np.where(plane, 255, 0).astype(np.uint8))
 
 
+def origin_of(proposal: Proposal, given: BoolArray | None = None) -> str:
+    """Where the excluded pixels come from, in words, with their fractions of all pixels.
+
+    given   (H, W) pixels that the clip excluded before
+
+    A pixel with several origins counts for the first one: given, never tissue, then drawn, carried or proposed.
+    """
+    shares, covered = {}, np.zeros(proposal.excluded[0].shape, bool)
+    for name, plane in (("given", given), ("never tissue", proposal.never)):
+        if plane is not None:
+            shares[name] = float((plane & ~covered).mean())
+            covered = covered | plane
+    for i, plane in enumerate(proposal.excluded):
+        name = f"drawn on {len(proposal.drawn)} frames" if i in proposal.drawn else proposal.kind
+        shares[name] = shares.get(name, 0.0) + float((plane & ~covered).mean()) / len(proposal.excluded)
+    return ", ".join(f"{name} {share:.1%}" for name, share in shares.items())
+
+
 def overlays(clip: Clip, proposal: Proposal) -> Picture:
-    """Up to twelve frames of the clip in rows, with proposed pixels in green, (H, W, 3) uint8."""
+    """Up to twelve frames of the clip in rows, (H, W, 3) uint8, with excluded pixels in colour.
+
+    Blue: drawn by a person; green: carried or proposed; orange: never tissue.
+    """
     chosen = np.unique(np.linspace(0, clip.count - 1, min(SHOWN, clip.count)).astype(int)).tolist()
     shown = []
     for i, pair in zip(chosen, clip.pictures(chosen)):
-        picture = overlay(pair.left, proposal.excluded[i])
+        never, drawn = proposal.never, i in proposal.drawn
+        own = proposal.excluded[i] if never is None else proposal.excluded[i] & ~never
+        picture = overlay(pair.left, own, DRAWN_COLOUR if drawn else OTHER_COLOUR)
+        picture = picture if never is None else overlay(picture, never, NEVER_COLOUR)
         factor = min(1.0, SHOWN_WIDTH / picture.shape[1])
         shown.append(area_resize(picture, round(picture.shape[1] * factor), round(picture.shape[0] * factor)))
     height, width = shown[0].shape[:2]

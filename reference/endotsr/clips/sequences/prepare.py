@@ -260,7 +260,7 @@ def _file_of(
         unit=unit,
         frame_rate=rate,
         times=times,
-        masks=MaskEntry(proposed=clip.masks.proposed) if clip.masks is not None else None,
+        masks=MaskEntry(proposed=clip.masks.proposed, origin=clip.masks.origin) if clip.masks is not None else None,
         depth=entry if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )

@@ -50,6 +50,9 @@ class Proposal(NamedTuple):
     reason: str  # number of frames with an instrument, or why there is no proposal
     outside: float = 0.0  # fraction of the picture outside the field of view, excluded in every frame
     without_tissue: tuple[int, ...] = ()  # frames with almost no remaining tissue
+    kind: str = "proposed"  # or `carried`: how the frames that no person drew got their masks
+    drawn: tuple[int, ...] = ()  # frames that a person drew
+    never: BoolArray | None = None  # (H, W) True where no frame shows tissue, as drawn by a person
 
     @property
     def found(self) -> bool:
@@ -234,8 +237,8 @@ def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:
     return nearest_pixels(plane, size[1], size[0], "mask")
 
 
-def overlay(picture: Picture, excluded: BoolArray) -> Picture:
-    """The picture with the excluded pixels in green, (H, W, 3) uint8."""
+def overlay(picture: Picture, excluded: BoolArray, colour: tuple[int, int, int] = (0, 255, 0)) -> Picture:
+    """The picture with the excluded pixels in a colour, half transparent, (H, W, 3) uint8."""
     shown = picture.copy()
-    shown[excluded] = (0.5 * picture[excluded] + np.array([0.0, 127.0, 0.0])).astype(np.uint8)
+    shown[excluded] = (0.5 * picture[excluded] + 0.499 * np.array(colour)).astype(np.uint8)
     return shown

@@ -125,6 +125,8 @@ def _depth_percentiles(clip: Clip, config: SequenceConfig) -> tuple[SequenceConf
     """The settings, without a repeated clipping of depth; and the notes on what the clip states."""
     notes, depth = list(clip.notes), clip.depth
     assert depth is not None
+    if clip.masks and clip.masks.origin:
+        notes.append(f"masks: excluded pixels {clip.masks.origin}")
     if clip.masks and clip.masks.proposed:
         notes.append("masks: proposed by a program, not checked by a person")
     if depth.clipped and depth.clipped == tuple(config.depth_percentiles):

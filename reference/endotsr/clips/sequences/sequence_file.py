@@ -16,6 +16,7 @@
     folder = "masks"
     excluded_value = "white"           # or "black"
     proposed = false                   # true: made by a program, not checked by a person
+    origin = ""                        # where the excluded pixels come from: given, drawn, carried, proposed
 
     [depth]                            # absent: `endotsr depth` makes it
     folder = "depth"
@@ -82,6 +83,7 @@ class MaskEntry(Section, frozen=True, kw_only=True):
     folder: str = MASKS
     excluded_value: Literal["white", "black"] = "white"
     proposed: bool = False
+    origin: str = ""
 
 
 class DepthEntry(Section, frozen=True, kw_only=True):

@@ -23,8 +23,10 @@ from endotsr.clips.sequences.trajectory import poses_of_frames, read_trajectory
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
+from endotsr.untrusted.json import read_json, text
 
 PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
+LARGEST_MARK = 1 << 16  # bytes of this file
 
 
 def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
@@ -151,8 +153,11 @@ def stated_masks(options: SourceOptions, frames: list[Path] | int, width: int, h
     if options.masks is None:
         return None
     files = files_of(options.masks, PICTURE_ENDINGS)
-    proposed = (options.masks.parent / PROPOSAL).is_file()
-    return masks_of(matching_files(frames, files), options.excluded_value, width, height, proposed)
+    mark = options.masks.parent / PROPOSAL
+    found = masks_of(matching_files(frames, files), options.excluded_value, width, height, mark.is_file())
+    if not found.proposed:
+        return found
+    return replace(found, origin=text(read_json(mark, LARGEST_MARK).get("origin", ""), f"{mark}: origin"))
 
 
 def stated_depth(options: SourceOptions, frames: list[Path] | int) -> Depth | None:

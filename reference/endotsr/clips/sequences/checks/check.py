@@ -137,6 +137,10 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     return Checked(str(path), worst_first(run.findings), facts, run.pictures)
 
 
+def _origin(clip: Clip) -> str:
+    return f": excluded pixels {clip.masks.origin}" if clip.masks and clip.masks.origin else ""
+
+
 def _stated(clip: Clip) -> list[Finding]:
     """Findings on what the files of a clip state."""
     found, where = [], clip.stated_in
@@ -146,7 +150,7 @@ def _stated(clip: Clip) -> list[Finding]:
     if clip.masks is None and not broken & {"masks-files", "sequence-file"}:
         found.append(finding("no-masks", where, "there are no masks"))
     elif clip.masks and clip.masks.proposed:
-        found.append(finding("proposed-masks", where, "a program proposed the masks"))
+        found.append(finding("proposed-masks", where, f"a program proposed the masks{_origin(clip)}"))
     if clip.intrinsics and any(clip.intrinsics.distortion):
         found.append(finding("distortion", where, "the pictures are distorted"))
     return found

@@ -82,6 +82,7 @@ def _masks(folder: FolderReader, found: SequenceFile, options: SourceOptions) ->
     if settings is not None and value == "white":  # the default, which a setting overrides
         value, stated_in = settings.excluded_value, ""
     masks = folder.masks(found.masks.folder, value, stated_in, found.masks.proposed)
+    masks = masks and replace(masks, origin=found.masks.origin)
     if masks is None or value == found.masks.excluded_value:
         return masks, []
     return masks, [f"sequence.excluded_value = {value!r} overrides the value in {FILE_NAME}"]
