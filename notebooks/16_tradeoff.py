@@ -131,7 +131,7 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 #
 # $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
 # $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow at most with the **logarithm** of the
-# accuracy. Each factor of ten adds the same area. In this small picture it adds fewer visits each time, because the
+# accuracy. Each factor of ten adds the same area. In this small picture it adds fewer visits each time; the
 # ellipses grow beyond the border, where there are no pixels.
 
 # %%

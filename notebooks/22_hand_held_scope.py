@@ -209,8 +209,8 @@ for one, other in zip(compose(true[1], inverse(moved)), expected):
 # ## The pose, found
 #
 # The next cell takes Gauss-Newton steps from the rows (22.5), beginning without motion. Weights leave out points that
-# do not fit. From so far away the finest level alone converges only because the motion is a few pixels; `endotsr poses`
-# begins with the flow of the pictures.
+# do not fit. Here the motion is a few pixels, and the finest level alone suffices; `endotsr poses` begins with
+# the flow of the pictures.
 
 # %%
 found, courses = CameraPose(np.eye(3), np.zeros(3)), []
