@@ -8,7 +8,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import raw_sources
-from input_kinds import Row, close, prepare
+from input_kinds import Row, close, folder_of, prepare, video
+from made_videos import picture, pictures, write
 from raw_sources import scene_picture
 
 from endotsr.cli.main import main
@@ -167,4 +168,57 @@ POSE_ROWS = [
     Row("LLFF, axes of its own tool, training", llff_trained, "refused", "prepare --trajectory-axes llff"),
     Row("LLFF, --trajectory-axes llff", llff_prepared("--trajectory-axes", "llff"), "right", "", true_poses),
 ]  # fmt: skip
-LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS]
+TWICE = [picture(i // 2) for i in range(40)]
+PULLED_DOWN = [picture(i - i // 5) for i in range(40)]
+COPY_ROWS = [
+    Row("video, every picture twice, coded", video("a.mp4", TWICE, options={"crf": "28"}), "told",
+        "every second frame repeats the one before (20 of 40 frames"),
+    Row("video, every picture twice, --frames ::2", video("a.mp4", TWICE, "--frames", "::2"), "right", "",
+        close(TWICE[::2])),
+    Row("video, 24 a second stored as 30", video("a.mp4", PULLED_DOWN, options={"crf": "28"}), "told",
+        "1 of every 5 frames repeat"),
+    Row("pictures, every picture twice", folder_of(TWICE), "told", "without the copies: --frames ::2"),
+]  # fmt: skip
+GROUPS = {"g": "12", "bf": "2"}  # options of the encoder: a whole picture in twelve
+PAUSE = [*range(0, 240, 40), *range(5000, 5240, 40)]  # milliseconds
+
+
+def hidden_lead_in(folder: Path) -> list[str]:
+    """An mp4 whose edit list hides the first five pictures, as a cut without coding leaves it."""
+    import av
+
+    write(folder / "whole.mp4", pictures(24), options=GROUPS)
+    how = {"avoid_negative_ts": "disabled"}
+    with av.open(str(folder / "whole.mp4")) as whole, av.open(str(folder / "a.mp4"), "w", options=how) as out:
+        source = whole.streams.video[0]
+        stream = out.add_stream_from_template(source)
+        for packet in whole.demux(source):
+            if packet.size:
+                lead = 5 * packet.duration
+                packet.pts, packet.dts, packet.stream = packet.pts - lead, packet.dts - lead, stream
+                out.mux(packet)
+    return prepare("a.mp4")(folder)
+
+
+def begun_inside(path: Path) -> None:
+    """The first packets of a transport stream are missing: it begins inside a group of pictures."""
+    path.write_bytes(path.read_bytes()[188 * 10 :])
+
+
+def twice_in_a_file(path: Path) -> None:
+    path.write_bytes(path.read_bytes() * 2)
+
+
+CLOCK_ROWS = [
+    Row("video, lead-in hidden by an edit list", hidden_lead_in, "right", "", close(pictures(24)[5:])),
+    Row("video, begins inside a group of pictures", video("a.ts", pictures(40), options=GROUPS, change=begun_inside),
+        "told", "coded pictures cannot be decoded and are left out", close(pictures(40)[12:])),
+    Row("video, two files joined, the clock goes back", video("a.ts", pictures(40), change=twice_in_a_file), "told",
+        "its clock goes back", close(pictures(40) * 2)),
+    Row("video, a clock that jumps", video("a.mkv", None, milliseconds=PAUSE), "refused", "its clock jumps by 4.8 s"),
+    Row("video, a clock that jumps, --source-rate", video("a.mkv", None, "--source-rate", "25", milliseconds=PAUSE),
+        "told", "its clock jumps by 4.8 s", lambda folder: read_sequence_file(folder / "o").times is None),
+    Row("video, a pause in a long clip", video("a.mkv", pictures(60), milliseconds=[40 * i + 1500 * (i > 20)
+        for i in range(60)]), "told", "its clock jumps by 1.54 s", close(pictures(60))),
+]  # fmt: skip
+LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS, *COPY_ROWS, *CLOCK_ROWS]

@@ -6,15 +6,17 @@ number is inexact for most codecs. Interlaced pictures are deinterlaced (bwdif):
 and the rows of the second are interpolated. A stated rotation is reported, not applied.
 """
 
+import contextlib
 import itertools
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.clocks import Clock, clock_of
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS, open_regular
 from endotsr.untrusted.names import plain_line
@@ -31,6 +33,7 @@ HIDDEN = ("vp8",)  # codecs with packets without a visible picture; pictures are
 WIDE_RANGE = {8: "linear light", 9: "logarithm", 10: "logarithm", 16: "PQ", 18: "HLG"}
 BT2020 = 9  # of the primaries
 UNSTATED, HIGH_DEFINITION = 2, 576  # colour matrix not stated; rows above which players assume BT.709
+MOST_DECODED = 5000  # pictures of a file that is decoded for its time stamps: a minute at high definition
 PROBED = 3  # pictures decoded to find properties that are missing in the header
 
 
@@ -40,13 +43,17 @@ class VideoFacts(NamedTuple):
     width: int  # as stored
     height: int
     count: int
-    rate: float | None  # pictures per second on average
-    times: NDArray[np.float64] | None  # (count,) seconds from the first picture, ascending; None: unknown
+    clock: Clock  # times and rate of the pictures
     turn: int  # counter-clockwise rotation by a player, degrees: 0, 90, 180 or 270
     interlaced: bool
     codec: str
     pixel_shape: float  # width / height of a pixel
     remarks: tuple[str, ...] = ()  # further remarks, in words
+
+    @property
+    def times(self) -> NDArray[np.float64] | None:
+        """(count,) seconds from the first picture, ascending; None: unknown."""
+        return self.clock.times
 
 
 def video_facts(path: Path) -> VideoFacts:
@@ -67,20 +74,19 @@ def video_facts(path: Path) -> VideoFacts:
         width, height, turn = first[0].width, first[0].height, round(first[0].rotation) % 360
         interlaced = any(frame.interlaced_frame for frame in first)
         remarks = _remarks(first[0], len(container.streams.video))
-    times = _times(path, by_decoding=interlaced or codec in HIDDEN)
-    if len(times) < stated:
+    packets = _packets(path)
+    if len(packets) < stated:
         raise InputError(
-            f"{path}: the video ends after {len(times)} of {stated} pictures: it is truncated or damaged; allowed: a"
+            f"{path}: the video ends after {len(packets)} of {stated} pictures: it is truncated or damaged; allowed: a"
             f" whole file (`ffmpeg -i {path.name} -c copy whole{path.suffix}` keeps what is left)"
         )
+    stamps, hidden = _stamps(path, packets, by_decoding=interlaced or codec in HIDDEN)
+    if hidden:
+        remarks = (*remarks, hidden)
     if turn % 90:
         raise InputError(f"{path}: the file states a rotation of {turn} degrees; allowed: 0, 90, 180 and 270")
-    known = len(times) > 1 and bool(np.isfinite(times).all()) and bool((np.diff(times) > 0).all())
-    if known:
-        rate = (len(times) - 1) / float(times[-1] - times[0])
-    found = times - times[0] if known else None
-    usable = rate if np.isfinite(rate) and rate > 0 else None
-    return VideoFacts(width, height, len(times), usable, found, turn, interlaced, codec, shape, remarks)
+    clock = clock_of(stamps, rate if np.isfinite(rate) and rate > 0 else None)
+    return VideoFacts(width, height, len(stamps), clock, turn, interlaced, codec, shape, remarks)
 
 
 def _remarks(frame: Any, streams: int) -> tuple[str, ...]:
@@ -107,18 +113,48 @@ def _refuse_wide_range(frame: Any, path: Path) -> None:
         )
 
 
-def _times(path: Path, by_decoding: bool) -> NDArray[np.float64]:
-    """Seconds of every picture in display order, from the packets or by decoding; NaN where unknown."""
+class _Packet(NamedTuple):
+    """A coded picture of a file."""
+
+    stamp: int | None  # of its display, or else of its decoding
+    order: int | None  # of its decoding
+    whole: bool  # a picture by itself, and not damaged
+    shown: bool  # an edit list may hide the lead-in of a cut
+
+
+def _packets(path: Path) -> list[_Packet]:
+    """The coded pictures, hidden ones included."""
     with _opened(path) as (container, stream):
-        if by_decoding:
-            found = [frame.pts for frame in _decoded(container.decode(stream), path)]
-        else:
-            packets = [(p.pts, p.dts) for p in _decoded(container.demux(stream), path) if p.size and not p.is_discard]
-            shown = [pts for pts, _ in packets]
-            found = shown if None not in shown else [dts for _, dts in packets]
+        found = [
+            _Packet(p.pts if p.pts is not None else p.dts, p.dts, p.is_keyframe and not p.is_corrupt, not p.is_discard)
+            for p in _decoded(container.demux(stream), path)
+            if p.size
+        ]
+    return found
+
+
+def _stamps(path: Path, packets: list[_Packet], by_decoding: bool) -> tuple[NDArray[np.float64], str]:
+    """Seconds of every picture that is shown, in this order, NaN where unknown; and a remark on lost pictures.
+
+    A packet that cannot be decoded is no picture. Long files are decoded for their stamps if they begin inside a group
+    of pictures, or their clock goes back.
+    """
+    shown = [packet for packet in packets if packet.shown]
+    order = [packet.order for packet in shown if packet.order is not None]
+    doubtful = len(shown) <= MOST_DECODED or not shown[0].whole or any(a >= b for a, b in pairwise(order))
+    stamps: list[int | None] = []
+    with _opened(path) as (container, stream):
         step = float(stream.time_base or 0)
-    values = np.array([np.nan if stamp is None else stamp for stamp in found], np.float64)
-    return np.sort(values) * step
+        if by_decoding or doubtful:
+            stream.thread_type = "AUTO"
+            with contextlib.suppress(InputError):  # the reader of the pictures names the damaged one
+                stamps = [frame.pts for frame in _decoded(container.decode(stream), path)]
+    if not stamps:
+        known = sorted(packet.stamp for packet in shown if packet.stamp is not None)
+        stamps = [*known, *[None] * (len(shown) - len(known))]
+    lost = 0 if by_decoding else len(shown) - len(stamps)
+    remark = f"{lost} of {len(shown)} coded pictures cannot be decoded and are left out" if lost > 0 else ""
+    return np.array([np.nan if stamp is None else stamp * step for stamp in stamps], np.float64), remark
 
 
 def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]:
@@ -211,7 +247,7 @@ def _metadata_ignored(version: str) -> dict[str, str]:
     return {} if int(version.split(".")[0]) >= 19 else {"metadata_errors": "ignore"}
 
 
-@contextmanager
+@contextlib.contextmanager
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     """The container and its best video stream. The decoder opens no other file. Raises InputError."""
     import av

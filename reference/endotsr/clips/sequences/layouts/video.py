@@ -33,8 +33,13 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
     stereo = "none" if options.stereo == "auto" else options.stereo
     width, height = halves(across, down, stereo)
-    rate = options.rate or facts.rate
-    times = None if options.rate else facts.times
+    rate = options.rate or facts.clock.rate
+    times = None if options.rate else facts.clock.times
+    if not facts.clock.stands and not options.rate:
+        raise InputError(
+            f"{path}: {facts.clock.remark}, and the jump is longer than all pictures together; allowed: --source-rate"
+            " HZ (evenly spaced), or a file cut there"
+        )
     camera = stated_camera(options, width, height, path)
     notes = _notes(facts, rate, path)
     if options.orientation is not None and not facts.turn:
@@ -87,7 +92,9 @@ def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
         found.append(f"{path.name} is interlaced: deinterlaced to one picture per two fields (bwdif)")
     if facts.pixel_shape != 1:
         found.append(f"{path.name}: pixels are {facts.pixel_shape:.4g} times as wide as high, as are fx and fy")
-    if facts.times is None:
+    if facts.clock.remark:
+        found.append(f"{path.name}: {facts.clock.remark}")
+    elif facts.clock.times is None:
         found.append(f"{path.name} states no times: frames count as evenly spaced")
     return found
 
