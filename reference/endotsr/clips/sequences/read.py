@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.checks.copies import copied_frames, steps_between, without_twins
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts
 from endotsr.clips.sequences.checks.guard import guarded
@@ -67,6 +68,7 @@ def sequence_of(clip: Clip, config: SequenceConfig, near: float = NEAR) -> Seque
     config, notes = _depth_percentiles(clip, config)
     sequence, store = _allocated(clip, frames, config, notes)
     facts = _filled(sequence, clip, frames, config, store)
+    sequence = _without_twins(sequence, facts, clip)
     sequence = _in_scene_units(sequence, clip)
     notes += _mask_notes(sequence, clip, config)
     notes.append(_depth_note(sequence.depth, near, clip))
@@ -195,6 +197,14 @@ def _filled(sequence: Sequence, clip: Clip, frames: range, config: SequenceConfi
     else:
         sequence.masks[...] = True
     return [fact for fact in facts if fact is not None]
+
+
+def _without_twins(sequence: Sequence, facts: list[Facts], clip: Clip) -> Sequence:
+    """The sequence without training frames that a held-out frame repeats, with a note. Raises InputError."""
+    copies = copied_frames(steps_between([picture.small for picture, _ in facts]))
+    train, notes = without_twins(sequence.train_index, sequence.test_index, copies, sequence.names, clip.where)
+    sequence.notes.extend(notes)
+    return replace(sequence, train_index=train)
 
 
 def _kept(plane: NDArray, stored: NDArray[np.uint8] | None, i: int) -> NDArray:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import other_profile
+from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.clips.sequences.files import frame_numbers, shortened
 
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
-SAME = 0.05  # mean difference in grey levels; sensor noise makes recorded frames differ by 0.5 or more
 FROZEN = 0.5  # as SAME, from the first frame of a clip to any other; encoders refine a still picture
 WOVEN = 1.15  # median of `FrameFacts.comb`, above which pictures are interlaced
 LEAST_ROWS = 16
@@ -63,9 +63,12 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     means = np.array([float(fact.small.mean()) for fact in facts])
     found = [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, float(means[i]), where, i)]
     readable = (means >= BLACK) & (means <= WHITE)
+    steps = steps_between([fact.small for fact in facts])
+    found += copy_findings(steps, [fact.name for fact in facts], readable, where)
     for i in range(1, len(facts)):
-        if readable[i - 1] and readable[i] and facts[i].small.shape == facts[i - 1].small.shape:
-            found += _of_neighbours(facts[i - 1], facts[i], float(means[i] / means[i - 1]), where, i)
+        if readable[i - 1] and readable[i] and not 1 / JUMP < means[i] / means[i - 1] < JUMP:
+            what = f"brightness changes by {means[i] / means[i - 1]:.2f} times"
+            found.append(finding("exposure-jump", where, what, i))
     found += _of_clip(facts, means, where)
     grey = [fact.small.mean(axis=2) for fact in facts]
     found += cut_findings(grey, [fact.name for fact in facts], readable, where) + halves_finding(grey, where)
@@ -113,16 +116,6 @@ def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding
     if fact.clipped > CLIPPED:
         return [finding("clipped-frame", where, f"{fact.name}: {fact.clipped:.0%} of it is fully white", i)]
     return []
-
-
-def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: str, i: int) -> list[Finding]:
-    """A repeated frame or a brightness jump; `ratio` is the ratio of mean brightness."""
-    found = []
-    if np.abs(fact.small - before.small).mean() < SAME:
-        found.append(finding("duplicated-frame", where, f"{fact.name} repeats {before.name}", i))
-    if not 1 / JUMP < ratio < JUMP:
-        found.append(finding("exposure-jump", where, f"brightness changes by {ratio:.2f} times", i))
-    return found
 
 
 def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding]:

@@ -47,8 +47,11 @@ KINDS: dict[str, Kind] = {
     "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does",
                                 "prepare the video itself, or deinterlace it before exporting pictures"),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
-    "duplicated-frame": Kind("warning", "a held-out copy of a training frame makes the metrics too good, and"
-                             " the motion stops there", LEAVE_OUT),
+    "duplicated-frame": Kind("warning", "the motion stops there, and training leaves out a frame that a held-out"
+                             " frame repeats", LEAVE_OUT),
+    "repeated-frames": Kind("warning", "the motion stops and jumps, and training leaves out every frame that a held-out"
+                            " frame repeats",
+                            "prepare the clip again with the --frames that are named"),
     "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
                           "fit exposures (model.exposure = true), or cut the clip with --frames"),
     "another-scene": Kind("warning", "training fits one scene, and the parts before and after a cut are unrelated",

@@ -19,6 +19,7 @@ from endotsr.clips.sequences.sources import (
 )
 from endotsr.clips.sequences.video_file import VIDEO_ENDINGS, VideoFacts, video_facts, video_pictures
 from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
 
 
 def recognises(path: Path) -> bool:
@@ -33,20 +34,9 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
     stereo = "none" if options.stereo == "auto" else options.stereo
     width, height = halves(across, down, stereo)
-    rate = options.rate or facts.clock.rate
-    times = None if options.rate else facts.clock.times
-    if not facts.clock.stands and not options.rate:
-        raise InputError(
-            f"{path}: {facts.clock.remark}, and the jump is longer than all pictures together; allowed: --source-rate"
-            " HZ (evenly spaced), or a file cut there"
-        )
+    rate, times = _clock(facts, options, path)
     camera = stated_camera(options, width, height, path)
-    notes = _notes(facts, rate, path)
-    if options.orientation is not None and not facts.turn:
-        notes.append(f"{path.name} states no rotation: --orientation {options.orientation} changes nothing")
-    if facts.turn:
-        done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
-        notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth refer to these")
+    notes = _notes(facts, rate, path) + _turn_notes(facts, quarters, options, path)
     poses, note = stated_poses(options, facts.count, rate, times)
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
@@ -70,6 +60,28 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         times=times,
         notes=[*notes, *camera.notes, *note],
     )
+
+
+def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float | None, FloatArray | None]:
+    """Rate and times of the pictures. Raises InputError for a clock that cannot be, without --source-rate."""
+    if options.rate:
+        return options.rate, None
+    if not facts.clock.stands:
+        raise InputError(
+            f"{path}: {facts.clock.remark}, and the jump is longer than all pictures together; allowed: --source-rate"
+            " HZ (evenly spaced), or a file cut there"
+        )
+    return facts.clock.rate, facts.clock.times
+
+
+def _turn_notes(facts: VideoFacts, quarters: int, options: SourceOptions, path: Path) -> list[str]:
+    """The note on a stated rotation, or on --orientation without one."""
+    if facts.turn:
+        done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
+        return [f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth refer to these"]
+    if options.orientation is not None:
+        return [f"{path.name} states no rotation: --orientation {options.orientation} changes nothing"]
+    return []
 
 
 def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int:

@@ -1,0 +1,117 @@
+"""Frames that repeat the one before: exactly, or in a pattern up to the noise of coding.
+
+A recorder that stores 15 pictures a second as 30 writes each twice, a conversion from 24 to 30 repeats every fifth.
+After coding, a copy differs a little, and the pattern tells it from a pause of the motion. In: small pictures of the
+frames. Out: the copies, findings, and a split in which no copy of a held-out frame is trained on.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.splits import LEAST_TRAINING_FRAMES
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import BoolArray, FloatArray, IndexArray
+
+SAME = 0.05  # mean difference in grey levels; sensor noise makes recorded frames differ by 0.5 or more
+LONGEST = 6  # frames of a pattern: 25 frames a second stored as 30
+CYCLES = 4  # patterns that a clip holds at least
+COPY = 0.25  # median step to a copy, of that to another picture; at least 0.8 between places of three real clips
+APART = 0.9  # of the steps to copies that are below this part of the steps to other pictures
+
+
+class Pattern(NamedTuple):
+    """Every `period` frames, those at `places` repeat the frame before."""
+
+    period: int
+    places: tuple[int, ...]  # frame number modulo the period
+    copied: float  # median step to a copy, grey levels
+    moved: float  # median step to another picture
+
+    @property
+    def frames(self) -> str:
+        """The frames without copies, as --frames takes them."""
+        kept = [place for place in range(self.period) if place not in self.places]
+        return ",".join(f"{place or ''}::{self.period}" for place in kept)
+
+
+def steps_between(small: list[np.ndarray]) -> FloatArray:
+    """(n - 1,) mean difference of each picture from the one before, grey levels; NaN between unlike sizes.
+
+    small   pictures (h, w, 3) of the frames
+    """
+    return np.array([np.abs(b - a).mean() if a.shape == b.shape else np.nan for a, b in pairwise(small)])
+
+
+def pattern_of(steps: FloatArray) -> Pattern | None:
+    """The shortest pattern of copies in the steps between frames; None without one."""
+    for period in range(2, LONGEST + 1):
+        if len(steps) + 1 < CYCLES * period or not np.isfinite(steps).all():
+            return None
+        at = [steps[(place - 1) % period :: period] for place in range(period)]  # step i leads to frame i + 1
+        medians = np.array([np.median(values) for values in at])
+        small = medians < COPY * medians.max()
+        if not small.any() or medians.max() < SAME:
+            continue
+        copied, moved = (np.concatenate([v for v, is_small in zip(at, small) if is_small == one]) for one in (1, 0))
+        if np.quantile(copied, APART) < np.quantile(moved, 1 - APART):
+            places = tuple(int(place) for place in np.flatnonzero(small))
+            return Pattern(period, places, float(np.median(copied)), float(np.median(moved)))
+    return None
+
+
+def copied_frames(steps: FloatArray) -> BoolArray:
+    """(n,) whether a frame repeats the one before."""
+    found = np.concatenate([[False], steps < SAME])
+    pattern = pattern_of(steps)
+    if pattern is not None:
+        found |= np.isin(np.arange(len(found)) % pattern.period, pattern.places)
+        found[0] = False
+    return found
+
+
+def copy_findings(steps: FloatArray, names: list[str], readable: BoolArray, where: str) -> list[Finding]:
+    """One warning on a pattern of copies, or one on every frame that repeats the one before exactly.
+
+    steps      from `steps_between`
+    readable   frames that are neither black nor white
+    """
+    pattern = pattern_of(steps)
+    if pattern is not None and readable.all():
+        count = int(copied_frames(steps).sum())
+        every = "every second frame repeats" if pattern.period == 2 else (
+            f"{len(pattern.places)} of every {pattern.period} frames repeat"
+        )  # fmt: skip
+        what = (
+            f"{every} the one before ({count} of {len(names)} frames; they differ by {pattern.copied:.2f} grey levels,"
+            f" other neighbours by {pattern.moved:.2f}); without the copies: --frames {pattern.frames}"
+        )
+        return [finding("repeated-frames", where, what)]
+    frames = [i for i in range(1, len(names)) if steps[i - 1] < SAME and readable[i - 1] and readable[i]]
+    return [finding("duplicated-frame", where, f"{names[i]} repeats {names[i - 1]}", i) for i in frames]
+
+
+def without_twins(
+    train: IndexArray, test: IndexArray, copies: BoolArray, names: list[str], where: object
+) -> tuple[IndexArray, list[str]]:
+    """The training frames of which no held-out frame is a copy or the original, and a note.
+
+    copies   (n,) from `copied_frames`
+
+    Raises:  InputError if fewer than two training frames remain.
+    """
+    picture = np.cumsum(~copies)  # frames with one number show one picture
+    twins = np.isin(picture[train], picture[test])
+    if not twins.any():
+        return train, []
+    kept = train[~twins]
+    if len(kept) < LEAST_TRAINING_FRAMES:
+        raise InputError(
+            f"{where}: all but {len(kept)} training frames are copies of held-out frames; allowed: a clip without the"
+            " copies (`endotsr check` names them), or another split"
+        )
+    left = [names[i] for i in train[twins].tolist()]
+    return kept, [f"{len(left)} frames are not trained on, because held-out frames repeat them: {shortened(left)}"]

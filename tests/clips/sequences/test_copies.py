@@ -1,0 +1,75 @@
+"""Frames that repeat the one before: found up to coding noise, told from pauses, and never held out beside a twin."""
+
+import numpy as np
+import pytest
+from common_folder import written
+
+from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.checks.copies import copied_frames, pattern_of, without_twins
+from endotsr.clips.sequences.read import read_sequence
+from endotsr.config import PAPER
+from endotsr.errors import InputError
+
+
+def steps_of(source: list[int], noise: float, seed: int = 0) -> np.ndarray:
+    """Steps between frames that show these pictures; a copy differs by up to `noise` grey levels."""
+    rng = np.random.default_rng(seed)
+    moved = np.diff(source) != 0
+    return np.where(moved, rng.uniform(0.8, 6.0, len(moved)), noise * rng.uniform(0.2, 1.0, len(moved)))
+
+
+@pytest.mark.parametrize(("source", "frames"), [
+    ([i // 2 for i in range(30)], "::2"),
+    ([(i + 1) // 2 for i in range(30)], "1::2"),
+    ([i // 3 for i in range(30)], "::3"),
+    ([i - i // 3 for i in range(30)], "1::3,2::3"),
+    ([i - i // 5 for i in range(40)], "1::5,2::5,3::5,4::5"),
+    ([i - i // 6 for i in range(40)], "1::6,2::6,3::6,4::6,5::6"),
+])  # fmt: skip
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_a_pattern_of_copies_is_found_with_the_frames_without_them(source, frames, noise):
+    found = pattern_of(steps_of(source, noise))
+    assert found is not None
+    assert found.frames == frames
+    kept = sorted(i for part in found.frames.split(",") for i in range(len(source))[_slice(part)])
+    assert len({source[i] for i in kept}) == len(kept)
+
+
+def _slice(part: str) -> slice:
+    first, _, step = part.split(":")
+    return slice(int(first or 0), None, int(step))
+
+
+def test_steady_motion_pauses_and_single_copies_are_no_pattern():
+    rng = np.random.default_rng(1)
+    assert pattern_of(rng.uniform(0.5, 2.0, 60)) is None
+    pause = rng.uniform(1.0, 2.0, 60)
+    pause[20:40] = 0.06
+    assert pattern_of(pause) is None
+    single = rng.uniform(1.0, 2.0, 60)
+    single[7] = 0.0
+    assert pattern_of(single) is None and np.flatnonzero(copied_frames(single)).tolist() == [8]
+    breathing = 1.2 * np.abs(np.sin(np.arange(60) * np.pi / 8)) + 0.06  # at rest every eighth frame
+    assert pattern_of(breathing) is None
+
+
+def test_a_copy_leaves_the_training_beside_its_held_out_twin():
+    index = np.arange(12)
+    held_out = (index - 1) % 8 == 0
+    copies = index % 2 == 1
+    names = [f"{i:02d}" for i in index]
+    train, notes = without_twins(index[~held_out], index[held_out], copies, names, "clip")
+    assert train.tolist() == [2, 3, 4, 5, 6, 7, 10, 11]  # 1 is a copy of 0, and 9 of 8
+    assert "00, 08" in notes[0]
+    same, nothing = without_twins(index[~held_out], index[held_out], copies & False, names, "clip")
+    assert nothing == [] and same.tolist() == index[~held_out].tolist()
+    with pytest.raises(InputError, match="copies of held-out frames"):
+        without_twins(index[::2], index[1::2], copies, names, "clip")
+
+
+def test_a_reader_leaves_out_the_twin(tmp_path):
+    written(tmp_path / "clip")
+    write_png(tmp_path / "clip/images/000001.png", read_png(tmp_path / "clip/images/000000.png"))
+    found = read_sequence(tmp_path / "clip", PAPER.sequence)
+    assert found.test_index.tolist() == [1] and found.train_index.tolist() == [2, 3, 4]
+    assert any("held-out frames repeat them: 000000" in note for note in found.notes)
