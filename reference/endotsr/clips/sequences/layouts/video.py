@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
@@ -19,7 +20,6 @@ from endotsr.clips.sequences.sources import (
 )
 from endotsr.clips.sequences.video_file import VIDEO_ENDINGS, VideoFacts, video_facts, video_pictures
 from endotsr.errors import InputError
-from endotsr.method.kernels.arrays import FloatArray
 
 
 def recognises(path: Path) -> bool:
@@ -62,7 +62,7 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     )
 
 
-def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float | None, FloatArray | None]:
+def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float | None, NDArray[np.float64] | None]:
     """Rate and times of the pictures. Raises InputError for a clock that cannot be, without --source-rate."""
     if options.rate:
         return options.rate, None
