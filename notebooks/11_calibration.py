@@ -44,7 +44,8 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 #
 # The views are spread over the training frames: positions
 # $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered by the base model. Here a
-# blurred frame stands in for the base render. How close the two are is not examined.
+# blurred frame stands in for the base render. The results of true base renders differ from those below; the last tables
+# of {doc}`/specification/rulings` have them for two clips.
 #
 # **(11.1) Two gradients.** The objective contains
 # $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the
@@ -158,8 +159,9 @@ np.testing.assert_allclose(
 # only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel. Near the
 # instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.) Right:
 # $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these substitutes for
-# a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. Because the
-# result depends on $w$ and on the state of the render, the preset uses the published number and does not calibrate.
+# a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. The base itself,
+# at iteration 3000, gives a result much closer to it ({doc}`/specification/rulings`). Because the result depends on $w$
+# and on the state of the render, the preset uses the published number and does not calibrate.
 
 # %% tags=["hide-input"]
 weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])

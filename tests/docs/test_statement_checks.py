@@ -134,3 +134,11 @@ def test_the_masks_of_the_published_metrics_are_the_nearer_ones():
     assert misses["masks"] < 0.03 < 0.5 < misses["gt_masks"]
     text = mask_folders.PAGE.read_text(encoding="utf-8")
     assert replaced(text, {"folders": mask_folders.table(found)}, mask_folders.PAGE, "masks") == text
+
+
+def test_the_base_calibrates_closer_to_the_published_weight_than_a_blurred_frame():
+    """Chapter 11, whose blurred frames give 1.3 and more at the weight of SSIM of `paper`; its cell asserts that."""
+    cells = read_json(base_checkpoint.RECORD, "python docs/make.py claims.base_checkpoint")["cells"]
+    found = [cell["lambda_lap"] for cell in cells if cell["ssim_weight"] == PAPER.loss.ssim_weight]
+    assert len(found) == 4
+    assert np.abs(np.array(found) - PAPER.loss.lambda_lap).max() < 0.25 * (1.2 - PAPER.loss.lambda_lap)
