@@ -17,9 +17,10 @@ class PosesOptions:
     """Estimate one camera pose per frame, for a clip of a moving scope without a trajectory.
 
     SEQUENCE is a folder from `endotsr prepare` with depth. The poses are added to its sequence.toml, where their origin
-    is stated. Frames that show too little are interpolated, and named. A scope that seems to be still is left as it is.
+    is stated. Frames that show too little are interpolated, and named. A scope that seems to be still is left as it is,
+    and so is a clip whose depth is a plane (`endotsr depth --flat`).
     Motion of the whole tissue, as in breathing, cannot be told from motion of the scope. An interrupted command
-    continues where it was. Exit code 1: the scope seems to be still, nothing written.
+    continues where it was. Exit code 1: nothing written, for one of these two reasons.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
@@ -27,7 +28,7 @@ class PosesOptions:
     replace: bool = False
     """replace existing poses"""
     force: bool = False
-    """estimate poses even if the scope seems to be still"""
+    """estimate poses even if the scope seems to be still or the shape of the depth is assumed"""
     html: Annotated[Path | None, Option("FILE.html", written=True)] = None
     """write a page with the path and the quality of every frame"""
     json: JsonFile = None

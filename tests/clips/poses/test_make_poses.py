@@ -87,12 +87,14 @@ def test_a_still_scope_is_left_as_it_is(tmp_path, capsys):
     assert json.loads((tmp_path / "a.json").read_text())["movement"]["answer"] == "still"
 
 
-def test_with_an_assumed_depth_nothing_is_called_still(tmp_path, capsys):
+def test_with_an_assumed_depth_the_clip_is_left_and_not_called_still(tmp_path, capsys):
     """A plane in place of the depth: a rigid motion leaves more of the flow than it does of a moving scope's."""
     folder = written(tmp_path / "flat", moving_views()[0], depth=False)
     assert main(["depth", str(folder), "--flat"]) == 0
     capsys.readouterr()
-    main(["poses", str(folder), "--json", str(tmp_path / "a.json")])
+    before = (folder / "sequence.toml").read_bytes()
+    assert main(["poses", str(folder), "--json", str(tmp_path / "a.json")]) == 1
+    assert (folder / "sequence.toml").read_bytes() == before
     said, found = capsys.readouterr().out, json.loads((tmp_path / "a.json").read_text())
     assert found["movement"]["left"] > STILL and found["movement"]["answer"] == "unclear"
     assert "cannot be told, as the depth is assumed (shape)" in said and "still, and" not in said

@@ -93,7 +93,7 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
     """Estimate the poses of a folder in the common format and record them.
 
     replace   whether existing poses may be replaced
-    force     whether poses are written even if the scope seems to be still
+    force     whether poses are written even if the scope seems to be still, or the shape of the depth is assumed
 
     Raises:   InputError, leaving the folder unchanged but for the partial result.
     """
@@ -109,7 +109,8 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
         raise InputError(f"{folder}: one frame: there is no motion to estimate")
     matcher, pairs, moves = movement_of(views)
     known = matcher, pairs, with_assumed_depth(moves, clip.depth.assumed)
-    if known[2].answer == "still" and not force:
+    # On a real rigid clip, poses fitted to a plane gave a scene that is worse than a copy of the nearest frame.
+    if (known[2].answer == "still" or clip.depth.assumed == "shape") and not force:
         return PoseReport(False, known[2], None, unit)
     found = _resumed(folder, views, known, watch)
     factor = scene_factor(file.unit)
@@ -199,7 +200,7 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
     lines = [report.movement.sentence]
     found = report.found
     if found is None:
-        return [*lines, f"{folder}: still: left as it is; --force estimates poses all the same"]
+        return [*lines, f"{folder}: {_why_left(report.movement)}: left as it is; --force estimates poses all the same"]
     if report.movement.answer == "unclear":
         lines.append("warning: if the scope is still, these poses are motion of the tissue; then do not use them")
     e, unit = found.estimate, report.unit
@@ -216,6 +217,12 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
         " tissue does in common, as in breathing, no method can tell from motion of the scope: it is in the path"
     )
     return lines
+
+
+def _why_left(moves: Movement) -> str:
+    if moves.assumed and moves.answer != "still":
+        return "the shape of the depth is assumed, and poses are as wrong as the depth that they are fitted to"
+    return "still"
 
 
 def _named(frames: list[int]) -> str:
