@@ -66,7 +66,9 @@ def _speed(settings: Config) -> "Speed":
     """The speed of the last training on this machine with the threads of the settings, else the assumed one."""
     from endotsr.clips.sequences.checks.duration import Speed, assumed_unit
     from endotsr.method.kernels.threads import use_threads
+    from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.training.runs.speed import remembered_unit
 
     threads = use_threads(settings.training.threads)
-    return Speed(remembered_unit(threads) or assumed_unit(threads), threads)
+    perceived = load_lpips_weights() is not None
+    return Speed(remembered_unit(threads) or assumed_unit(threads), threads, perceived)

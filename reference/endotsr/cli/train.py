@@ -15,7 +15,7 @@ from endotsr.cli.parts.options import (
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.result import JsonFile, write_result
-from endotsr.config import PAPER, PRESETS, Config, lengthened
+from endotsr.config import PAPER, PRESETS, Config, lengthened, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
 from endotsr.training.runs.folder import RunFolder, open_run, refuse_existing
@@ -262,7 +262,7 @@ def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
 
 
 def _print_settings(config: Config, schedule_note: str) -> None:
-    changed = differences(config, PRESETS[config.preset], config.preset)
+    changed = differences(config, with_fixed_length(PRESETS[config.preset]), config.preset)
     print(f"settings: preset {config.preset}{', except' if changed else ''}")
     for line in changed:
         print(f"  {line}")

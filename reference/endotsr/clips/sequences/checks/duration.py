@@ -36,9 +36,9 @@ SERIAL = 1.7  # time of an iteration on one thread over that on several; the oth
 READ = 0.25  # units per frame: decoding, checks
 TRACKED, TRACKED_POINTS = 0.8, 7.5e-6  # units per training frame for the initial motion, and for each of its points
 FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
-MEASURED, PERCEIVED = 1.0, 4.0  # units per picture for its metrics, and for LPIPS
+MEASURED, PERCEIVED = 1.2, 2.7  # units per picture for its metrics, and for LPIPS
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
-PAGES = 60.0  # units for the viewer, the report and the renders
+PAGES = 80.0  # units for the viewer, the report and the renders
 EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
 COMPILATION = 30.0  # seconds for the kernels of a training, once per machine
 
@@ -129,10 +129,11 @@ class Frames(NamedTuple):
 
 
 class Speed(NamedTuple):
-    """The speed of a machine; the default is that of an assumed one."""
+    """What a machine contributes to the time of a command; the default is an assumed machine."""
 
     unit: float = SECONDS  # seconds per unit of work with these threads
     threads: int = 2
+    perceived: bool = True  # whether it has LPIPS weights for the evaluation
 
 
 ASSUMED = Speed()

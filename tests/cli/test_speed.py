@@ -1,0 +1,35 @@
+"""The speed of the machine between trainings: kept only if enough was timed, and never in the way."""
+
+import pytest
+
+from endotsr.training.runs import speed
+
+
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(speed, "speed_file", lambda threads: tmp_path / f"speed-{threads}.json")
+    return tmp_path / "speed-2.json"
+
+
+def test_a_speed_is_kept_for_its_number_of_threads(kept):
+    assert speed.remembered_unit(2) is None
+    speed.remember_unit(2, 0.0625, 200, 80_000)
+    assert speed.remembered_unit(2) == 0.0625 and speed.remembered_unit(1) is None
+
+
+@pytest.mark.parametrize("unit, iterations, pixels", [(0.1, 199, 80_000), (0.1, 200, 79_999), (None, 900, 90_000)])
+def test_too_short_or_too_small_a_training_tells_no_speed(kept, unit, iterations, pixels):
+    speed.remember_unit(2, unit, iterations, pixels)
+    assert not kept.exists()
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"seconds_per_unit": "fast"}', '{"seconds_per_unit": 0}', "\0"])
+def test_a_damaged_file_is_no_speed(kept, content):
+    kept.write_text(content)
+    assert speed.remembered_unit(2) is None
+
+
+def test_a_folder_that_cannot_be_written_does_not_stop_a_training(tmp_path, monkeypatch):
+    monkeypatch.setattr(speed, "speed_file", lambda threads: tmp_path / "missing" / "speed.json")
+    speed.remember_unit(2, 0.1, 900, 90_000)
+    assert not list(tmp_path.iterdir())
