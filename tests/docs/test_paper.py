@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pages.claims import paper
 from pages.store.marks import replaced
-from pages.store.published import SEVEN_OTHERS
+from pages.store.published import BY_NAME, SEVEN_OTHERS
 
 from endotsr import __version__
 from endotsr.errors import InputError
@@ -50,6 +50,14 @@ def test_lpips_has_the_verdict_of_both_ranges_of_its_input():
 def test_the_other_systems_have_their_printed_values():
     table = paper.systems()
     assert all(f"| {value:.2f} |" in table for value in SEVEN_OTHERS) and "not at hand" not in table
+
+
+def test_systems_by_name_are_ordered_by_their_mean():
+    rows = [line.strip("| ").split(" | ") for line in paper.by_name().splitlines()[2:]]
+    means = [float(row[3]) for row in rows]
+    assert len(rows) == len(BY_NAME) and means == sorted(means, reverse=True)
+    assert next(row for row in rows if row[0] == "Local-EndoGS")[1:4] == ["38.73", "39.65", "39.19"]
+    assert next(row for row in rows if row[0] == "ColorGS")[1:4] == ["-", "-", "39.85"]
 
 
 def test_a_name_that_is_gone_stops_the_page():

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from pages.book import figures, readme_presets
+from pages.book import figures, readme_gaps, readme_presets
 from pages.full_size import interpolation, levers
 from pages.store.marks import replaced
 
@@ -85,3 +85,17 @@ def test_differences_are_paired_by_seed():
 def test_the_table_of_interpolation_is_what_its_record_says():
     found = json.loads((RESULTS / "interpolation.json").read_text(encoding="utf-8"))
     assert interpolation.table(found) in interpolation.PAGE.read_text(encoding="utf-8")
+
+
+def test_the_readme_has_the_table_of_the_gaps():
+    text = readme_gaps.PAGE.read_text(encoding="utf-8")
+    assert replaced(text, readme_gaps.parts(), readme_gaps.PAGE, "gaps") == text
+
+
+def test_the_readme_says_of_the_gaps_what_their_table_says():
+    """Below flow for one frame, within the interval for 4 and 8, above it for 16; LPIPS of flow is better in each."""
+    rows = {gap: readme_gaps.row(gap) for gap in readme_gaps.GAPS}
+    difference = {gap: [float(part) for part in cells[6].split(" ± ")] for gap, cells in rows.items()}
+    assert difference[1][0] < 0 and difference[16][0] > difference[16][1]
+    assert all(abs(difference[gap][0]) < difference[gap][1] for gap in (4, 8))
+    assert all(float(cells[7]) < float(cells[8]) for cells in rows.values())

@@ -34,12 +34,14 @@ MIB = 1 / 2**20
 PULLING, SHARP = "pulling_paper_seed0.json", "pulling_sharp_seed?.json"
 PAPER = "pulling_paper_seed?.json"
 ALONE = "clips.endonerf_pulling.every eighth frame.baselines"
+CUTTING = "clips.endonerf_cutting.every eighth frame.baselines"
 FIGURES: dict[str, Figure | Setting | Formula] = {
-    "flow_tissue.tissue": Figure("interpolation.json", f"{ALONE}.flow_interpolation_tissue.psnr_tissue", "{:.2f}"),
     "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
     "blend.tissue": Figure(PULLING, "baselines.two_neighbours.mean.psnr_tissue", "{:.2f}"),
     "sharp.tissue": Figure(SHARP, "held_out.mean.psnr_tissue", "{:.2f}"),
     "paper.tissue": Figure(PAPER, "held_out.mean.psnr_tissue", "{:.2f}"),
+    "blend.full.pulling": Figure("interpolation.json", f"{ALONE}.two_neighbours.psnr_full", "{:.2f}"),
+    "blend.full.cutting": Figure("interpolation.json", f"{CUTTING}.two_neighbours.psnr_full", "{:.2f}"),
     "paper.below_blend": Formula(sub, ("blend.tissue", "paper.tissue"), "{:.1f}"),
     "flow.frame1": Figure(PULLING, "baselines.flow_interpolation.per_frame.0.psnr_tissue", "{:.2f}"),
     "workload.focal": Setting("endotsr.training.scene.workload:FOCAL"),

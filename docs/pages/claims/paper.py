@@ -1,4 +1,4 @@
-"""Write the generated parts of docs/paper.md: the method sentence by sentence, and the compared systems.
+"""Write the generated parts of docs/paper.md: the method sentence by sentence, and the systems.
 
     python docs/make.py claims.paper
 
@@ -10,6 +10,7 @@ error.
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
+import math
 import re
 import sys
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple
 
 from pages.claims.verdicts import CLIPS, HEADS, student
 from pages.store.marks import read_json, write_marked
-from pages.store.published import PUBLISHED, SEVEN_OTHERS, SURGICALGS
+from pages.store.published import BY_NAME, PUBLISHED, SEVEN_OTHERS, SURGICALGS
 
 DOCS = Path(__file__).parents[2]
 sys.path.append(str(DOCS / "_extensions"))
@@ -122,7 +123,7 @@ SECTIONS: dict[str, tuple[Sentence, ...]] = {
 
 def parts() -> dict[str, str]:
     """Every generated part of the page by name."""
-    return {"method": method(), "systems": systems()}
+    return {"method": method(), "systems": systems(), "by_name": by_name()}
 
 
 def method() -> str:
@@ -187,6 +188,16 @@ def verdict_on(clip: str, start: str) -> str:
     table = CLAIMS.read_text(encoding="utf-8").partition(f"<!-- {mark}:start -->")[2].partition("<!--")[0]
     rows = [line.strip("| ").split(" | ") for line in table.splitlines()]
     return next((row[VERDICT] for row in rows if row[0].startswith(start)), "")
+
+
+def by_name() -> str:
+    """Printed values of systems by name, the highest mean first; what a paper does not give is a dash."""
+    cell = lambda value: "-" if math.isnan(value) else f"{value:.2f}"
+    printed = lambda row: cell(mean(row)) if math.isnan(row.mean) else str(row.mean)
+    mean = lambda row: (row.pulling + row.cutting) / 2 if math.isnan(row.mean) else row.mean
+    rows = sorted(BY_NAME, key=lambda row: -mean(row))
+    heads = ("System", "Pulling, dB", "Cutting, dB", "Mean, dB", "Printed in (arXiv)")
+    return markdown(heads, [[r.system, cell(r.pulling), cell(r.cutting), printed(r), r.source] for r in rows])
 
 
 def systems() -> str:
