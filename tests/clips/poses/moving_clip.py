@@ -15,15 +15,15 @@ SWING = 10.0  # mm
 
 
 @cache
-def moving_sequence(*effects):
+def moving_sequence(*effects, seed=0):
     """The sequence; effects beside the moving camera and noise."""
-    settings = with_effects(SIZE, "camera_motion", "noise", *effects)
+    settings = with_effects(with_settings(SIZE, seed=seed), "camera_motion", "noise", *effects)
     return simulate(with_settings(settings, camera_motion={"amplitude": SWING})).sequence
 
 
-def moving_views(*effects):
+def moving_views(*effects, seed=0):
     """The views, and the true poses."""
-    found = moving_sequence(*effects)
+    found = moving_sequence(*effects, seed=seed)
     poses = [CameraPose(camera.rotation, camera.translation) for camera in found.cameras]
     return Views(found.images, found.masks, found.depth, found.cameras[0]), poses
 

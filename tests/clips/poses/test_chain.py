@@ -7,6 +7,7 @@ from moving_clip import centres, moving_views, path_error
 from endotsr.clips.poses.chain import LONGEST_GAP, chained
 from endotsr.clips.poses.estimate import estimated
 from endotsr.clips.poses.matches import matcher_of
+from endotsr.clips.poses.movement import pairs_that_move
 from endotsr.clips.poses.views import Views
 from endotsr.errors import InputError
 
@@ -60,6 +61,18 @@ def test_what_follows_a_cut_has_no_pose(cut):
             chained(matcher)
     else:
         assert chained(matcher).without == list(range(cut, VIEWS.count))
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_another_scene_after_a_cut_is_not_registered_to_the_first(seed):
+    """Flow between the two returns to a fifth of the points by chance, and a pose can be fitted to them."""
+    other = moving_views(seed=seed)[0]
+    planes = [np.concatenate([one, two[:4]]) for one, two in zip(VIEWS[:3], other[:3], strict=True)]
+    matcher = matcher_of(Views(*planes, VIEWS.camera))
+    assert chained(matcher).without == [14, 15, 16, 17]
+    assert matcher.by_flow(13, 14).count > 60 and not matcher.by_flow(13, 14).related
+    assert matcher.by_flow(12, 13).support > 0.7 and matcher.by_flow(0, 7).related
+    assert all({pair.source, pair.target} <= set(range(14)) for pair in pairs_that_move(matcher) if pair.source < 14)
 
 
 def test_identical_frames_have_one_pose():

@@ -1,6 +1,8 @@
 """`endotsr poses`: what it writes, what it refuses, and that an interrupted call continues."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,7 @@ import endotsr
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
 from endotsr.clips.poses.movement import STILL
+from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences import make_poses
 from endotsr.clips.sequences.make_poses import PARTIAL, PoseProgress, enter_poses
 from endotsr.clips.sequences.sequence_file import CameraEntry, DepthEntry, SequenceFile, write_sequence_file
@@ -133,3 +136,66 @@ def test_an_interrupted_call_continues_with_the_same_result(clip, monkeypatch, a
 def test_a_damaged_partial_result_is_not_used(clip, text):
     (clip / PARTIAL).write_text(text)
     assert enter_poses(clip).written
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from endotsr.clips.sequences import make_poses
+make_poses.KEEP_EVERY, steps = 2, [0]
+
+def step():
+    steps[0] += 1
+    if steps[0] == int(sys.argv[2]):
+        os.kill(os.getpid(), getattr(signal, "SIGKILL", signal.SIGTERM))
+
+make_poses.enter_poses(Path(sys.argv[1]), watch=make_poses.PoseProgress(step=step))
+"""
+
+
+@pytest.mark.parametrize("after", [6, 15], ids=["in the chain", "in the adjustment"])
+def test_a_killed_call_leaves_the_clip_and_the_next_one_continues(clip, after):
+    before = (clip / "sequence.toml").read_bytes()
+    done = subprocess.run([sys.executable, "-c", KILLED, str(clip), str(after)], capture_output=True, check=False)
+    assert done.returncode != 0 and (clip / "sequence.toml").read_bytes() == before
+    begun = len(json.loads((clip / PARTIAL).read_text("utf-8"))["poses"])
+    assert begun == min(after - after % 2, len(TRUE))
+    found = enter_poses(clip).found
+    assert not (clip / PARTIAL).exists()
+    whole = enter_poses(clip, replace=True).found
+    for one, other in zip(found.cameras, whole.cameras, strict=True):
+        np.testing.assert_array_equal(one.translation, other.translation)
+
+
+def test_a_cut_is_named_as_held_frames_or_refused(tmp_path, capsys):
+    views, other = moving_views()[0], moving_views(seed=5)[0]
+    planes = [np.concatenate([one, two[:5]]) for one, two in zip(views[:3], other[:3], strict=True)]
+    folder = written(tmp_path / "short", Views(*planes, views.camera))
+    assert main(["poses", str(folder)]) == 0
+    assert "after the last pose, which is held: 5 frames 14, 15, 16" in capsys.readouterr().out
+    planes = [np.concatenate([one, two[:10]]) for one, two in zip(views[:3], other[:3], strict=True)]
+    folder = written(tmp_path / "long", Views(*planes, views.camera))
+    assert main(["poses", str(folder)]) == 2
+    assert "frames 14 to 23 cannot be registered: 10 in a row" in capsys.readouterr().err
+
+
+def test_equal_frames_are_still_and_without_tissue_or_depth_it_is_refused(tmp_path, capsys):
+    views = moving_views()[0]
+    frozen = views._replace(images=views.images[:1].repeat(14, 0), depth=views.depth[:1].repeat(14, 0))
+    assert main(["poses", str(written(tmp_path / "frozen", frozen))]) == 1
+    assert "the picture moves by 0.0 pixels" in capsys.readouterr().out
+    for name, changed in {
+        "dark": views._replace(images=np.zeros_like(views.images)),
+        "flat": views._replace(depth=np.zeros_like(views.depth)),
+    }.items():
+        assert main(["poses", str(written(tmp_path / name, changed))]) == 2
+        assert "no frame has" in capsys.readouterr().err
+
+
+def test_one_frame_is_refused_and_two_are_enough(tmp_path, capsys):
+    views = moving_views()[0]
+    for frames, code in ((1, 2), (2, 0)):
+        few = Views(*(plane[:: 13 // frames][:frames] for plane in views[:3]), views.camera)
+        folder = written(tmp_path / str(frames), few)
+        assert main(["poses", str(folder), "--force"]) == code, capsys.readouterr()
+    assert "[poses]" in (tmp_path / "2" / "sequence.toml").read_text("utf-8")

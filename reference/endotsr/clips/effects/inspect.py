@@ -12,7 +12,8 @@ from endotsr.clips.effects.motion import motion_verdict
 from endotsr.clips.effects.noise import Noise, estimate_noise
 from endotsr.clips.effects.periodic import Line
 from endotsr.clips.effects.photometric import photometric_verdict
-from endotsr.clips.effects.seen import camera_verdict, depth_verdict, highlight_verdict, occluder_verdict
+from endotsr.clips.effects.scope import camera_verdict
+from endotsr.clips.effects.seen import depth_verdict, highlight_verdict, occluder_verdict
 from endotsr.clips.effects.topology import topology_verdict
 from endotsr.clips.effects.tracks import make_tracks, without_frames
 from endotsr.clips.effects.verdict import EffectVerdict, verdict_record

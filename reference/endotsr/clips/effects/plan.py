@@ -181,7 +181,9 @@ def _remarks(inspection: Inspection) -> tuple[str, ...]:
         for name in ("topology change", "smoke", "blur")
         if verdicts[name].present
     ]
-    motion = verdicts["motion"]
+    camera, motion = verdicts["camera motion"], verdicts["motion"]
+    if camera.present and camera.false_positive_rate is None:
+        said.append("The camera moves, but its poses do not: a training takes its motion for motion of the tissue.")
     if motion.present:
         waves = motion.details["half_waves"]
         said.append(f"{waves} half waves over time hold 99 % of the motion; a time base resolves about one.")

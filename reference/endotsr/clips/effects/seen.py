@@ -1,4 +1,4 @@
-"""Tests that need no motion estimate: occluders, camera motion, highlights, and the quality of the prior depth."""
+"""Tests that need no motion estimate: occluders, highlights, and the quality of the prior depth."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,11 +8,9 @@ from endotsr.clips.effects.noise import NORMAL_MAD
 from endotsr.clips.effects.verdict import Curve, EffectVerdict, Map, sentence
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray
-from endotsr.method.splatting.camera import camera_centre
 
 SATURATED, COLOURLESS = 0.98, 0.1  # a highlight: largest channel above, (max - min) / max below
 LEAST_HIGHLIGHT = 1e-3  # fraction of the tissue
-LEAST_POSE_CHANGE = 1e-9  # scene units, and elements of the rotation
 LEAST_PIXELS = 10  # with depth, in a usable frame
 HOLES = 0.01  # fraction of the tissue
 RELATIVE = 1e-3  # of the median depth: threshold for steps and flicker
@@ -37,24 +35,6 @@ def occluder_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     details = {"never_seen": float(always.mean())}
     return EffectVerdict("occluders", excluded > 0, kind, excluded, 0.0, "fraction of the pixels",
                          "excluded pixels", 0.0, reason, details, curve, picture)  # fmt: skip
-
-
-def camera_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
-    """Whether the poses of the training frames differ; a fact, not an estimate."""
-    centres = np.array([camera_centre(camera) for camera in clip.cameras])
-    turns = np.array([camera.rotation for camera in clip.cameras])
-    shift = float(np.abs(centres - centres[0]).max())
-    spread = max(shift, float(np.abs(turns - turns[0]).max()))
-    moves = not sequence.static_camera and spread > LEAST_POSE_CHANGE
-    path = np.linalg.norm(centres - centres[0], axis=1)
-    reason = (
-        f"The camera moves by up to {path.max():.3g} {sequence.unit}." if moves else "All frames have the same pose."
-    )
-    details = {"largest_shift": float(path.max())}
-    curve = Curve(f"distance from the first pose, {sequence.unit}", "time", clip.times, {"camera": path})
-    return EffectVerdict("camera motion", moves, "moving" if moves else "none", spread, LEAST_POSE_CHANGE,
-                         sequence.unit, "largest difference of two poses", 0.0, reason, details,
-                         curve if moves else None)  # fmt: skip
 
 
 def highlight_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:

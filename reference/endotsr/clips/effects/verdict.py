@@ -36,7 +36,7 @@ class EffectVerdict(NamedTuple):
     threshold: float  # of the statistic; the effect is present at or above it
     unit: str  # of both
     test: str  # description of the statistic
-    false_positive_rate: float  # designed rate; 0 for a fact
+    false_positive_rate: float | None  # designed rate; 0 for a fact, None where the threshold has no rate
     reason: str  # one sentence
     details: Mapping[str, Any] = MappingProxyType({})  # JSON-able numbers, by name
     curve: Curve | None = None

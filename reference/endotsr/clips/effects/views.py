@@ -28,7 +28,7 @@ def view_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     test = "change of colour by a typical coefficient of degree 1 between frames"
     if sequence.static_camera:
         return EffectVerdict("view change", False, "degree 0", 0.0, LEAST_CHANGE, "display units", test, 0.0,
-                             "The camera is fixed: every point keeps one view direction.",
+                             "All frames have the same pose: every point keeps one view direction.",
                              {"degree": 0, "changes": [0.0] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
     directions = view_directions(clip)
     if not len(directions):

@@ -1,8 +1,9 @@
 """First poses of a clip: every frame is registered to a keyframe by flow and resection.
 
 In: a `Matcher`. Out: `Chain`, with None for frames that show too little. A frame is tried against the keyframe, then
-against the last frame with a pose, by flow; after a gap also by features. A keyframe is replaced when too few of its
-usable points are found or agree.
+against the last frame with a pose, by flow; after a gap also by features. Too few matches, or matches that do not look
+alike, are not used, so nothing is registered across a cut. A keyframe is replaced when too few of its usable points
+are found or agree.
 """
 
 from collections.abc import Callable
@@ -111,7 +112,7 @@ def _registered(matcher: Matcher, chain: Chain, j: int) -> tuple[int, Matches, R
     known, key, last = [pose or IDENTITY for pose in chain.poses], chain.key, chain.last
     for source in dict.fromkeys((key, last)):
         matches = matcher.by_flow(source, j)
-        done = resection(matches, matcher.camera, between(known, source, last))
+        done = resection(matches, matcher.camera, between(known, source, last)) if matches.related else None
         if done is None:
             continue
         enough = done.agreeing >= USE_AGREEING and matches.count >= USE_FOUND * matches.usable

@@ -114,7 +114,7 @@ def _own_motion(matcher: Matcher, poses: list[CameraPose | None]) -> float:
         if poses[i] is None or poses[i + gap] is None:
             continue
         matches = matcher.by_flow(i, i + gap)
-        if matches.count >= LEAST_MATCHES:
+        if matches.count >= LEAST_MATCHES and matches.related:
             left = left_over(between(poses, i, i + gap), matches, matcher.camera)  # type: ignore[arg-type]
             found.append(np.median(left * matches.points[2]) / focal)
     return float(np.median(found)) if found else float("nan")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import dense_flow, sample_bilinear
+from endotsr.clips.opencv import dense_flow, gaussian_blur, sample_bilinear
 from endotsr.clips.opencv.geometry import Features, equalised, features_of, grey_of, matched_features
 from endotsr.clips.poses.views import ViewFrame, Views, known_depth, usable_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
@@ -17,6 +17,8 @@ from endotsr.method.splatting.camera import Camera, backproject
 
 POINTS, LEAST_STEP = 600, 4  # number of grid points of a picture, and their least distance in pixels
 RETURN, RETURN_FRACTION = 1.0, 0.03  # accepted error of flow there and back: pixels, and fraction of the flow
+SMOOTH = 2.0  # pixels: standard deviation of the blur before pictures are compared
+LEAST_SUPPORT = 0.35  # neighbouring frames have over 0.8, pictures of two simulated scenes under 0.25
 
 
 class Matches(NamedTuple):
@@ -26,6 +28,17 @@ class Matches(NamedTuple):
     source: FloatArray  # (2, M) pixels, the centre of the first pixel is (0.5, 0.5)
     target: FloatArray  # (2, M) pixels
     usable: int  # grid points of the source frame that could have matched
+    likeness: float = 1.0  # correlation of the smoothed luminance of the points between both frames
+
+    @property
+    def support(self) -> float:
+        """Fraction of the usable points that were found, times their likeness."""
+        return self.count / max(self.usable, 1) * self.likeness
+
+    @property
+    def related(self) -> bool:
+        """Whether both frames show one scene; between unrelated pictures, flow returns to some points by chance."""
+        return self.support >= LEAST_SUPPORT
 
     @property
     def count(self) -> int:
@@ -43,6 +56,7 @@ class _Prepared(NamedTuple):
 
     plain: NDArray[np.uint8]  # (H, W) luminance
     grey: NDArray[np.uint8]  # (H, W) the same, equalised
+    smooth: NDArray[np.float32]  # (H, W) that, blurred: without most of the noise
     usable: BoolArray  # (H, W)
     depth: NDArray[np.float32]  # (H, W) 0 = none
 
@@ -76,7 +90,8 @@ class Matcher:
         kept = (error < RETURN + RETURN_FRACTION * np.hypot(*flow)) & _marked(other.usable, x, y)
         points = backproject(self.camera, column[kept], row[kept], depth[kept])
         source_place, target_place = np.stack([column, row])[:, kept] + 0.5, np.stack([x, y])[:, kept] + 0.5
-        return Matches(points, source_place, target_place, column.size)
+        likeness = _correlation(one.smooth[row[kept], column[kept]], sample_bilinear(other.smooth, x[kept], y[kept]))
+        return Matches(points, source_place, target_place, column.size, likeness)
 
     def by_features(self, source: int, target: int) -> Matches:
         """Features of the source frame in the target frame; for frames that are too far apart for flow."""
@@ -100,7 +115,9 @@ class Matcher:
             frame = self._read(number)
             plain = grey_of(frame.image)
             usable = usable_pixels(frame.image, frame.tissue)
-            self._frames[number] = _Prepared(plain, equalised(plain), usable, known_depth(frame.depth))
+            grey = equalised(plain)
+            smooth = gaussian_blur(grey.astype(np.float32), SMOOTH)
+            self._frames[number] = _Prepared(plain, grey, smooth, usable, known_depth(frame.depth))
         return self._frames[number]
 
     def _features_of(self, number: int) -> Features:
@@ -108,6 +125,13 @@ class Matcher:
             one = self._frame(number)
             self._features[number] = features_of(one.plain, one.usable)
         return self._features[number]
+
+
+def _correlation(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """Of two lists of values; 0 where one of them is constant or shorter than three."""
+    if len(one) < 3 or not np.ptp(one) > 0 or not np.ptp(other) > 0:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])
 
 
 def matcher_of(views: Views) -> Matcher:

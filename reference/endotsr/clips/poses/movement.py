@@ -91,7 +91,7 @@ def _best_gap(matcher: Matcher, i: int, gaps: list[int], at: int, last: int) -> 
     chosen = at
     for k in range(at, last + 1):  # wider, while the picture moves too little
         matches = matcher.by_flow(i, i + gaps[k])
-        if matches.count < LEAST_MATCHES:
+        if not _enough(matches):
             break
         kept, chosen = matches, k
         if np.median(matches.flow) >= WANTED / 2:
@@ -99,9 +99,13 @@ def _best_gap(matcher: Matcher, i: int, gaps: list[int], at: int, last: int) -> 
     while kept is None and at > 0:  # closer, while too little matches
         at -= 1
         matches = matcher.by_flow(i, i + gaps[at])
-        if matches.count >= LEAST_MATCHES:
+        if _enough(matches):
             kept, chosen = matches, at
     return kept, chosen
+
+
+def _enough(matches: Matches) -> bool:
+    return matches.count >= LEAST_MATCHES and matches.related
 
 
 def _pair(matcher: Matcher, source: int, target: int, matches: Matches) -> FramePair:
@@ -141,7 +145,7 @@ def drift(matcher: Matcher) -> Movement:
     place, places = np.zeros(2), [np.zeros(2)]
     for k in range(matcher.count - 1):
         matches = matcher.by_flow(k, k + 1)
-        if matches.count >= LEAST_MATCHES:
+        if _enough(matches):
             place = place + np.median(matches.target - matches.source, axis=1)
         places.append(place)
     far = float(np.linalg.norm(np.ptp(places, axis=0))) / matcher.camera.width

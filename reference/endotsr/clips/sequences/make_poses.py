@@ -209,7 +209,7 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
         f" {e.still:.2f} that the picture moves"
     )
     if found.interpolated:
-        lines.append(f"interpolated, the pose is interpolated: {_named(found.interpolated)}")
+        lines.append(f"without matches, the pose is interpolated: {_named(found.interpolated)}")
     if found.held:
         lines.append(f"before the first or after the last pose, which is held: {_named(found.held)}")
     lines.append(

@@ -83,7 +83,7 @@ def _verdicts(inspection: Inspection) -> str:
         [
             parts.text(v.effect), f'<b class="{"good" if v.kind in SMALL else "bad"}">{parts.text(v.kind)}</b>',
             parts.cell(float(v.statistic)), parts.cell(float(v.threshold)), parts.text(v.unit),
-            "exact" if v.false_positive_rate == 0 else f"{v.false_positive_rate:.0%}", f"{v.confidence:.2f}",
+            _false_positives(v), f"{v.confidence:.2f}",
         ]
         for v in inspection.verdicts.values()
     ]  # fmt: skip
@@ -97,6 +97,11 @@ def _verdicts(inspection: Inspection) -> str:
         "0.5 at the threshold, 1 far from it or for an exact answer."
     )
     return parts.section("Findings", tables.html_table(columns, rows), reasons, note=note)
+
+
+def _false_positives(verdict: EffectVerdict) -> str:
+    rate = verdict.false_positive_rate
+    return "not known" if rate is None else "exact" if rate == 0 else f"{rate:.0%}"
 
 
 def _plan(plan: Plan) -> str:
