@@ -177,7 +177,10 @@ def test_stopped_process_resumes_bitwise_equal(how, finished_run, tmp_path):
     assert not [p.name for p in out.iterdir() if p.name.startswith(".")]
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+HANG_UP = getattr(signal, "SIGHUP", signal.SIGTERM)  # of a closed terminal
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, HANG_UP])
 @pytest.mark.parametrize("then", ["goes on", "fails"])
 def test_a_signal_that_a_callback_swallows_still_stops_the_run(then, how, tmp_path, capsys, monkeypatch):
     """Python drops an exception within a callback of compiled code; the run must not go on, nor end as a failure."""

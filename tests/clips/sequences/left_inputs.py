@@ -8,9 +8,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import raw_sources
-from input_kinds import Row, close, folder_of, prepare, video
-from made_videos import picture, pictures, write
+from input_kinds import Row, close, depth_is_true, folder_of, prepare, video
+from made_videos import HEIGHT, WIDTH, picture, pictures, write
 from raw_sources import scene_picture
+from test_stated_depth import recording as with_depth
+from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
 from endotsr.clips.sequences.sequence_file import read_sequence_file
@@ -221,4 +223,21 @@ CLOCK_ROWS = [
     Row("video, a pause in a long clip", video("a.mkv", pictures(60), milliseconds=[40 * i + 1500 * (i > 20)
         for i in range(60)]), "told", "its clock jumps by 1.54 s", close(pictures(60))),
 ]  # fmt: skip
-LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS, *COPY_ROWS, *CLOCK_ROWS]
+
+
+def points_of_scared(folder: Path) -> list[str]:
+    """Depth as SCARED stores it: x y z in float32, NaN without depth."""
+    import cv2
+
+    words = with_depth(folder, true_depth)
+    v, u = np.mgrid[0:HEIGHT, 0:WIDTH]
+    for i, file in enumerate(sorted((folder / "depth").iterdir())):
+        file.unlink()
+        z = true_depth(i)
+        points = np.stack([(u - 63.5) / 100 * z, (v - 47.5) / 100 * z, z], axis=2).astype(np.float32)
+        cv2.imwrite(str(file.with_suffix(".tiff")), points[..., ::-1])
+    return words
+
+
+DEPTH_ROWS = [Row("depth, points x y z of SCARED", points_of_scared, "right", "", depth_is_true)]
+LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS, *COPY_ROWS, *CLOCK_ROWS, *DEPTH_ROWS]

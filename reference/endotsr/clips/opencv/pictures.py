@@ -37,6 +37,8 @@ STARTS = {  # extension -> file type, and its first bytes
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
 GAMMA = 1 / 2.2  # of sRGB, as stated in a PNG
 ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
+TIFF_WIDTH, TIFF_HEIGHT, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 277, 339  # tags
+FLOATING_POINT = 3  # of TIFF_FORMAT
 GREY = ("1", "L")  # modes of Pillow
 NOT_DECODED = ("LA", "La", "PA", "LAB")  # OpenCV drops their transparency or reads them as RGB
 
@@ -57,6 +59,32 @@ def read_picture(path: Path) -> Array:
     pixels = None if kind == "EXR" else _by_pillow(data, kind, path)
     if pixels is not None:
         return pixels
+    return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
+
+
+def read_points(path: Path) -> Array | None:
+    """The three channels (H, W, 3) of a TIFF of floating-point numbers, such as x, y and z; None for another file.
+
+    Raises:  InputError as `read_picture`.
+    """
+    if Path(path).suffix.lower() not in TIFF_ENDINGS:
+        return None
+    data = read_bytes(Path(path), LARGEST_FILE)
+    kind = _check_start_and_end(data, Path(path).suffix.lower(), path)
+    _plugin(kind)
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    try:
+        tags = ImageFileDirectory_v2(data[:8])
+        stream = io.BytesIO(data)
+        stream.seek(tags.next)
+        tags.load(stream)
+        width, height = int(tags.get(TIFF_WIDTH, 0)), int(tags.get(TIFF_HEIGHT, 0))
+        if tags.get(TIFF_CHANNELS, 1) != 3 or set(tags.get(TIFF_FORMAT, ())) != {FLOATING_POINT}:
+            return None
+    except Exception:  # Pillow passes on any error of its parser; the reader of pictures reports the fault
+        return None
+    _check_size((width, height), path)
     return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
 
 

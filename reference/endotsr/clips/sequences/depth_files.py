@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, write_png
-from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
+from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture, read_points
 from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.masks import sparse_step
 from endotsr.config import SequenceConfig
@@ -26,13 +26,16 @@ ALLOWED = "allowed: an .npy file of numbers"
 
 
 def read_plane(path: Path) -> NDArray:
-    """The values (H, W) of a file as stored. Axes of length 1 are dropped.
+    """The values (H, W) of a file as stored; z of a TIFF of points x y z. Axes of length 1 are dropped.
 
     Raises:  InputError naming the file and the reason.
     """
     ending = Path(path).suffix.lower()
     if ending not in DEPTH_ENDINGS:
         raise InputError(f"{path}: no depth by its name; allowed: {', '.join(DEPTH_ENDINGS)}")
+    points = read_points(path)
+    if points is not None:
+        return np.ascontiguousarray(points[:, :, 2])
     array = read_npy(path) if ending == ".npy" else read_pfm(path) if ending == ".pfm" else read_picture(path)
     plane = grey_plane(array, path) if ending not in (".npy", ".pfm") else np.squeeze(array)
     if plane.ndim != 2:

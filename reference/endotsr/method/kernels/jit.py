@@ -22,11 +22,15 @@ import re
 import shutil
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+
+# Numba's parallel loops, which no kernel uses, need semaphores; without /dev/shm it warns when it prepares them.
+warnings.filterwarnings("ignore", message="Could not obtain multiprocessing lock", module=r"numba\.")
 
 F = TypeVar("F", bound=Callable)
 

@@ -34,12 +34,41 @@ _working = threading.Event()  # set in a worker while it executes a run
 
 def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Generator[Outcome | None, None, None]:
     """Execute the runs, `workers` at a time with `threads` threads each; KeyboardInterrupt stops all of them."""
+    why = no_processes()
+    if why:
+        print(f"one run at a time in this process: {why}", flush=True)
+        yield from _here(jobs, workers * threads)
+        return
     waiting, losses = deque(jobs), Counter[str]()
     stop = Path(jobs[0].folder).parents[1] / STOP
     stop.unlink(missing_ok=True)
     while waiting:
         with _pool(workers, stop) as pool:
             yield from _until_broken(pool, waiting, losses, workers, threads)
+
+
+def no_processes() -> str:
+    """Why this system cannot run a pool of processes, which needs semaphores; "" if it can."""
+    try:
+        multiprocessing.get_context("spawn").Lock()
+    except (OSError, ImportError) as error:
+        shared = "/dev/shm, " if os.name == "posix" else ""
+        return f"semaphores cannot be created ({shared}{getattr(error, 'strerror', None) or error})"
+    return ""
+
+
+def _here(jobs: list[Job], threads: int) -> Generator[Outcome | None, None, None]:
+    """Execute the runs in this process, one after the other. Raises KeyboardInterrupt once a signal has arrived."""
+    from endotsr.training.runs.stopping import signals_stop, stop_asked
+
+    for job in jobs:
+        yield None
+        with signals_stop():
+            outcome = execute(job, threads)
+            stopped = stop_asked()
+        yield outcome
+        if stopped:
+            raise KeyboardInterrupt
 
 
 def _until_broken(

@@ -19,7 +19,6 @@ from endotsr.studies.sweeps.jobs import Job
 
 MARGIN = 1.4  # factor on the memory estimate; measured peaks: 1.14 (`paper`) and 1.10 (`sharp`) times the estimate
 USABLE = 0.9  # fraction of the free memory
-CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
 class Size(NamedTuple):
@@ -116,14 +115,4 @@ def capacity(
 
 def free_memory() -> float | None:
     """Free memory in bytes, at most the limit of a container; None if the system does not report it."""
-    found = [value for value in (memory_available(), _container_limit(), memory_of_machine()) if value is not None]
-    return min(found, default=None)
-
-
-def _container_limit() -> float | None:
-    for name in CGROUP_LIMITS:
-        try:
-            return float(Path(name).read_text(encoding="ascii"))
-        except (OSError, ValueError):  # no such file, or the word `max`
-            continue
-    return None
+    return min((value for value in (memory_available(), memory_of_machine()) if value is not None), default=None)

@@ -13,7 +13,7 @@ import signal
 import threading
 from collections.abc import Iterator
 
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)]
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 PATIENCE = 0.7  # seconds after the first signal within which work inside `finishing` must end
 
 _asked = threading.Event()
@@ -24,7 +24,8 @@ _finishing: list[threading.Timer] = []  # the timers of the open `finishing` blo
 def signals_stop() -> Iterator[None]:
     """In the block, SIGTERM (a batch system, a shutdown) acts like Ctrl-C: KeyboardInterrupt in the main thread.
 
-    So does SIGBREAK, which Windows sends for Ctrl-Break and for a closed console instead of SIGTERM.
+    So does SIGHUP of a closed terminal, unless `nohup` made the command ignore it, and SIGBREAK, which Windows
+    sends for Ctrl-Break and for a closed console.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -40,7 +41,8 @@ def signals_stop() -> Iterator[None]:
         raise KeyboardInterrupt
 
     _asked.clear()
-    before = {number: signal.signal(number, stop) for number in SIGNALS}
+    heard = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN or number == signal.SIGINT]
+    before = {number: signal.signal(number, stop) for number in heard}
     try:
         yield
     finally:
