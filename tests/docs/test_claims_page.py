@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pages.claims import page as claims
-from pages.claims.answer import answer
+from pages.claims.answer import against, answer, baselines
 from pages.claims.estimates import averaged, contrast, spread
 from pages.claims.parts import planned_hours, protocols, tables
 from pages.claims.power import least_size, pairs_needed, power
@@ -336,6 +336,14 @@ def test_the_answer_says_what_the_records_say():
     assert f"{motion.mean():+.2f} ± {(high - low) / 2:.2f} dB where only the tissue moves" in text
     bare = answer(claims.RESULTS, {"pulling": record, "cutting": None}, [], "")
     assert "EndoNeRF cutting is not finished" in bare and "right camera" not in bare and "1 choices" in bare
+
+
+def test_the_answer_states_no_order_within_the_interval_of_the_level():
+    assert [against(39.05, value, 0.2) for value in (39.0, 38.8, 39.3)] == ["level with", "above", "below"]
+    assert against(39.05, 39.0, 0.0) == "above"
+    mean, limits = student([*psnr(stored("pulling"), "A+S+L")])
+    blend = baselines(claims.RESULTS, "pulling")["two_neighbours_tissue"]
+    assert f"it is {against(mean, blend, limits[1] - mean)} the mean ({blend:.2f} dB)" in claims.parts()["answer"]
 
 
 def test_what_the_page_says_of_the_largest_step():

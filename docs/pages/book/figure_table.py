@@ -9,7 +9,7 @@ class Figure(NamedTuple):
     """The mean of one number of several records."""
 
     records: str  # pattern of files of docs/results
-    path: str  # keys and indices, joined by dots
+    path: str  # keys and indices, joined by dots; * is the mean over a list
     form: str
     scale: float = 1.0
 
@@ -43,6 +43,9 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "blend.full.pulling": Figure("interpolation.json", f"{ALONE}.two_neighbours.psnr_full", "{:.2f}"),
     "blend.full.cutting": Figure("interpolation.json", f"{CUTTING}.two_neighbours.psnr_full", "{:.2f}"),
     "paper.below_blend": Formula(sub, ("blend.tissue", "paper.tissue"), "{:.1f}"),
+    "sharp.paths": Figure("levers.json", "scenes.demo.`sharp`.*.scene_units", "{:.2f}"),
+    "paper.paths": Figure("levers.json", "scenes.demo.`paper`.*.scene_units", "{:.2f}"),
+    "tissue.paths": Figure("levers.json", "scenes.demo.`paper`.*.motion_scene_units", "{:.2f}"),
     "flow.frame1": Figure(PULLING, "baselines.flow_interpolation.per_frame.0.psnr_tissue", "{:.2f}"),
     "workload.focal": Setting("endotsr.training.scene.workload:FOCAL"),
     "diverged.rise": Setting("endotsr.training.fitting.divergence:RISE"),

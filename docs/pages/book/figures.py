@@ -37,7 +37,7 @@ PAGES = (
     "../notebooks/*.md",
     "../notebooks/*.py",
 )
-UNITS = "dB|ms|us|s|seconds|min|minutes|hours|[KMG]i?B|px|pixels|%|times"
+UNITS = "dB|mm|ms|us|s|seconds|min|minutes|hours|[KMG]i?B|px|pixels|%|times"
 MARK = re.compile(  # a number, its unit if any, and the name of the figure
     rf"(?P<number>[-+]?\d[\d.]*)(?P<unit>(?: ?(?:{UNITS}))?)<!--=(?P<key>[\w.]+)-->"
 )
@@ -70,12 +70,20 @@ def _constant(dotted: str) -> float:
 
 def _at(found: Any, path: str, file: Path) -> float:
     """The number at a path, or the mean of the list of numbers there."""
+    first, star, rest = path.partition(".*.")
+    if star:
+        found = _part(found, first, file)
+        return float(np.mean([_at(one, rest, file) for one in found]))
+    return float(np.mean(_part(found, path, file)))
+
+
+def _part(found: Any, path: str, file: Path) -> Any:
     for key in path.split("."):
         try:
             found = found[int(key)] if isinstance(found, list) else found[key]
         except (KeyError, IndexError, ValueError, TypeError):
             raise InputError(f"{file}: no {path}") from None
-    return float(np.mean(found))
+    return found
 
 
 @cache

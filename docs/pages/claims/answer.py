@@ -63,7 +63,8 @@ def level(folder: Path, found: Record, clip: str) -> str:
     mean, limits = student(values)
     verdict = "is not decided" if limits is None else "is not reached" if limits[1] < published else "is reached"
     text = f"The published level, {published:.2f} dB, {verdict}: {shown(values, 2)} dB."
-    return f"{text} {beaten(folder, clip, mean, 'The reproduction is')}".strip()
+    half = 0.0 if limits is None else limits[1] - mean
+    return f"{text} {beaten(folder, clip, mean, 'The reproduction is', half)}".strip()
 
 
 def baselines(folder: Path, clip: str) -> dict[str, float]:
@@ -74,18 +75,22 @@ def baselines(folder: Path, clip: str) -> dict[str, float]:
     return {name: float(np.mean(rows[name]["psnr_full"])) for name in PREDICTIONS if name in rows}
 
 
-def beaten(folder: Path, clip: str, level: float, who: str) -> str:
-    """How a level stands to the predictions without a model."""
+def against(level: float, value: float, half: float) -> str:
+    """Below, above, or level with: within half the width of the interval of the level."""
+    return "level with" if abs(level - value) <= half else "below" if level < value else "above"
+
+
+def beaten(folder: Path, clip: str, level: float, who: str, half: float = 0.0) -> str:
+    """How a level, with half the width of its interval, stands to the predictions without a model."""
     of = baselines(folder, clip)
     if len(of) < len(PREDICTIONS):
         return ""
     blend, flow, blend_tissue, flow_tissue = (of[name] for name in PREDICTIONS)
-    plain = "below" if level < min(blend, flow) else "not below"
-    tissue = ["below" if level < value else "above" for value in (blend_tissue, flow_tissue)]
+    to_blend, to_flow, to_tissue, to_flow_tissue = (against(level, value, half) for value in of.values())
     return (
-        f"{who} {plain} the mean of the two neighbouring frames ({blend:.2f} dB) and flow ({flow:.2f} dB); if these "
-        f"may read tissue only, as the model does, it is {tissue[0]} the mean ({blend_tissue:.2f} dB) and {tissue[1]} "
-        f"flow ({flow_tissue:.2f} dB)."
+        f"{who} {to_blend} the mean of the two neighbouring frames ({blend:.2f} dB) and {to_flow} flow ({flow:.2f} "
+        f"dB); if these may read tissue only, as the model does, it is {to_tissue} the mean ({blend_tissue:.2f} dB) "
+        f"and {to_flow_tissue} flow ({flow_tissue:.2f} dB)."
     )
 
 

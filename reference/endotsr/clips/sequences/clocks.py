@@ -1,7 +1,7 @@
 """The clock of a recording: seconds of its pictures from their time stamps, and the places where it jumps.
 
 In: one stamp per picture, in the order in which they are shown. Out: `Clock`. Joined files start their clock again, a
-recorder that pauses leaves a gap, and a transport stream counts over 26 hours and then from 0.
+recorder that pauses leaves a gap, and a transport stream counts to 2^33 and then from 0.
 """
 
 from typing import NamedTuple
