@@ -91,6 +91,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "window.tissue": Setting("endotsr.studies.windows.plan:LEAST_TISSUE", scale=100),
     "window.step": Setting("endotsr.studies.windows.survey:LARGEST_STEP", scale=100),
     "effects.width": Setting("endotsr.clips.effects.frames:WIDEST"),
+    "effects.drift": Setting("endotsr.clips.poses.movement:DRIFT", scale=100),
     "effects.motion": Setting("endotsr.clips.effects.motion:LEAST_MOTION", "{:.2f}"),
     "effects.explained": Setting("endotsr.clips.effects.motion:EXPLAINED", scale=100),
     "effects.rates": Setting("endotsr.clips.effects.periodic:ALARM", scale=100),
