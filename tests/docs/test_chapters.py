@@ -6,6 +6,8 @@ import pytest
 from pages.book import chapters
 from pages.store.marks import read_json, replaced
 
+from endotsr.errors import InputError
+
 TEXTS = {file.stem: file.read_text(encoding="utf-8") for file in sorted(chapters.NOTEBOOKS.glob("*.py"))}
 CUTS = {
     "derivation": ("\n# ## The reverse pass", "\n# ## Another section"),
@@ -47,3 +49,15 @@ def test_every_chapter_was_timed_and_the_book_takes_ten_minutes_at_most():
     assert set(times) == set(TEXTS)
     assert all(row["processor_seconds"] > 0 for row in times.values())
     assert sum(row["processor_seconds"] for row in times.values()) <= chapters.LONGEST
+
+
+def test_some_chapters_are_timed_and_the_others_keep_their_times(monkeypatch, tmp_path):
+    (tmp_path / "01_a.py").write_text("", encoding="utf-8")
+    (tmp_path / "02_b.py").write_text("", encoding="utf-8")
+    monkeypatch.setattr(chapters, "NOTEBOOKS", tmp_path)
+    stored = read_json(chapters.FILE, chapters.COMMAND)["chapters"]
+    found = chapters.measured(["02"])["chapters"]
+    assert found == stored | {"02_b": found["02_b"]} and "01_a" not in found
+    assert set(chapters.measured([])["chapters"]) == {"01_a", "02_b"}
+    with pytest.raises(InputError, match=r"no notebook .*03.*; allowed: 01, 02"):
+        chapters.measured(["03"])

@@ -1,7 +1,8 @@
 """The elements of every chapter of the book: motive, derivation, figures, exercises and run time.
 
-    python docs/make.py book.chapters measure   run every notebook at its small size, one after the other, on one thread
-    python docs/make.py book.chapters           rewrite the table in notebooks/index.md
+    python docs/make.py book.chapters measure [NUMBER ...]   run these notebooks, or all, at their small size
+                                                             on one thread, and keep the stored times of the others
+    python docs/make.py book.chapters                        rewrite the table in notebooks/index.md
 
 The times are docs/results/chapters.json. Everything else is read from the text of the notebooks. A test checks every
 chapter with `missing`.
@@ -74,11 +75,17 @@ def chapters() -> dict[str, Chapter]:
     return {file.stem: chapter_of(file.read_text(encoding="utf-8")) for file in sorted(NOTEBOOKS.glob("*.py"))}
 
 
-def measured() -> dict[str, Any]:
-    """Processor time and elapsed time of every notebook, run as a script on one thread."""
+def measured(numbers: list[str]) -> dict[str, Any]:
+    """Processor time and elapsed time of notebooks, run as scripts on one thread; all of them without numbers.
+
+    Raises: InputError for a number without a notebook, and for a notebook that fails.
+    """
+    files = {file.name[:2]: file for file in sorted(NOTEBOOKS.glob("[0-9]*.py"))}
+    if not {*numbers} <= {*files}:
+        raise InputError(f"no notebook {sorted({*numbers} - {*files})}; allowed: {', '.join(files)}")
     environment = os.environ | {"ENDOTSR_NOTEBOOK_SIZE": "small", "MPLBACKEND": "Agg", "NUMBA_NUM_THREADS": "1"}
-    found = {}
-    for file in sorted(NOTEBOOKS.glob("*.py")):
+    found = read_json(FILE, COMMAND)["chapters"] if numbers else {}
+    for file in (files[number] for number in numbers or files):
         before, began = os.times(), time.monotonic()
         done = subprocess.run([sys.executable, str(file)], env=environment, capture_output=True, text=True)
         if done.returncode:
@@ -112,8 +119,8 @@ def table(found: dict[str, Chapter], times: dict[str, Any]) -> str:
 def main(words: list[str]) -> None:
     """The command."""
     try:
-        if words == ["measure"]:
-            write_json(FILE, measured())
+        if words[:1] == ["measure"]:
+            write_json(FILE, measured(words[1:]))
         elif words:
             sys.exit(__doc__)
         write_marked(PAGE, {"table": table(chapters(), read_json(FILE, COMMAND))}, "chapters")
