@@ -4,13 +4,16 @@ import importlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from endotsr.clips.sequences.layouts import layouts
+from endotsr.method.splatting.camera import CameraPose
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"
-TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera")
+TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera", "hand_held_training")
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
             "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP", "hamlyn": "Hamlyn",
             "scared": "SCARED", "servct": "SERV-CT", "c3vd": "C3VD", "nerfstudio": "nerfstudio"}  # fmt: skip
@@ -23,6 +26,41 @@ def test_a_table_is_what_its_result_says(name):
         pytest.skip(f"not measured yet: python docs/make.py recordings.{name}")
     found = json.loads(made.FILE.read_text(encoding="utf-8"))
     assert made.table(found["rows"] if name == "long_clip" else found) in PAGE.read_text(encoding="utf-8")
+
+
+def test_the_tables_of_hand_held_clips_are_what_their_result_says():
+    from pages.recordings import hand_held
+
+    made = hand_held.tables(json.loads(hand_held.FILE.read_text(encoding="utf-8")))
+    assert len(made) == 3 and all(table in PAGE.read_text(encoding="utf-8") for table in made.values())
+
+
+def turned(poses, rotation, shift, factor=1.0):
+    """The same path in another world, and in another unit."""
+    return [
+        CameraPose(p.rotation @ rotation.T, factor * (p.translation - p.rotation @ rotation.T @ shift)) for p in poses
+    ]
+
+
+def test_errors_of_a_path_do_not_depend_on_the_world_but_on_the_unit():
+    from pages.recordings.path_errors import path_errors
+
+    rng = np.random.default_rng(0)
+    true = [
+        CameraPose(Rotation.from_rotvec(0.1 * rng.normal(size=3)).as_matrix(), rng.normal(size=3)) for _ in range(9)
+    ]
+    moved = turned(true, Rotation.from_rotvec([0.4, -1.0, 0.3]).as_matrix(), np.array([3.0, -2.0, 9.0]))
+    found = path_errors(moved, true, scaled=False)
+    assert max(found[name] for name in ("error", "step", "step_degrees")) < 1e-6 and found["registered"] == 9
+    longer = turned(true, np.eye(3), np.zeros(3), 2.0)
+    assert (
+        path_errors(longer, true, scaled=True)["error"] < 1e-9 < 0.1 < path_errors(longer, true, scaled=False)["error"]
+    )
+    wrong = [*moved[:4], moved[4]._replace(translation=moved[4].translation + [0.9, 0, 0]), *moved[5:]]
+    assert 0.2 < path_errors(wrong, true, scaled=False)["error"] < 0.3  # 0.9 / sqrt(9), less what the alignment takes
+    gaps = path_errors([None, *moved[1:4], None, *moved[5:]], true, scaled=False)
+    assert gaps["registered"] == 7 and gaps["error"] < 1e-6
+    assert "error" not in path_errors([None] * 7 + moved[7:], true, scaled=False)
 
 
 def test_every_layout_has_its_section():

@@ -10,6 +10,7 @@ from endotsr.clips.effects.frames import reduced_frames
 from endotsr.clips.effects.inspect import inspect_sequence
 from endotsr.clips.effects.plan import make_plan
 from endotsr.clips.effects.scope import camera_verdict
+from endotsr.clips.sequences.read import NOT_METRIC
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, with_settings
 from endotsr.results.report.inspection import inspection_html, inspection_text
@@ -69,6 +70,12 @@ def test_without_depth_it_moves_or_cannot_be_told():
     for sequence in (clip("noise"), clip("noise", "pull"), without_poses(clip("noise", "camera_motion"))):
         found = verdict(without_depth(sequence))
         assert not found.present and found.kind == "unknown" and "cannot be told" in found.reason
+
+
+def test_assumed_depth_counts_as_none():
+    """A plane in place of the depth explains no flow, which would be taken for a still camera."""
+    sequence = replace(clip("noise", "pull"), notes=[f"{NOT_METRIC}a plane"])
+    assert verdict(sequence).kind == "unknown" and verdict(clip("noise", "pull")).kind == "none"
 
 
 def test_masked_frames_leave_it_open():

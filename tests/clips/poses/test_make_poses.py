@@ -138,6 +138,17 @@ def test_a_damaged_partial_result_is_not_used(clip, text):
     assert enter_poses(clip).written
 
 
+def test_windows_that_overlap_have_the_same_poses(clip):
+    """`train --windows` reads a range of the frames for each window; all poses come from one estimate."""
+    enter_poses(clip)
+    whole = endotsr.load_sequence(clip, allow_tissue_fraction=True).cameras
+    for first, end in ((0, 9), (5, 14)):
+        part = endotsr.load_sequence(clip, allow_tissue_fraction=True, frames=f"{first}:{end}").cameras
+        for one, other in zip(part, whole[first:end], strict=True):
+            np.testing.assert_array_equal(one.rotation, other.rotation)
+            np.testing.assert_array_equal(one.translation, other.translation)
+
+
 KILLED = """
 import os, signal, sys
 from pathlib import Path

@@ -11,6 +11,7 @@ from endotsr.clips.effects.verdict import UNKNOWN, Curve, EffectVerdict
 from endotsr.clips.poses.matches import matcher_of
 from endotsr.clips.poses.movement import DRIFT, LEAST_FLOW, MOVING, STILL, Movement, drift, movement, pairs_that_move
 from endotsr.clips.poses.views import Views, known_depth, small_views
+from endotsr.clips.sequences.read import NOT_METRIC
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.splatting.camera import camera_centre
 
@@ -51,10 +52,14 @@ def _seen_verdict(sequence: Sequence) -> EffectVerdict:
 
 
 def seen_movement(sequence: Sequence) -> Movement:
-    """Whether the camera moves, from the pictures of the training frames, and from their depth if there is any."""
+    """Whether the camera moves, from the pictures of the training frames, and from their depth if it was measured.
+
+    With assumed depth, a rigid motion does not explain the flow of a moving camera either.
+    """
     index = sequence.train_index
     depth = known_depth(sequence.depth[index])
     views = Views(sequence.images[index], sequence.masks[index], depth, sequence.cameras[0])
-    if (depth > 0).any():
+    assumed = any(note.startswith(NOT_METRIC) for note in sequence.notes)
+    if (depth > 0).any() and not assumed:
         return movement(pairs_that_move(matcher_of(small_views(views))))
     return drift(matcher_of(small_views(views._replace(depth=np.ones_like(depth)))))

@@ -38,6 +38,7 @@ from endotsr.untrusted.files import in_threads
 NEAR = 0.2  # near plane of every preset, scene units
 LEAST_SIDE = 16  # pixels; the three-level pyramid needs this many
 NO_MASKS = "no masks: every pixel counts as tissue, instruments included"
+NOT_METRIC = "not metric: "  # a note on assumed depth begins so
 EVERYTHING = (0.0, 100.0)  # percentiles that clip nothing
 Facts = tuple[FrameFacts, DepthFacts]  # of one frame, for the checks
 
@@ -135,7 +136,7 @@ def _depth_percentiles(clip: Clip, config: SequenceConfig) -> tuple[SequenceConf
         config = msgspec.structs.replace(config, depth_percentiles=EVERYTHING)
         notes.append(f"depth: clipped to its percentiles {list(depth.clipped)} when it was resized, and not again")
     if depth.assumed:
-        notes.append(f"not metric: {depth.method}; {KINDS['assumed-depth'].why}")
+        notes.append(f"{NOT_METRIC}{depth.method}; {KINDS['assumed-depth'].why}")
     return config, notes
 
 
