@@ -98,4 +98,6 @@ def test_the_readme_says_of_the_gaps_what_their_table_says():
     difference = {gap: [float(part) for part in cells[6].split(" ± ")] for gap, cells in rows.items()}
     assert difference[1][0] < 0 and difference[16][0] > difference[16][1]
     assert all(abs(difference[gap][0]) < difference[gap][1] for gap in (4, 8))
+    above_tissue_only = {gap: float(cells[4]) > float(cells[3]) for gap, cells in rows.items()}
+    assert above_tissue_only == {1: True, 4: True, 8: True, 16: False}
     assert all(float(cells[7]) < float(cells[8]) for cells in rows.values())
