@@ -32,6 +32,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(command, tmp_p
         "render": [run, "--out", out], "export": [run, "--out", f"{out}.ply"],
         "evaluate": [run], "tradeoff": ["--out", out, "--budget", "10 ms"],
         "golden judge": [run], "golden run": ["--port", "true {requests} {outputs}"], "golden reference": [out],
+        "golden verify": [run],
     }  # fmt: skip
     words = [*command.split(), *needed.get(command, []), "--json", str(tmp_path / "no" / "a.json")]
     assert_refused(capsys, words, "a.json: cannot be written")

@@ -10,7 +10,7 @@ from endotsr.cli.parts import progress
 from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.waiting import in_words, waiting_line
 from endotsr.clips.sequences.checks.duration import (
-    Plan,
+    TimedCommand,
     estimated_seconds,
     frames_of,
     iteration_work,
@@ -35,7 +35,7 @@ class Clock:
 
 def plan_of(preset, count, threads):
     frames = frames_of(*every_eighth(count))
-    return Plan(lengthened(PRESETS[preset], frames.training), frames, PIXELS, threads, perceived=None)
+    return TimedCommand(lengthened(PRESETS[preset], frames.training), frames, PIXELS, threads, perceived=None)
 
 
 class Told:

@@ -73,6 +73,8 @@ class VerifyOptions:
     """the command of the port; that of the certificate is shown and not run"""
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder or archive of the golden cases (default: golden/ or archive at hand)"""
+    json: JsonFile = None
+    """also write the outcome as JSON"""
     timeout: float = 600.0
     """time limit of a call, seconds"""
 
@@ -160,6 +162,7 @@ def _verify(words: list[str]) -> int:
     with tempfile.TemporaryDirectory() as scratch:
         report, _, found = verified(golden, given, options.port, Path(scratch), timeout=options.timeout)
     print("\n".join([*([as_table(report)] if found else []), *summary(given, options.port, found)]))
+    write_result(options.json, certificate=options.certificate, confirmed=not found, differences=found)
     return 1 if found else 0
 
 

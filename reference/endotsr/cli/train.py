@@ -236,7 +236,7 @@ def _progress(folder: RunFolder, sequence: "Sequence", config: Config, options: 
     import numba
 
     from endotsr.cli.parts.waiting import waiting_line
-    from endotsr.clips.sequences.checks.duration import Plan, frames_of
+    from endotsr.clips.sequences.checks.duration import TimedCommand, frames_of
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before
@@ -244,7 +244,7 @@ def _progress(folder: RunFolder, sequence: "Sequence", config: Config, options: 
 
     frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
     perceived = load_lpips_weights(options.lpips) is not None if options.evaluate else None
-    plan = Plan(config, frames, sequence.width * sequence.height, threads, perceived)
+    plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived)
     print(waiting_line(plan, remembered_unit(threads), done_before(config).exists()))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))

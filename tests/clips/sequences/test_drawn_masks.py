@@ -11,7 +11,7 @@ from endotsr.clips.sequences.carry_masks import ClipFlows, carry_masks
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.drawing import displacement, drawing_of, even_frames, plausible_drafts
 from endotsr.clips.sequences.drawn_masks import FORMAT, MOST_POINTS, key_masks, read_drawn
-from endotsr.clips.sequences.mask_shapes import Shape, filled, inside_polygon, near_line, shapes_of
+from endotsr.clips.sequences.mask_shapes import MaskShape, filled, inside_polygon, near_line, shapes_of
 from endotsr.errors import InputError
 
 WIDTH, HEIGHT = 50, 40
@@ -61,7 +61,7 @@ def test_a_polygon_covers_the_centres_inside(seed):
 def test_a_polygon_of_whole_pixels_is_exact():
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[5:15, 5:20] = True
-    np.testing.assert_array_equal(filled([Shape(tool="polygon", points=square()["points"])], WIDTH, HEIGHT), mask)
+    np.testing.assert_array_equal(filled([MaskShape(tool="polygon", points=square()["points"])], WIDTH, HEIGHT), mask)
     assert not inside_polygon(np.array([[1.0, 1], [9, 9]]), WIDTH, HEIGHT).any()
 
 
@@ -73,10 +73,10 @@ def test_a_stroke_covers_the_centres_near_its_line(seed):
 
 
 def test_shapes_add_and_erase_in_their_order():
-    shapes = [Shape(tool="polygon", points=square()["points"])]
+    shapes = [MaskShape(tool="polygon", points=square()["points"])]
     shapes += [
-        Shape(tool="brush", points=[(10, 10)], radius=3, erase=True),
-        Shape(tool="brush", points=[(10, 10)], radius=1),
+        MaskShape(tool="brush", points=[(10, 10)], radius=3, erase=True),
+        MaskShape(tool="brush", points=[(10, 10)], radius=1),
     ]
     found = filled(shapes, WIDTH, HEIGHT)
     assert found[9, 9] and not found[10, 11] and found[14, 18]

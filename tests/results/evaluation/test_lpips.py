@@ -46,7 +46,7 @@ def test_pooling_is_the_largest_of_nine(height, width):
         [image[:, y : y + 3, x : x + 3].max(axis=(1, 2)) for x in range(0, width - 2, 2)]
         for y in range(0, height - 2, 2)
     ]
-    np.testing.assert_array_equal(module._pool(image), np.array(windows).transpose(2, 0, 1))
+    np.testing.assert_array_equal(module.pooled(image), np.array(windows).transpose(2, 0, 1))
 
 
 def pair(height=35, width=47):

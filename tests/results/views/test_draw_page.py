@@ -14,9 +14,9 @@ from remote import Remote
 
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.drawing import Draft, Drawing, DrawnFrame
+from endotsr.clips.sequences.drawing import Draft, DrawnClip, DrawnFrame
 from endotsr.clips.sequences.drawn_masks import key_masks, read_drawn
-from endotsr.clips.sequences.mask_shapes import Shape
+from endotsr.clips.sequences.mask_shapes import MaskShape
 from endotsr.errors import InputError
 from endotsr.results.views.draw_page import check_draw_page, draw_page, write_draw_page
 
@@ -38,18 +38,18 @@ PAINTED = f"""(() => {{
 SHIFT = (24.0, 8.0)  # px from one frame of the page to the next
 
 
-def drawing(shapes: list[Shape] | None = None) -> Drawing:
+def drawing(shapes: list[MaskShape] | None = None) -> DrawnClip:
     """Four of seven frames; the second one has a draft, the third one may be drawn already."""
     rng = np.random.default_rng(0)
     ahead = np.tile(np.array(SHIFT)[:, None], COLUMNS * (HEIGHT // STEP))
-    draft = Draft("colour", [Shape(tool="polygon", points=[(200, 20), (300, 20), (300, 90)], origin="colour")])
+    draft = Draft("colour", [MaskShape(tool="polygon", points=[(200, 20), (300, 20), (300, 90)], origin="colour")])
     frames = []
     for i, name in enumerate(NAMES):
         picture = rng.integers(90, 160, (HEIGHT, WIDTH, 3), np.uint8)
         drawn = (shapes or []) if i == 2 else []
         motion = (ahead if i < 3 else None, -ahead if i else None)
         frames.append(DrawnFrame(2 * i, name, picture, drawn, bool(drawn), draft if i == 1 else None, *motion))
-    return Drawing(7, WIDTH, HEIGHT, frames, [], STEP, COLUMNS)
+    return DrawnClip(7, WIDTH, HEIGHT, frames, [], STEP, COLUMNS)
 
 
 def clip() -> Clip:
@@ -250,7 +250,7 @@ def test_names_of_the_clip_are_text_and_the_page_fits(opened):
 
 
 def test_a_page_of_drawn_frames_continues_them(tmp_path, remote):
-    old = [Shape(tool="polygon", points=[(40, 40), (140, 40), (140, 100)])]
+    old = [MaskShape(tool="polygon", points=[(40, 40), (140, 40), (140, 100)])]
     write_draw_page(tmp_path / "draw.html", drawing(old), "a clip", "x")
     page = Page(remote.open(tmp_path / "draw.html", tmp_path), tmp_path)
     assert "Frame 0" in page.said()

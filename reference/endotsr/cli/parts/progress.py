@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from endotsr.clips.sequences.checks.duration import Plan, Standing, estimated_seconds, expected_gaussians
+from endotsr.clips.sequences.checks.duration import Standing, TimedCommand, estimated_seconds, expected_gaussians
 from endotsr.results.report.tables import duration
 from endotsr.training.fitting.records import LogEntry
 from endotsr.training.runs.time_left import TimeLeft
@@ -29,7 +29,7 @@ class Progress:
     page     receives the same events, and the time left
     """
 
-    def __init__(self, plan: Plan, page: "LivePage | None" = None) -> None:
+    def __init__(self, plan: TimedCommand, page: "LivePage | None" = None) -> None:
         self._plan, self._page = plan, page
         self._total, self._done = plan.config.training.iterations, 0
         self._training: TrainingState | None = None

@@ -1,10 +1,10 @@
 """What a person waits for in `endotsr train`, in one line before the first iteration."""
 
-from endotsr.clips.sequences.checks.duration import COMPILATION, Plan, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.checks.duration import COMPILATION, TimedCommand, assumed_unit, estimated_seconds
 from endotsr.results.report.tables import duration
 
 
-def waiting_line(plan: Plan, unit: float | None, compiled: bool) -> str:
+def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool) -> str:
     """The parts of the command after reading, with the time of each.
 
     unit       seconds per unit of work in an earlier training on this machine; None = unknown

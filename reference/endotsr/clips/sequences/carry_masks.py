@@ -167,7 +167,8 @@ def _levels(blend: FloatArray | BoolArray) -> NDArray[np.uint8]:
 
 
 def _excluded(levels: NDArray[np.uint8], margin: int) -> BoolArray:
-    return levels >= 128 if margin == 0 else grown(levels >= 64, margin)
+    # 128 is a blend of exactly 1/2: half-way between two keys, a pixel of one side alone.
+    return levels > 128 if margin == 0 else grown(levels >= 64, margin)
 
 
 def overlap_of(one: BoolArray, other: BoolArray) -> float:

@@ -1,8 +1,8 @@
 """What the drawing page shows: key frames with their shapes, drafts, and the motion between them.
 
-In: a clip and, after the first round, the file of the page. Out: a `Drawing`. In the first round the frames are evenly
-spaced and the drafts come from the colours. Later the frames of the file are shown with those whose mask would help
-most, and their drafts are the carried masks.
+In: a clip and, after the first round, the file of the page. Out: a `DrawnClip`. In the first round the frames are
+evenly spaced and the drafts come from the colours. Later the frames of the file are shown with those whose mask would
+help most, and their drafts are the carried masks.
 """
 
 import math
@@ -22,7 +22,7 @@ from endotsr.clips.sequences.carry_masks import (
 )
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
-from endotsr.clips.sequences.mask_shapes import LARGEST, Origin, Shape, shapes_of
+from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, Origin, shapes_of
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -35,7 +35,7 @@ class Draft(NamedTuple):
     """Shapes that a person has not accepted yet."""
 
     origin: Origin  # `colour` or `carried`
-    shapes: list[Shape]
+    shapes: list[MaskShape]
 
 
 class DrawnFrame(NamedTuple):
@@ -44,21 +44,21 @@ class DrawnFrame(NamedTuple):
     frame: int
     name: str
     picture: Picture
-    shapes: list[Shape]
+    shapes: list[MaskShape]
     key: bool  # whether a person has drawn this frame, or stated that it shows no instrument
     draft: Draft | None
     ahead: FloatArray | None  # (2, m) px: displacement of the nodes to the next frame of the page
     back: FloatArray | None  # (2, m) px: displacement to the previous one
 
 
-class Drawing(NamedTuple):
+class DrawnClip(NamedTuple):
     """All of the page."""
 
     count: int  # frames of the clip
     width: int
     height: int
     frames: list[DrawnFrame]
-    never: list[Shape]
+    never: list[MaskShape]
     step: int  # px between the nodes; the first one is at (step / 2, step / 2)
     columns: int
 
@@ -72,7 +72,7 @@ def even_frames(count: int, wanted: int) -> list[int]:
 
 def drawing_of(
     clip: Clip, pictures: Sequence[Picture], wanted: int, colour: list[BoolArray], drawn: DrawnFile | None = None
-) -> Drawing:
+) -> DrawnClip:
     """The content of the page.
 
     pictures   (H, W, 3) of all frames
@@ -102,7 +102,7 @@ def drawing_of(
     for before, i, after in zip((None, *shown), shown, (*shown[1:], None)):
         ahead, back = (None if k is None else displacement(motion, i, k, points) for k in (after, before))
         frames.append(_frame(clip, pictures, i, keys.get(i), drafts.get(i))._replace(ahead=ahead, back=back))
-    return Drawing(len(pictures), width, height, frames, drawn.never if drawn else [], step, columns)
+    return DrawnClip(len(pictures), width, height, frames, drawn.never if drawn else [], step, columns)
 
 
 def plausible_drafts(motion: ClipFlows, colour: list[BoolArray]) -> set[int]:

@@ -17,7 +17,7 @@ from typing import Annotated, NamedTuple
 import msgspec
 
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.mask_shapes import LARGEST, Shape, filled
+from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, filled
 from endotsr.config import Section
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
@@ -29,7 +29,7 @@ LARGEST_FILE = 16 << 20  # bytes
 MOST_SHAPES = 1000  # of a frame
 MOST_POINTS = 100_000  # of a file
 Side = Annotated[int, msgspec.Meta(ge=1, le=LARGEST)]
-Shapes = Annotated[list[Shape], msgspec.Meta(max_length=MOST_SHAPES)]
+Shapes = Annotated[list[MaskShape], msgspec.Meta(max_length=MOST_SHAPES)]
 
 
 class DrawnKey(Section, frozen=True, kw_only=True):

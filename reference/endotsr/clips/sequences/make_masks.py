@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import area_resize, read_png, write_png
 from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carry_masks, motion_of
 from endotsr.clips.sequences.clip import Clip, Picture
-from endotsr.clips.sequences.drawing import Drawing, drawing_of
+from endotsr.clips.sequences.drawing import DrawnClip, drawing_of
 from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts.common import describe_prepared
@@ -127,7 +127,7 @@ def _folder_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
     return {place[f.stem]: threshold_masks([plane], [f.name], [])[0] for f, plane in zip(files, planes)}
 
 
-def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> Drawing:
+def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:
     """The content of the drawing page.
 
     keys     the file of an earlier page, or a folder of masks, which become polygons; None: a first page, with drafts
@@ -212,15 +212,15 @@ def origin_of(proposal: Proposal, given: BoolArray | None = None) -> str:
 
     A pixel with several origins counts for the first one: given, never tissue, then drawn, carried or proposed.
     """
-    shares, covered = {}, np.zeros(proposal.excluded[0].shape, bool)
+    fractions, covered = {}, np.zeros(proposal.excluded[0].shape, bool)
     for name, plane in (("given", given), ("never tissue", proposal.never)):
         if plane is not None:
-            shares[name] = float((plane & ~covered).mean())
+            fractions[name] = float((plane & ~covered).mean())
             covered = covered | plane
     for i, plane in enumerate(proposal.excluded):
         name = f"drawn on {len(proposal.drawn)} frames" if i in proposal.drawn else proposal.kind
-        shares[name] = shares.get(name, 0.0) + float((plane & ~covered).mean()) / len(proposal.excluded)
-    return ", ".join(f"{name} {share:.1%}" for name, share in shares.items())
+        fractions[name] = fractions.get(name, 0.0) + float((plane & ~covered).mean()) / len(proposal.excluded)
+    return ", ".join(f"{name} {fraction:.1%}" for name, fraction in fractions.items())
 
 
 def overlays(clip: Clip, proposal: Proposal) -> Picture:

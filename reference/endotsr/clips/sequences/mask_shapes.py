@@ -23,7 +23,7 @@ Coordinate = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 Origin = Literal["drawn", "copied", "colour", "carried"]
 
 
-class Shape(Section, frozen=True, kw_only=True):
+class MaskShape(Section, frozen=True, kw_only=True):
     """A polygon or a stroke of the brush."""
 
     tool: Literal["polygon", "brush"]
@@ -33,7 +33,7 @@ class Shape(Section, frozen=True, kw_only=True):
     origin: Origin = "drawn"  # by hand, moved from another frame, or a draft that a person accepted
 
 
-def filled(shapes: list[Shape], width: int, height: int) -> BoolArray:
+def filled(shapes: list[MaskShape], width: int, height: int) -> BoolArray:
     """The pixels (H, W) that the shapes cover, True = covered."""
     mask = np.zeros((height, width), bool)
     for shape in shapes:
@@ -108,7 +108,7 @@ def _count(ends: NDArray[np.int64], low: FloatArray, high: FloatArray) -> None:
     ends[rows[kept], behind[kept]] -= 1
 
 
-def shapes_of(mask: BoolArray, origin: Origin) -> list[Shape]:
+def shapes_of(mask: BoolArray, origin: Origin) -> list[MaskShape]:
     """Polygons whose area is a mask (H, W), within TOLERANCE of its outline; holes are polygons that erase.
 
     Regions below LEAST_AREA are left out.
@@ -118,7 +118,7 @@ def shapes_of(mask: BoolArray, origin: Origin) -> list[Shape]:
     found = outlines(mask, TOLERANCE)
     kept = [(points, hole) for points, hole in found if 3 <= len(points) <= MOST_POINTS and _area(points) >= LEAST_AREA]
     return [
-        Shape(tool="polygon", points=[(float(x), float(y)) for x, y in points], erase=hole, origin=origin)
+        MaskShape(tool="polygon", points=[(float(x), float(y)) for x, y in points], erase=hole, origin=origin)
         for points, hole in sorted(kept, key=lambda pair: pair[1])
     ]
 

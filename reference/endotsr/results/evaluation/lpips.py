@@ -128,7 +128,7 @@ def _features(image: FloatArray, weights: LpipsWeights) -> list[FloatArray]:
     found = []
     for layer in range(5):
         if POOL_BEFORE[layer]:
-            image = _pool(image)
+            image = pooled(image)
         image = _convolve(image, weights.kernels[layer], STRIDES[layer], PADDINGS[layer])
         image = np.maximum(image + weights.biases[layer][:, None, None], 0)
         found.append(image)
@@ -145,7 +145,7 @@ def _convolve(image: FloatArray, kernel: FloatArray, stride: int, padding: int) 
     return (kernel.reshape(len(kernel), -1) @ matrix).reshape(len(kernel), rows, columns)
 
 
-def _pool(image: FloatArray) -> FloatArray:
+def pooled(image: FloatArray) -> FloatArray:
     """3 x 3 maximum pooling with stride 2: rows first, then columns."""
     for _ in range(2):
         count = (image.shape[1] - 3) // 2 + 1

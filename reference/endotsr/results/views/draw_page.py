@@ -1,6 +1,6 @@
 """The drawing page: masks of key frames drawn by hand, in one HTML file that needs no server and no other file.
 
-In: a `Drawing`. Out: the text of the page, which saves the file that `drawn_masks` reads.
+In: a `DrawnClip`. Out: the text of the page, which saves the file that `drawn_masks` reads.
 """
 
 import html
@@ -12,9 +12,9 @@ from typing import Any
 
 import msgspec
 
-from endotsr.clips.sequences.drawing import Drawing, DrawnFrame
+from endotsr.clips.sequences.drawing import DrawnClip, DrawnFrame
 from endotsr.clips.sequences.drawn_masks import FORMAT
-from endotsr.clips.sequences.mask_shapes import Shape
+from endotsr.clips.sequences.mask_shapes import MaskShape
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.results.report.figures import data_uri, encode
@@ -29,12 +29,12 @@ def check_draw_page(file: Path) -> None:
         raise InputError(f"{file}: not a page; allowed: a name that ends in .html")
 
 
-def write_draw_page(file: Path, drawing: Drawing, title: str, command: str) -> None:
+def write_draw_page(file: Path, drawing: DrawnClip, title: str, command: str) -> None:
     """Write the page atomically. Raises OSError naming the file."""
     replace_text(file, draw_page(drawing, title, command))
 
 
-def draw_page(drawing: Drawing, title: str, command: str) -> str:
+def draw_page(drawing: DrawnClip, title: str, command: str) -> str:
     """The text of the page.
 
     title     heading
@@ -74,7 +74,7 @@ def _about_frame(shown: DrawnFrame) -> dict[str, Any]:
     }
 
 
-def _plain(shapes: list[Shape]) -> list[dict[str, Any]]:
+def _plain(shapes: list[MaskShape]) -> list[dict[str, Any]]:
     return msgspec.to_builtins(shapes)
 
 

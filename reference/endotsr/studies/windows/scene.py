@@ -176,14 +176,16 @@ def open_windows(run: Path) -> WindowedScene:
 def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecord:
     """The record of the covered frames as one sequence.
 
-    A frame is held out if every window that contains it holds it out. `cameras` are the first window's, valid for a
-    static camera; for a moving one see `WindowedScene.cameras`.
+    A frame is held out if a window holds it out and none trains on it. A copy of a held-out frame is neither.
+    `cameras` are the first window's, valid for a static camera; for a moving one see `WindowedScene.cameras`.
     """
     names: dict[int, str] = {}
     trained: set[int] = set()
+    held_out: set[int] = set()
     for window, record in zip(plan.windows, records):
         names |= {window.first + i: name for i, name in enumerate(record.names)}
         trained |= {window.first + i for i in record.train_index}
+        held_out |= {window.first + i for i in record.test_index}
     frames = sorted(names)
     return SequenceRecord(
         unit=records[0].unit,
@@ -192,7 +194,7 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
         names=[names[g] for g in frames],
         times=[g / plan.frames for g in frames],
         train_index=[j for j, g in enumerate(frames) if g in trained],
-        test_index=[j for j, g in enumerate(frames) if g not in trained],
+        test_index=[j for j, g in enumerate(frames) if g in held_out - trained],
         cameras=records[0].cameras,
         duration=sum(record.duration for record in records) * plan.frames / sum(record.count for record in records),
     )

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 from endotsr.clips.sequences.checks.duration import (
     PIXELS,
-    Plan,
     Standing,
+    TimedCommand,
     gap_units,
     iteration_work,
     visited,
@@ -26,7 +26,7 @@ SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left o
 class TimeLeft:
     """Collects the time of iterations and targets."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: TimedCommand) -> None:
         self._plan = plan
         self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)  # per unit of work, without waiting
         self._waited: deque[float] = deque(maxlen=LEAST_ITERATIONS)  # per unit of work, of iterations that waited

@@ -139,7 +139,7 @@ class Speed(NamedTuple):
 ASSUMED = Speed()
 
 
-class Plan(NamedTuple):
+class TimedCommand(NamedTuple):
     """One command, as far as its time is concerned."""
 
     config: Config  # of fixed length
@@ -153,7 +153,7 @@ class Plan(NamedTuple):
         return unit * (SERIAL if self.threads > 1 else 1.0)
 
 
-class Seconds(NamedTuple):
+class PartSeconds(NamedTuple):
     """Seconds of the parts of one command, in order."""
 
     reading: float
@@ -183,7 +183,7 @@ def expected_frames(count: int, config: Config) -> Frames:
         return frames_of(np.arange(count), np.arange(0))
 
 
-def estimated_seconds(plan: Plan, unit: float = SECONDS) -> Seconds:
+def estimated_seconds(plan: TimedCommand, unit: float = SECONDS) -> PartSeconds:
     """Seconds of the parts of a command. unit: seconds per unit of work with the threads of the plan."""
     config, frames, size = plan.config, plan.frames, plan.pixels / PIXELS
     alone, first = plan.alone(unit), at_start(config)
@@ -192,7 +192,7 @@ def estimated_seconds(plan: Plan, unit: float = SECONDS) -> Seconds:
     targets = sizes * gap_units(frames) * frames.gaps * visited(config, frames.gaps, config.training.iterations)
     pictures = frames.held_out * METHODS * (MEASURED + PERCEIVED * bool(plan.perceived))
     pictures += MEASURED * frames.training / EVERY_TRAINING_FRAME
-    return Seconds(
+    return PartSeconds(
         alone * size * READ * frames.total,
         alone * size * tracked * frames.training,
         alone * size * targets / plan.threads,
