@@ -17,6 +17,17 @@ def test_no_figure_is_without_a_source():
     assert not found, "substitute it from a record or the code (docs/pages/book/figures.py), or leave it out"
 
 
+def test_a_program_writes_every_block():
+    """A block between marks hides no figure that was written by hand."""
+    made = "".join(file.read_text(encoding="utf-8") for file in (bare_figures.ROOT / "docs" / "pages").rglob("*.py"))
+    rooms = {
+        (name.split(":")[0], page.name)
+        for page in figures.pages()
+        for name in re.findall(r"<!-- ([\w:]+):start\b", page.read_text(encoding="utf-8"))
+    }
+    assert len(rooms) > 20 and [found for found in rooms if not re.search(rf'["\s]{found[0]}["\s:]', made)] == []
+
+
 def test_every_name_of_the_table_is_used_and_has_a_value():
     used = {name for page in figures.pages() for name in MARK.findall(page.read_text(encoding="utf-8"))}
     assert set(figures.FIGURES) == used

@@ -101,9 +101,10 @@ def answer(result: dict[str, Any], plans: dict[str, Any] | None = None, bench: d
     nothing = abs(real.time) < 0.005 and abs(real.gain) < 0.005
     there = "there is nothing to save" if nothing else f"it saves {real.time:.0%} of the time ({real.gain:+.2f} dB)"
     plan = plans["clips"][name]["plan"] if plans else {"changes": []}
+    changed = f"{still.gain:+.2f} ± {still.interval:.2f} dB"
     return (
-        f"**On a still clip, `--effects auto` saves {still.time:.0%} of the time and changes the held-out "
-        f"PSNR by {still.gain:+.2f} dB. On the real clip `{name}`, {there} with `demo`.**{_without_tracks(plan, bench)}"
+        f"**On a still clip, `--effects auto` saves {still.time:.0%} of the time and changes the held-out PSNR by "
+        f"{changed}. On the real clip `{name}`, {there} with `demo`.**{_without_tracks(plan, bench)}"
     )
 
 
