@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from pages.book import figures, readme_gaps, readme_presets
-from pages.full_size import interpolation, levers
+from pages.full_size import interpolation, levers, record
 from pages.store.marks import replaced
 
 from endotsr.errors import InputError
@@ -101,3 +101,44 @@ def test_the_readme_says_of_the_gaps_what_their_table_says():
     above_tissue_only = {gap: float(cells[4]) > float(cells[3]) for gap, cells in rows.items()}
     assert above_tissue_only == {1: True, 4: True, 8: True, 16: False}
     assert all(float(cells[7]) < float(cells[8]) for cells in rows.values())
+
+
+def test_the_tables_of_the_runs_are_what_their_records_say():
+    text = (RESULTS / "README.md").read_text(encoding="utf-8")
+    for clip in record.CLIPS:
+        if records := record.stored(clip):
+            assert record.table(records) in text and record.missing(clip, records) in text, clip
+
+
+def made_up(preset, seed, values):
+    """The record of a run on cutting: PSNR of frames 65 and 73."""
+    frames = [{"frame": frame, "psnr_full": value} for frame, value in zip((65, 73), values, strict=True)]
+    part = {"label": "Copy", "mean": {"psnr_full": sum(values) / 2}, "per_frame": frames}
+    settings = {"preset": preset, "sequence": {"split": "every_eighth", "block_length": 8}}
+    run = {"settings": settings, "input": {"source": "endonerf_cutting"}, "seed": seed}
+    return {
+        "run": run, "held_out": part, "baselines": {"nearest_frame": part}, "frames": {"held_out": [65, 73]},
+        "published": [{"label": "as published", "psnr_full": 40.96}],
+    }  # fmt: skip
+
+
+def test_a_table_of_cutting_has_the_means_without_its_two_frames():
+    records = {f"cutting_quick_seed{seed}": made_up("quick", seed, (40.0, 30.0)) for seed in (0, 1)}
+    head, _, model, copy, published = record.table(records).splitlines()
+    assert head.startswith("| endonerf_cutting, held out: every eighth frame (in brackets without frame 73) |")
+    assert model.startswith("| endotsr, preset `quick`, mean of 2 seeds | 35.00 ± 0.00 (40.00 ± 0.00) | - |")
+    assert copy.startswith("| Copy | 35.00 (40.00) | - |") and published.startswith("| as published | 40.96 | - |")
+
+
+def test_the_seeds_that_are_not_measured_are_named():
+    records = {"cutting_quick_seed0": made_up("quick", 0, (40.0, 30.0))}
+    said = "Not all runs on cutting are measured yet: `paper` 0 of 5 seeds, `quick` 1 of 3 seeds, `sharp` 0 of 3 seeds."
+    assert record.missing("cutting", records) == said
+    assert record.table(records).splitlines()[2].startswith("| endotsr, preset `quick`, one seed | 35.00 (40.00) |")
+    assert record.missing("pulling", record.stored("pulling")) == ""
+
+
+def test_the_splits_without_interpolation_are_named():
+    found = json.loads((RESULTS / "interpolation.json").read_text(encoding="utf-8"))
+    del found["clips"]["endonerf_pulling"]["blocks of 8 frames"]
+    assert "endonerf_pulling, blocks of 8 frames" in interpolation.table(found).split("Not measured yet: ")[1]

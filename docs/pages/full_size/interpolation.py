@@ -34,7 +34,7 @@ SPLITS: dict[str, dict[str, Any]] = {
     "blocks of 8 frames": {"split": "blocks", "block_length": 8},
     "blocks of 16 frames": {"split": "blocks", "block_length": 16},
 }
-LEFT_OUT = {"endonerf_cutting": (73,)}  # stereo matching fails in it and in frame 74, and the masks follow the depth
+LEFT_OUT = {"endonerf_cutting": (73, 74)}  # in these frames the masks differ from those of their neighbours
 NAMES = [name for name in EVERY_BASELINE if name != "temporal_mean"]
 KEYS = ("psnr_full", "psnr_tissue", "ssim_full", "lpips")
 
@@ -72,13 +72,20 @@ def row(part: dict[str, Any], name: str, without: tuple[int, ...]) -> list[str]:
     return [EVERY_BASELINE[name][0], *(cell.replace("nan", "-") for cell in cells)]
 
 
+def frames_text(frames: tuple[int, ...]) -> str:
+    """The numbers of some frames as text: frame 73, frames 73 and 74."""
+    return f"frame{'s' * (len(frames) > 1)} {' and '.join(map(str, frames))}"
+
+
 def table(result: dict[str, Any]) -> str:
     """One table for each clip and split."""
     parts = []
     for clip, splits in result["clips"].items():
         for split, part in splits.items():
             without = tuple(k for k in LEFT_OUT.get(clip, ()) if k in part["frames"])
-            frames = f"{len(part['frames'])} frames" + (f"; in brackets without frame {without[0]}" if without else "")
+            frames = f"{len(part['frames'])} frames" + (
+                f"; in brackets without {frames_text(without)}" if without else ""
+            )
             head = (
                 f"{clip}, {split} held out ({frames})",
                 "PSNR full, dB",
@@ -90,6 +97,8 @@ def table(result: dict[str, Any]) -> str:
     made = f"{result['machine']['processor']}, {result['date'][:10]}."
     note = "± is a 95 % interval over the frames, as if they were independent. "
     note += "The first three rows read every pixel of the other frames, instruments included."
+    lacking = [f"{clip}, {split}" for clip, found in result["clips"].items() for split in SPLITS if split not in found]
+    note += f" Not measured yet: {'; '.join(lacking)}." if lacking else ""
     return "\n\n".join([*parts, f"{made} {note}"])
 
 

@@ -3,9 +3,10 @@
     python docs/make.py full_size.record RUN NAME COMMIT   add or replace one record, then rewrite the tables
     python docs/make.py full_size.record                   rewrite the tables only
 
-COMMIT is the revision of this repository that made the run.
+COMMIT is the revision of this repository that made the run. The first part of NAME is `pulling` or `cutting`.
 
-The tables stand in docs/results/README.md and in README.md, between the `results:start` and `results:end` marks.
+The tables stand in docs/results/README.md, between the `results:start` and `results:end` marks. README.md has
+the one of every eighth frame of pulling. The tables of cutting give in brackets the means without frames 73 and 74.
 """
 
 import json
@@ -17,11 +18,14 @@ from scipy import stats
 
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
+from pages.full_size.interpolation import LEFT_OUT, frames_text
 from pages.store.published import PUBLISHED
 
 FOLDER = Path(__file__).parents[2] / "results"
 START, END = "<!-- results:start (made by docs/pages/full_size/record.py) -->", "<!-- results:end -->"
 EVERY_EIGHTH = "every eighth frame"
+CLIPS = ("pulling", "cutting")
+PLANNED = {"pulling": {"paper": 3, "sharp": 3}, "cutting": {"paper": 5, "quick": 3, "sharp": 3}}  # seeds of a preset
 MORE = "[All runs, with blocks of frames held out, machine and times](docs/results/README.md). ± is a 95 % interval."
 COLUMNS = (
     ("psnr_full", "PSNR full, dB", "{:.2f}"),
@@ -53,25 +57,52 @@ def split_of(metrics: dict) -> str:
     return words[sequence["split"]]
 
 
-def rows(records: dict[str, dict]) -> list[tuple[str, list[dict]]]:
-    """Label and held-out means: the seeds of every preset, the baselines of the first run, what was published."""
+def clip_of(metrics: dict) -> str:
+    """The folder of the clip that a run read."""
+    return metrics["run"]["input"]["source"]
+
+
+def means(part: dict, without: tuple[int, ...]) -> dict[str, float | None]:
+    """Means of the metrics over the held-out frames, some of them left out; None where one is not measured."""
+    if not without:
+        return part["mean"]
+    frames = [row for row in part["per_frame"] if row["frame"] not in without]
+    values = {key: [row[key] for row in frames if row.get(key) is not None] for key, _, _ in COLUMNS}
+    return {key: float(np.mean(of)) if of else None for key, of in values.items()}
+
+
+def rows(records: dict[str, dict], without: tuple[int, ...] = ()) -> list[tuple[str, list[dict]]]:
+    """Label and held-out means: the seeds of every preset, the baselines of the first run, what was published.
+
+    without   held-out frames that the means leave out
+    """
     first = next(iter(records.values()))
     presets: dict[str, list[dict]] = {}
     faded: dict[str, list[dict]] = {}
     for metrics in records.values():
         preset = metrics["run"]["settings"]["preset"]
-        presets.setdefault(preset, []).append(metrics["held_out"]["mean"])
+        presets.setdefault(preset, []).append(means(metrics["held_out"], without))
         if row := metrics.get("cross_fade"):
-            faded.setdefault(preset, []).append(row["mean"])
+            faded.setdefault(preset, []).append(means(row, without))
     out = [(f"endotsr, preset `{name}`{counted(runs)}", runs) for name, runs in presets.items()]
-    out += [(f"blend of the own renders of `{name}`{counted(means)}", means) for name, means in faded.items()]
-    out += [(baseline["label"], [baseline["mean"]]) for baseline in first["baselines"].values()]
-    return out + [(row["label"], [row]) for row in first["published"] if split_of(first) == EVERY_EIGHTH]
+    out += [(f"blend of the own renders of `{name}`{counted(of)}", of) for name, of in faded.items()]
+    out += [(baseline["label"], [means(baseline, without)]) for baseline in first["baselines"].values()]
+    published = first["published"] if split_of(first) == EVERY_EIGHTH else []
+    return out + [(row["label"], [{} if without else row]) for row in published]
+
+
+def missing(clip: str, records: dict[str, dict]) -> str:
+    """A sentence about the seeds of every eighth frame that are not recorded; "" if none is missing."""
+    runs = [metrics for metrics in records.values() if split_of(metrics) == EVERY_EIGHTH]
+    found = [metrics["run"]["settings"]["preset"] for metrics in runs]
+    lacking = [f"`{name}` {found.count(name)} of {count} seeds"
+               for name, count in PLANNED[clip].items() if found.count(name) < count]  # fmt: skip
+    return f"Not all runs on {clip} are measured yet: {', '.join(lacking)}." if lacking else ""
 
 
 def counted(runs: list[dict]) -> str:
-    """What a mean is taken over, if there is more than one run."""
-    return f", mean of {len(runs)} seeds" if len(runs) > 1 else ""
+    """The number of seeds that a mean is taken over."""
+    return f", mean of {len(runs)} seeds" if len(runs) > 1 else ", one seed"
 
 
 def cell(values: list[dict], key: str, form: str) -> str:
@@ -86,13 +117,27 @@ def cell(values: list[dict], key: str, form: str) -> str:
 
 
 def table(records: dict[str, dict]) -> str:
-    """For every split the held-out means as Markdown."""
+    """For every split of one clip the held-out means as Markdown."""
     parts = []
+    clip = clip_of(next(iter(records.values())))
     for split in dict.fromkeys(split_of(metrics) for metrics in records.values()):
         chosen = {name: metrics for name, metrics in records.items() if split_of(metrics) == split}
-        cells = [[label, *(cell(values, key, form) for key, _, form in COLUMNS)] for label, values in rows(chosen)]
-        parts.append(markdown([f"Held out: {split}", *(c[1] for c in COLUMNS)], cells))
+        held_out = next(iter(chosen.values()))["frames"]["held_out"]
+        without = tuple(frame for frame in LEFT_OUT.get(clip, ()) if frame in held_out)
+        bare = rows(chosen, without) if without else rows(chosen)
+        cells = [
+            [label, *(_both(values, other, key, form, bool(without)) for key, _, form in COLUMNS)]
+            for (label, values), (_, other) in zip(rows(chosen), bare, strict=True)
+        ]
+        about = "Held out" if clip == "endonerf_pulling" else f"{clip}, held out"
+        brackets = f" (in brackets without {frames_text(without)})" if without else ""
+        parts.append(markdown([f"{about}: {split}{brackets}", *(c[1] for c in COLUMNS)], cells))
     return "\n\n".join(parts)
+
+
+def _both(values: list[dict], other: list[dict], key: str, form: str, bracketed: bool) -> str:
+    found, bare = cell(values, key, form), cell(other, key, form)
+    return f"{found} ({bare})" if bracketed and bare != "-" else found
 
 
 def about(name: str, metrics: dict) -> str:
@@ -123,9 +168,15 @@ def main(words: list[str]) -> None:
         record(Path(words[0]), words[1], words[2])
     elif words:
         sys.exit(__doc__)
-    records = {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(FOLDER.glob("pulling*.json"))}
-    if records:
-        runs = "\n".join(about(name, metrics) for name, metrics in records.items())
-        replace_marked(FOLDER / "README.md", f"{table(records)}\n\n{runs}")
-        short = {name: metrics for name, metrics in records.items() if split_of(metrics) == EVERY_EIGHTH}
-        replace_marked(FOLDER.parents[1] / "README.md", f"{table(short)}\n\n{MORE}")
+    clips = {clip: stored(clip) for clip in CLIPS}
+    found = {clip: records for clip, records in clips.items() if records}
+    made = [part for clip, records in found.items() for part in (table(records), missing(clip, records))]
+    runs = "\n".join(about(name, metrics) for records in found.values() for name, metrics in records.items())
+    replace_marked(FOLDER / "README.md", "\n\n".join([*filter(None, made), runs]))
+    short = {name: metrics for name, metrics in clips["pulling"].items() if split_of(metrics) == EVERY_EIGHTH}
+    replace_marked(FOLDER.parents[1] / "README.md", f"{table(short)}\n\n{MORE}")
+
+
+def stored(clip: str) -> dict[str, dict]:
+    """The recorded runs on a clip by name."""
+    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(FOLDER.glob(f"{clip}_*.json"))}
