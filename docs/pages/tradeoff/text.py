@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from endotsr.results.report.tables import duration, plain
-from endotsr.studies.tradeoff.study import Ranked
+from endotsr.studies.tradeoff.study import Ranked, dominates
 from endotsr.studies.tradeoff.text import levels
 
 # Dominated presets with the reason to keep them. A test fails for a dominated preset without a reason.
@@ -78,12 +78,6 @@ def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:
 def _joint(result: dict[str, Any], precision: str) -> list[dict[str, Any]]:
     names = set(result["joint"])
     return [p for p in result["points"] if p["name"] in names and p["setting"]["precision"] == precision]
-
-
-def dominates(a: Ranked, b: Ranked) -> bool:
-    """Whether a is nowhere worse than b and somewhere strictly better."""
-    ours, theirs = (a.cost, *a.errors), (b.cost, *b.errors)
-    return all(x <= y for x, y in zip(ours, theirs, strict=True)) and ours != theirs
 
 
 def dominated_by(point: Ranked, points: Sequence[Ranked]) -> list[str]:

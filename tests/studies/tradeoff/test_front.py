@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from pages.tradeoff.text import KEPT, dominates, judge_presets
+from pages.tradeoff.text import KEPT, judge_presets
 
-from endotsr.studies.tradeoff.study import Ranked, non_dominated, run_study
+from endotsr.studies.tradeoff.study import Ranked, dominates, non_dominated, run_study
 
 RESULTS = Path(__file__).parents[3] / "docs" / "results"
 
@@ -23,6 +23,13 @@ def test_domination():
 def test_front_is_what_nothing_dominates():
     points = [Ranked(f"{x}{y}", x, (y,)) for x, y in ((1, 9), (2, 9), (2, 5), (3, 6), (4, 1), (4, 0), (5, 0))]
     assert [p.name for p in non_dominated(points)] == ["19", "25", "40"]
+
+
+def test_the_front_and_the_presets_have_one_meaning_of_dominated():
+    """With several errors: a point stays if one of its errors is smaller, however large the others are."""
+    points = [Ranked("a", 1, (2, 2)), Ranked("b", 2, (3, 1)), Ranked("c", 2, (3, 2)), Ranked("d", 1, (2, 2))]
+    assert [p.name for p in non_dominated(points)] == ["a", "b"]
+    assert [p.name for p in points if any(dominates(q, p) for q in points)] == ["c"]
 
 
 def unexplained(result) -> list[str]:

@@ -154,11 +154,17 @@ class Ranked(NamedTuple):
     errors: tuple[float, ...]
 
 
+def dominates(a: Ranked, b: Ranked) -> bool:
+    """Whether a costs no more than b, has no larger error, and is strictly better in one of these."""
+    ours, theirs = (a.cost, *a.errors), (b.cost, *b.errors)
+    return all(x <= y for x, y in zip(ours, theirs, strict=True)) and ours != theirs
+
+
 def non_dominated(points: Iterable[Ranked]) -> list[Ranked]:
-    """The Pareto front in cost and first error, cheapest first."""
+    """The Pareto front: the points that no other dominates, cheapest first; of equal points the first alone."""
     front: list[Ranked] = []
-    for point in sorted(points, key=lambda p: (p.cost, p.errors[0])):
-        if not front or point.errors[0] < front[-1].errors[0]:
+    for point in sorted(points, key=lambda p: (p.cost, p.errors)):
+        if not any(dominates(other, point) or other[1:] == point[1:] for other in front):
             front.append(point)
     return front
 
