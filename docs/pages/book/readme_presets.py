@@ -1,6 +1,7 @@
 """Write the table of presets of README.md, time and quality on one clip: python docs/make.py book.readme_presets
 
-The record is docs/results/minutes.json (`python docs/make.py bench.minutes`).
+The records are docs/results/minutes.json (`python docs/make.py bench.minutes`), for whole commands waiting.json
+(`bench.waiting`), and for the compilation bench_start.json (`bench measure start`).
 """
 
 import sys
@@ -9,11 +10,12 @@ from statistics import mean
 from typing import Any
 
 from endotsr.config import PRESETS
-from endotsr.results.report.tables import markdown
+from endotsr.results.report.tables import duration, markdown
 from pages.store.marks import read_json, write_marked
 
 DOCS = Path(__file__).parents[2]
 PAGE, RECORD = DOCS.parent / "README.md", DOCS / "results" / "minutes.json"
+WHOLE, START = DOCS / "results" / "waiting.json", DOCS / "results" / "bench_start.json"
 HEADS = ("Preset", "Training, minutes", "PSNR full, dB", "LPIPS [0,1]", "Seeds")
 MEASURED = (("psnr_full", 2), ("lpips", 4))  # metric, digits
 
@@ -42,9 +44,24 @@ def table(found: dict[str, Any]) -> str:
     return f"{markdown(HEADS, cells)}\n\n{about}"
 
 
+def whole(rows: list[dict[str, Any]], start: dict[str, Any]) -> str:
+    """The time of whole commands, warm, and what a cold start adds."""
+    rows = [row for row in rows if row["clock"] == "processor" and row["seed"] == 0]
+    named = ", ".join(f"`{r['preset']}` on {r['clip']} ({r['frames']} frames) {duration(r['whole'])}" for r in rows)
+    threads, machines = sorted({row["threads"] for row in rows}), sorted({row["machine"]["processor"] for row in rows})
+    added = start["cold"]["first iteration"] - start["warm"]["first iteration"]
+    return (
+        "Whole commands, from reading the clip to its report, with LPIPS, in processor time of "
+        f"{' or '.join(map(str, threads))} thread of {', '.join(machines)}, in minutes: {named}. With two threads the "
+        f"iterations take less time on the clock. The first training on a machine compiles, which takes {added:.0f} s "
+        "there on two cores."
+    )
+
+
 def parts() -> dict[str, str]:
-    """The generated part of README.md."""
-    return {"table": table(read_json(RECORD, "python docs/make.py bench.minutes"))}
+    """The generated parts of README.md."""
+    rows, start = read_json(WHOLE, "python docs/make.py bench.waiting add CLIP")["rows"], read_json(START, "bench")
+    return {"table": table(read_json(RECORD, "python docs/make.py bench.minutes")), "whole": whole(rows, start)}
 
 
 def main(words: list[str]) -> None:

@@ -1,0 +1,182 @@
+"""What trainings said about their time, what they took, and their held-out quality against seconds.
+
+    python docs/make.py bench.waiting add CLIP ... --preset quick --lpips FILE   train each clip and store what was said
+    python docs/make.py bench.waiting                                            rewrite the table and the picture
+
+`add` runs `endotsr train` on each clip in this process, with its evaluation. The first clip is forecast at the assumed
+speed of a machine, the next ones at the speed of the training before. Without --wall every time is processor time of
+one thread, which other work on the machine hardly changes; set OPENBLAS_NUM_THREADS=1 for it. The renders for the curve
+are no part of any time. The result is docs/results/waiting.json.
+"""
+
+import argparse
+import contextlib
+import tempfile
+import time
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+
+from endotsr.cli.main import main as endotsr
+from endotsr.cli.parts import progress, waiting
+from endotsr.clips.sequences.checks.duration import COMPILATION, Plan, Standing, assumed_unit, estimated_seconds
+from endotsr.results.evaluation.metrics import psnr
+from endotsr.results.report import live_page
+from endotsr.results.report.live_page import LivePage
+from endotsr.training.fitting import bridged
+from endotsr.training.fitting.model import camera_at, render_at
+from endotsr.training.runs import speed
+from endotsr.training.runs import training as runs_training
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
+from pages.bench.waiting_text import PICTURE, draw, parts
+from pages.store.marks import read_json, write_marked
+
+DOCS = Path(__file__).parents[2]
+FILE, PAGE = DOCS / "results" / "waiting.json", DOCS / "bench.md"
+MARKS = 10  # renders of every held-out frame, evenly over the iterations
+MINUTE = 60.0
+KEYS = ("psnr_full", "psnr_tissue", "lpips")
+
+
+class Watch:
+    """Time since its creation without what was excluded, seconds."""
+
+    def __init__(self, wall: bool) -> None:
+        self._clock = time.perf_counter if wall else time.process_time
+        self._began, self._excluded = self._clock(), 0.0
+
+    def now(self) -> float:
+        """Seconds."""
+        return self._clock() - self._began - self._excluded
+
+    @contextlib.contextmanager
+    def excluded(self) -> Iterator[None]:
+        """What happens inside takes no time."""
+        began = self._clock()
+        yield
+        self._excluded += self._clock() - began
+
+
+class Heard:
+    """What one command says, with the times at which it does."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch, self.said, self.curve = watch, {}, []
+        self.trained, self.largest_rise, self._least = 0.0, 0.0, float("inf")
+        self._about: LivePage | None = None
+
+    def first_line(self, plan: Plan, unit: float | None, compiled: bool) -> str:
+        """In place of `waiting_line`."""
+        found = estimated_seconds(plan, unit or assumed_unit(plan.threads))
+        left = sum(found) - found.reading + (0.0 if compiled else COMPILATION)
+        self.said["start"] = {
+            "at": self.watch.now(), "left": left, "evaluation": found.evaluation, "initial": found.start,
+            "speed": "assumed" if unit is None else "measured", "compiled": compiled,
+        }  # fmt: skip
+        return LINE(plan, unit, compiled)
+
+    def update(self, shown: progress.Progress, entry: Any) -> None:
+        """In place of `Progress.update`."""
+        UPDATE(shown, entry)
+        with self.watch.excluded():
+            state, plan = shown._training, shown._plan
+            assert state is not None
+            standing, now = Standing(entry["iteration"], entry["gaussians"], state.coarse), self.watch.now()
+            self.trained = now
+            left, unit = shown.time_left.seconds(standing), shown.time_left.unit
+            if left is not None and unit is not None and shown._done >= progress.FORECAST_AFTER:
+                self._hear(now, left, estimated_seconds(plan, unit).evaluation)
+            if entry["iteration"] * MARKS // plan.config.training.iterations > len(self.curve):
+                self.curve.append(self._point(shown, now, standing))
+
+    def _hear(self, now: float, left: float, evaluation: float) -> None:
+        self._least = min(self._least, left)
+        self.largest_rise = max(self.largest_rise, left / self._least - 1.0 if left > 5.0 else 0.0)
+        told = {"at": now, "left": left + evaluation, "evaluation": evaluation}
+        self.said.setdefault("forecast", told)
+        if now >= MINUTE:
+            self.said.setdefault("minute", told)
+
+    def _point(self, shown: progress.Progress, now: float, at: Standing) -> dict[str, float]:
+        """Mean held-out PSNR of the current parameters."""
+        page, state = shown._page, shown._training
+        assert page is not None and state is not None
+        sequence, config, found = page._sequence, page._config, []
+        for index in map(int, sequence.test_index):
+            moment = float(sequence.times[index])
+            camera = camera_at(state.frames, sequence.cameras[index], moment)
+            out = render_at(state.gaussians, page._spectral, config, camera, moment, frames=state.frames)
+            found.append(psnr(out.colour, sequence.frame(index).image, sequence.masks[index]))
+        return {
+            "seconds": now, "iteration": at.iteration, "gaussians": at.gaussians, "psnr_full": sum(found) / len(found)
+        }  # fmt: skip
+
+
+LINE, UPDATE = waiting.waiting_line, progress.Progress.update
+
+
+def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[str, Any]:
+    """One command. kept_speed: the file in which trainings keep the speed of the machine."""
+    watch = Watch(wall)
+    spoken = Heard(watch)
+    clock = SimpleNamespace(monotonic=watch.now, perf_counter=watch.now, thread_time=time.thread_time)
+    with tempfile.TemporaryDirectory() as root, contextlib.ExitStack() as stack:
+        for module in (progress, bridged, runs_training, live_page):
+            stack.enter_context(mock.patch.object(module, "time", clock))
+        stack.enter_context(mock.patch.object(waiting, "waiting_line", spoken.first_line))
+        stack.enter_context(mock.patch.object(progress.Progress, "update", lambda *given: spoken.update(*given)))
+        stack.enter_context(mock.patch.object(speed, "speed_file", lambda threads: kept_speed))
+        run = Path(root) / "run"
+        threads = [] if wall else ["--threads", "1"]
+        if endotsr(["train", str(clip), "--out", str(run), *words, *threads]) != 0:
+            raise SystemExit(f"failed: endotsr train {clip}")
+        whole, metrics = watch.now(), read_json(run / "metrics.json", "endotsr train")
+    about = metrics["run"]
+    return {
+        "clip": clip.resolve().name, "frames": about["input"]["frames"],
+        "size": f"{about['input']['width']}x{about['input']['height']}", "preset": about["settings"]["preset"],
+        "seed": about["seed"], "threads": about["threads"], "clock": "wall" if wall else "processor",
+        "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
+        "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise, "curve": spoken.curve,
+        "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
+        "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
+        "machine": machine(), "date": date.today().isoformat(),
+    }  # fmt: skip
+
+
+def add(options: argparse.Namespace) -> None:
+    """Train on every clip and store what was said, in place of an earlier command of the same kind."""
+    rows = read_json(FILE, "python docs/make.py bench.waiting")["rows"] if FILE.exists() else []
+    words = ["--preset", options.preset, "--seed", str(options.seed)]
+    words += ["--lpips", str(options.lpips)] if options.lpips else []
+    words += ["--iterations", str(options.iterations)] if options.iterations else []
+    with tempfile.TemporaryDirectory() as root:
+        for clip in options.clips:
+            row = heard(clip, words, options.wall, Path(root) / "speed.json")
+            key = ("clip", "preset", "iterations", "seed", "clock")
+            rows = [other for other in rows if any(other[k] != row[k] for k in key)] + [row]
+            write_json(FILE, {"rows": sorted(rows, key=lambda r: [str(r[k]) for k in key])})
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("what", choices=["add"], nargs="?")
+    parser.add_argument("clips", type=Path, nargs="*", help="sequence folders")
+    parser.add_argument("--preset", default="quick")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--iterations", type=int, help="exact length (default: that of the preset on the clip)")
+    parser.add_argument("--lpips", type=Path, help="AlexNet LPIPS weights")
+    parser.add_argument("--wall", action="store_true", help="time on the wall, with all threads")
+    options = parser.parse_args(words)
+    if options.what and not options.clips:
+        parser.error("add needs sequence folders")
+    if options.what:
+        add(options)
+    result = read_json(FILE, "python docs/make.py bench.waiting add CLIP")
+    draw(result["rows"], PICTURE)
+    write_marked(PAGE, parts(result), "waiting")

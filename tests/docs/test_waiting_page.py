@@ -1,0 +1,47 @@
+"""docs/bench.md: what trainings said about their time is what the record holds, and it held."""
+
+import json
+import time
+from types import SimpleNamespace
+
+import pytest
+from pages.bench import waiting, waiting_text
+
+RECORD = json.loads(waiting.FILE.read_text(encoding="utf-8"))
+
+
+def test_the_committed_tables_are_what_the_record_says():
+    page = waiting.PAGE.read_text(encoding="utf-8")
+    for text in waiting_text.parts(RECORD).values():
+        assert text in page
+
+
+@pytest.mark.parametrize("row", RECORD["rows"], ids=waiting_text.named)
+def test_the_recorded_forecasts_hold_within_15_percent(row):
+    """The first line too, if the speed of the machine was measured; no time left rises by more than a tenth."""
+    for when in ("start", "forecast", "minute"):
+        said = row["said"].get(when)
+        if said is None or said.get("speed") == "assumed":
+            continue
+        left = row["whole"] - said["at"]
+        assert abs(said["left"] - left) <= 0.15 * left, when
+    assert row["largest_rise"] <= 0.1
+
+
+def test_what_is_excluded_takes_no_time(monkeypatch):
+    clock = SimpleNamespace(now=10.0)
+    monkeypatch.setattr(
+        waiting, "time", SimpleNamespace(perf_counter=lambda: clock.now, process_time=time.process_time)
+    )
+    watch = waiting.Watch(wall=True)
+    clock.now = 13.0
+    with watch.excluded():
+        clock.now = 20.0
+    clock.now = 21.0
+    assert watch.now() == 4.0
+
+
+def test_a_forecast_is_compared_with_what_was_left():
+    row = {"whole": 210.0, "said": {"start": {"at": 10.0, "left": 150.0}}}
+    assert waiting_text.told(row, "start") == "2:30 of 3:20 (-25%)"
+    assert waiting_text.told(row, "minute") == "-"
