@@ -113,6 +113,7 @@ def made(folder: Path) -> dict[str, Path]:
     (folder / "poses.txt").write_text("\n".join(lines) + "\n")
     (folder / "K.txt").write_text("100 0 63 0 101 46 0 0 1")
     write(folder / "a.mkv", [picture(i) for i in range(FRAMES)])
+    write(folder / "right.mkv", [np.roll(picture(i), -5, axis=1) for i in range(FRAMES)])
     colmap(folder / "colmap", binary=False, frames=FRAMES)
     found |= {name: folder / name for name in ("pair", "mask", "more", "depth", "colmap")}
     return found
@@ -129,7 +130,7 @@ def prepare_options(folder: Path) -> dict[str, list[str]]:
         "drop": ["2"], "crop": ["8", "8", "32", "32"], "unite-masks": [str(folder / "more")], "rate": ["12"],
         "source-rate": ["50"], "orientation": ["stored"], "scale": ["0.5"], "gaps": ["drop"], "pictures": ["jpg"],
         "also": ["nerfstudio"], "layout": ["auto"],
-        "model": ["sparse/0"],
+        "model": ["sparse/0"], "right": [str(folder / "right.mkv")],
     }  # fmt: skip
     return {name: [f"--{name}", *words] for name, words in values.items()}
 

@@ -32,6 +32,8 @@ class PrepareOptions:
     """layout of the source instead of the detected one"""
     stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
     """stereo pairs in one picture: side_by_side = left picture on the left, stacked = left picture on top"""
+    right: Annotated[Path | None, Option("PATH")] = None
+    """right view of a pair: a second video, or a folder of pictures"""
     camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
     """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
@@ -41,7 +43,7 @@ class PrepareOptions:
     baseline: float | None = None
     """baseline of an already rectified pair, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
-    """poses in TUM format: stamp tx ty tz qx qy qz qw"""
+    """poses: stamp tx ty tz qx qy qz qw as TUM and EuRoC have them, matrices of KITTI, or .npy"""
     trajectory_direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
     """direction of the poses"""
     trajectory_axes: Literal["opencv", "opengl", "llff"] | None = None
@@ -50,8 +52,8 @@ class PrepareOptions:
     """unit of the positions (TUM and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one per frame, or one file for all frames"""
-    excluded_value: Literal["white", "black"] = "white"
-    """excluded value of these masks; white = above half of the largest value"""
+    excluded_value: Literal["white", "black", "nonzero"] = "white"
+    """excluded value of these masks; white = above half of the largest value, nonzero = the numbers of objects"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
     """depth of every frame: png, tiff, npy or pfm"""
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
@@ -165,7 +167,7 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
     from endotsr.clips.sequences.source_options import SourceOptions
 
     same = (
-        "layout", "stereo", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
+        "layout", "stereo", "right", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
         "excluded_value", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation", "model",
     )  # fmt: skip
     return SourceOptions(

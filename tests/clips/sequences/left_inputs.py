@@ -1,5 +1,6 @@
 """Rows of `inputs_tried.py` about folders as other programs leave them: models, pairs, copies, trajectories, marks."""
 
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -8,13 +9,27 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import raw_sources
-from input_kinds import Row, close, depth_is_true, folder_of, prepare, video
+from input_kinds import (
+    Row,
+    centred,
+    close,
+    depth_is_true,
+    files,
+    folder_of,
+    half_excluded,
+    mask,
+    masked,
+    prepare,
+    public,
+    video,
+)
 from made_videos import HEIGHT, WIDTH, picture, pictures, write
 from raw_sources import scene_picture
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
+from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 FRAMES = 6
@@ -240,4 +255,163 @@ def points_of_scared(folder: Path) -> list[str]:
 
 
 DEPTH_ROWS = [Row("depth, points x y z of SCARED", points_of_scared, "right", "", depth_is_true)]
-LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS, *COPY_ROWS, *CLOCK_ROWS, *DEPTH_ROWS]
+MOVED = [np.roll(shown, -5, axis=1) for shown in pictures()]
+
+
+def two_videos(*words: str, names=("left.mkv", "right.mkv"), right=MOVED):
+    """A folder with a video of each camera."""
+
+    def make(folder: Path) -> list[str]:
+        (folder / "clip").mkdir()
+        for name, frames in zip(names, (pictures(), right)):
+            write(folder / "clip" / name, frames, codec="ffv1", layout="bgr0")
+        return prepare("clip", "--baseline", "4", *words)(folder)
+
+    return make
+
+
+def second_video(folder: Path) -> list[str]:
+    two_videos(names=("a.mkv", "b.mkv"))(folder)
+    return prepare("clip/a.mkv", "--right", str(folder / "clip/b.mkv"), "--baseline", "4")(folder)
+
+
+def second_folder(folder: Path) -> list[str]:
+    for name, frames in (("one", pictures()), ("other", MOVED)):
+        files(folder, name, frames)
+    return prepare("one", "--right", str(folder / "other"), "--baseline", "4")(folder)
+
+
+def pair_of_folders(left: str, right: str):
+    def make(folder: Path) -> list[str]:
+        (folder / "clip").mkdir()
+        files(folder / "clip", left, pictures())
+        files(folder / "clip", right, MOVED)
+        return prepare("clip", "--baseline", "4")(folder)
+
+    return make
+
+
+def pairs_kept(folder: Path) -> bool:
+    found = describe(folder / "o")
+    both = [next(found.pictures([i])) for i in range(found.count)]
+    return len(both) == 12 and all(
+        (pair.left == one).all() and (pair.right == other).all() for pair, one, other in zip(both, pictures(), MOVED)
+    )
+
+
+def renamed_video(name: str, **how):
+    """A video under a name that does not end like one."""
+
+    def make(folder: Path) -> list[str]:
+        write(folder / f"a.{how.pop('kind')}", pictures(), **how)
+        next(folder.glob("a.*")).rename(folder / name)
+        return prepare(name)(folder)
+
+    return make
+
+
+PAIR_ROWS = [
+    Row("stereo, two videos in a folder", two_videos(), "right", "", pairs_kept),
+    Row("stereo, two videos of unlike length", two_videos(right=MOVED[:9]), "refused", "count 9, of left.mkv 12"),
+    Row("stereo, --right with a video", second_video, "right", "", pairs_kept),
+    Row("stereo, --right with a folder", second_folder, "right", "", pairs_kept),
+    Row("stereo, left_frames/ and right_frames/", pair_of_folders("left_frames", "right_frames"), "right", "",
+        pairs_kept),
+    Row("stereo, left_rectified/ and right_rectified/", pair_of_folders("left_rectified", "right_rectified"), "right",
+        "", pairs_kept),
+    Row("video of a recorder, .VOB", renamed_video("A.VOB", kind="mpg", codec="mpeg2video", options={"b": "4000000"}),
+        "right", "", close(pictures())),
+    Row("video without an ending", renamed_video("recording", kind="mkv"), "right", "", close(pictures())),
+    Row("video, .flv", renamed_video("a.flv", kind="flv"), "right", "", close(pictures())),
+]  # fmt: skip
+
+
+def matrices(folder: Path) -> np.ndarray:
+    """The true camera-to-world matrices (n, 3, 4) of a clip of a moving scope."""
+    moving(folder)
+    true = np.load(folder / "true.npy").reshape(-1, 3, 5)
+    return np.concatenate([true[:, :, :3] * [1.0, -1.0, -1.0], true[:, :, 3:4]], axis=2)
+
+
+def with_poses(name: str, rows, write_rows):
+    """Pictures and depth of a moving scope with its trajectory in another form."""
+
+    def make(folder: Path) -> list[str]:
+        write_rows(folder / name, rows(matrices(folder)))
+        clip = folder / "clip"
+        lens = ("--camera", *map(str, lens_of(clip)))
+        words = ["--trajectory", str(folder / name), "--trajectory-unit", "mm", "--depth", str(clip / "depth")]
+        return prepare("clip/images", *words, camera=lens)(folder)
+
+    return make
+
+
+def lens_of(clip: Path) -> tuple[float, ...]:
+    focal = float(np.load(clip / "poses_bounds.npy")[0, 14])
+    return focal, focal, 80.0, 64.0
+
+
+def kitti(found: np.ndarray) -> np.ndarray:
+    return found.reshape(len(found), 12)
+
+
+def squared(found: np.ndarray) -> np.ndarray:
+    last = np.broadcast_to(np.array([[[0.0, 0, 0, 1]]]), (len(found), 1, 4))
+    return np.concatenate([found, last], axis=1)
+
+
+def euroc(found: np.ndarray) -> np.ndarray:
+    """Stamp in nanoseconds, position, quaternion w x y z."""
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(found[:, :, :3]).as_quat()[:, [3, 0, 1, 2]]
+    return np.column_stack([1e18 + 4e7 * np.arange(len(found)), found[:, :, 3], turns])
+
+
+def with_head(path: Path, rows: np.ndarray) -> None:
+    np.savetxt(path, rows, delimiter=",", header="timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z", comments="")
+
+
+TRAJECTORY_ROWS = [
+    Row("trajectory of KITTI", with_poses("kitti.txt", kitti, np.savetxt), "told", "positions in mm", true_poses),
+    Row("trajectory, npy of 4x4 matrices", with_poses("poses.npy", squared, np.save), "told", "positions in mm",
+        true_poses),
+    Row("trajectory of EuRoC, w x y z by a head line without a mark", with_poses("data.csv", euroc, with_head), "told",
+        "positions in mm", true_poses),
+    Row("trajectory of KITTI, a pose missing", with_poses("kitti.txt", lambda m: kitti(m)[1:], np.savetxt), "refused",
+        "13 poses without stamps for 14 frames"),
+]  # fmt: skip
+
+
+def objects(i: int) -> np.ndarray:
+    """Numbers of two instruments: 1 and 2."""
+    return mask(1) + mask(1) * (np.arange(WIDTH) < 20).astype(np.uint8)
+
+
+def with_backslashes(raw: Path) -> None:
+    file = raw / "transforms.json"
+    file.write_text(file.read_text().replace("./images/", ".\\\\images\\\\"))
+
+
+def as_blender(raw: Path) -> None:
+    """Field of view in place of the focal length, no endings, transforms_train.json."""
+    file = raw / "transforms.json"
+    frames = json.loads(file.read_text().replace(".png", ""))["frames"]
+    kept = [{key: frame[key] for key in ("file_path", "transform_matrix")} for frame in frames]
+    (raw / "transforms_train.json").write_text(
+        json.dumps({"camera_angle_x": float(2 * np.arctan(0.64)), "frames": kept})
+    )
+    file.unlink()
+
+
+OTHER_ROWS = [
+    Row("masks, numbers of objects, --excluded-value nonzero", masked([objects(0)] * 12, "--excluded-value", "nonzero"),
+        "right", "", half_excluded),
+    Row("nerfstudio, separators of Windows", public("nerfstudio", change=with_backslashes), "told",
+        "unit of lengths unknown", centred),
+    Row("nerfstudio, --trajectory-unit", public("nerfstudio", "--trajectory-unit", "m"), "told", "unit of lengths m",
+        lambda folder: read_sequence_file(folder / "o").unit == "mm"),
+    Row("Blender, transforms_train.json", public("nerfstudio", change=as_blender), "told", "transforms_train.json",
+        lambda folder: np.isclose(read_sequence_file(folder / "o").camera.fx, 100)),
+]  # fmt: skip
+LEFT_ROWS = [*COLMAP_ROWS, *POSE_ROWS, *COPY_ROWS, *CLOCK_ROWS, *DEPTH_ROWS, *PAIR_ROWS, *TRAJECTORY_ROWS, *OTHER_ROWS]

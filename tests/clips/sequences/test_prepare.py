@@ -275,7 +275,7 @@ WRONG = {
     "principal point": (lambda p: None, {"camera": (60, 60, 900, 20)}, "principal point"),
     "odd halves": (lambda p: None, {"camera": CAMERA, "stereo": "side_by_side"}, "63x48 pixels: a side_by_side pair"),
     "no mask of these numbers": (lambda p: masks(p, "m90", "m91"), {"camera": CAMERA}, "no file has the number"),
-    "trajectory": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 0 1"), {"camera": CAMERA}, "line 1: allowed: 8"),
+    "trajectory": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 1"), {"camera": CAMERA}, "line 1: allowed: 8"),
     "quaternion": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 0 0 2"), {"camera": CAMERA}, "has length 2"),
     "trajectory empty": (lambda p: (p / "t.txt").write_text("# x\n"), {"camera": CAMERA}, "holds no pose"),
     "stamp twice": (lambda p: (p / "t.txt").write_text("0 0 0 0 0 0 0 1\n" * 2), {"camera": CAMERA}, "line 2: .*twice"),

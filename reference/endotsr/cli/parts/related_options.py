@@ -27,6 +27,8 @@ PREPARE = (
     Needs(("excluded-value",), ("masks", "unite-masks"), "it describes the masks of these files"),
     Needs(("depth-unit", "depth-scale", "trust-depth"), ("depth",), "it describes the depth of these files"),
     Needs(("points",), ("layout=colmap", "layout=points"), "only a reconstruction has points"),
+    Needs(("right",), ("layout=video", "layout=pictures"), "the other layouts have their own right pictures, or none"),
+    Excludes(("right",), ("stereo=side_by_side", "stereo=stacked"), "each picture would hold two views already"),
     Needs(("model",), ("layout=colmap",), "only COLMAP leaves several models"),
     Excludes(
         ("source-rate",),

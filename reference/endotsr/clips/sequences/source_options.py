@@ -16,13 +16,14 @@ class SourceOptions:
     camera: tuple[float, ...] | None = None  # fx fy cx cy, pixel edges at integers
     distortion: tuple[float, ...] = ()
     calibration: Path | None = None  # a file in one of `calibration_formats.FORMATS`
+    right: Path | None = None  # right view: a video, or a folder of pictures
     baseline: float | None = None  # of a rectified pair, in `unit`
     trajectory: Path | None = None  # TUM: time or frame, position, quaternion x y z w
     direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
     axes: Literal["opencv", "opengl", "llff"] | None = None  # of the camera; None: those of the layout
     trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None  # None: the unit of the layout
     masks: Path | None = None
-    excluded_value: Literal["white", "black"] = "white"
+    excluded_value: Literal["white", "black", "nonzero"] = "white"
     depth: Path | None = None
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     depth_scale: float = 1.0

@@ -95,10 +95,17 @@ def masks_of(files: list[Path | None], excluded_value: str, width: int, height: 
         path = files[i]
         if path is None:
             return None
-        plane = grey_plane(read_picture(path), path)
+        pixels = read_picture(path)
+        if excluded_value == "nonzero":  # numbers or colours of objects
+            numbered = pixels.reshape(*pixels.shape[:2], -1).any(axis=2)
+            return nearest_pixels(~numbered, width, height, path)
+        plane = grey_plane(pixels, path)
         values = np.unique(plane)
         if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT_FRACTION:
-            raise InputError(f"{path}: {len(values)} different values: this is not a mask; allowed: two values")
+            raise InputError(
+                f"{path}: {len(values)} different values: this is not a mask; allowed: two values, or with"
+                " --excluded-value nonzero the numbers of several objects"
+            )
         white = plane > values[-1] / 2
         tissue = ~white if excluded_value == "white" else white
         return nearest_pixels(tissue, width, height, path)

@@ -1,11 +1,14 @@
-"""Trajectories in the TUM format: one line per pose, `stamp tx ty tz qx qy qz qw`; lines that begin with # are
-comments.
+"""Trajectories: one line per pose, `stamp tx ty tz qx qy qz qw` of TUM and EuRoC, or the matrices of KITTI; or .npy.
+
+Lines that begin with # are comments; a head line may state the order of the quaternion. Matrices have no stamps: one
+per frame, in order.
 
 The stamp is a time in seconds or a frame number. In: the file, its unit, direction and axes. Out: one world-to-camera
 pose per frame in millimetres or the arbitrary unit; None for frames without a pose.
 """
 
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,11 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import pose_of, scene_factor
+from endotsr.clips.sequences.depth_files import read_npy
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 
+COLUMNS = (7, 8, 12, 16)
+ALLOWED = (
+    "allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw; without stamps 7, or the 12 or 16 of a matrix, as KITTI has"
+    " them"
+)
 NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
 
 
@@ -27,6 +36,7 @@ class Trajectory(NamedTuple):
     stamps: NDArray[np.float64]  # (n,)
     poses: list[CameraPose]  # world-to-camera, OpenCV axes
     path: Path
+    stamped: bool = True  # False: the file holds one pose per frame, in order
 
     @property
     def counts_frames(self) -> bool:
@@ -43,21 +53,59 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
 
     Raises:  InputError naming the line and the reason.
     """
-    rows, lines = _rows(Path(path))
-    order = np.argsort(rows[:, 0], kind="stable")
-    rows = rows[order]
-    repeated = np.flatnonzero(np.diff(rows[:, 0]) == 0)
-    if repeated.size:
-        first = lines[order[repeated[0] + 1]]
-        raise InputError(f"{path}: line {first}: the stamp {rows[repeated[0], 0]:.12g} occurs twice")
-    poses = [_pose(row, scene_factor(unit), direction, axes) for row in rows]
-    return Trajectory(rows[:, 0].astype(np.float64), poses, Path(path))
+    rows, stamped = _stored(Path(path))
+    rows.sort(key=lambda row: row.stamp)
+    for before, row in pairwise(rows):
+        if before.stamp == row.stamp:
+            raise InputError(f"{row.where}: the stamp {row.stamp:.12g} occurs twice")
+    scale = scene_factor(unit)
+    poses = [pose_of(row.rotation, row.position * scale, direction, axes, row.where) for row in rows]
+    return Trajectory(np.array([row.stamp for row in rows], np.float64), poses, Path(path), stamped)
 
 
-def _rows(path: Path) -> tuple[FloatArray, list[int]]:
-    rows, lines, order = [], [], "xyzw"
+class _Row(NamedTuple):
+    """A pose as it is stored."""
+
+    stamp: float
+    rotation: FloatArray  # (3, 3)
+    position: FloatArray  # (3,)
+    where: str
+
+
+def _stored(path: Path) -> tuple[list[_Row], bool]:
+    """The poses of a file, and whether they have stamps; without, they count from 0. Raises InputError."""
+    lines = _array_lines(path) if path.suffix.lower() == ".npy" else _text_lines(path)
+    if not lines:
+        raise InputError(f"{path}: holds no pose; {ALLOWED}")
+    found, order = [], "xyzw"
+    sizes = {len(row) for _, row, _ in lines}
+    if len(sizes) > 1:
+        raise InputError(f"{path}: lines of {' and '.join(map(str, sorted(sizes)))} numbers; {ALLOWED}")
+    for k, (where, row, stated) in enumerate(lines):
+        order = stated or order
+        if len(row) in (12, 16):
+            matrix = np.array(row).reshape(-1, 4)[:3]
+            found.append(_Row(k, matrix[:, :3], matrix[:, 3], where))
+        else:
+            stamp, *rest = row if len(row) == 8 else [float(k), *row]
+            found.append(_Row(stamp, _rotation(rest[3:], order, where), np.array(rest[:3]), where))
+    return found, sizes == {8}
+
+
+def _array_lines(path: Path) -> list[tuple[str, list[float], str]]:
+    """The rows of an array (n, 7 | 8 | 12 | 16), (n, 3, 4) or (n, 4, 4), with their place."""
+    array = read_npy(path).astype(np.float64)
+    rows = array.reshape(len(array), -1) if array.ndim in (2, 3) and len(array) else np.zeros((0, 0))
+    if rows.shape[1] not in COLUMNS or not np.isfinite(rows).all():
+        raise InputError(f"{path}: array of shape {array.shape}; {ALLOWED}")
+    return [(f"{path}: row {i}", row, "") for i, row in enumerate(rows.tolist())]
+
+
+def _text_lines(path: Path) -> list[tuple[str, list[float], str]]:
+    """Place, numbers and stated order of the quaternion of every line; a head line may have no mark."""
+    found, order = [], ""
     for number, line in enumerate(read_text(path).splitlines(), 1):
-        words = line.replace(",", " ").split()
+        words, where = line.replace(",", " ").split(), f"{path}: line {number}"
         if not words or words[0].startswith("#"):
             order = _stated_order(line) or order
             continue
@@ -65,30 +113,28 @@ def _rows(path: Path) -> tuple[FloatArray, list[int]]:
             row = [float(word) for word in words]
         except ValueError:
             row = []
-        if len(row) != 8 or not np.isfinite(row).all():
-            raise InputError(f"{path}: line {number}: allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw")
-        if abs(np.linalg.norm(row[4:]) - 1) > NORM_TOLERANCE:
-            raise InputError(
-                f"{path}: line {number}: the quaternion has length {np.linalg.norm(row[4:]):.4g}; allowed: 1,"
-                " in the order x y z w"
-            )
-        rows.append(row[:4] + [row[4 + order.index(axis)] for axis in "xyzw"])
-        lines.append(number)
-    if not rows:
-        raise InputError(f"{path}: holds no pose; allowed: lines of 8 numbers, stamp tx ty tz qx qy qz qw")
-    return np.array(rows), lines
+        if not row and not found and _stated_order(line):
+            order = _stated_order(line)
+            continue
+        if len(row) not in COLUMNS or not np.isfinite(row).all():
+            raise InputError(f"{where}: {ALLOWED}")
+        found.append((where, row, order))
+    return found
+
+
+def _rotation(quaternion: list[float], order: str, where: str) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
+    length = np.linalg.norm(quaternion)
+    if abs(length - 1) > NORM_TOLERANCE:
+        raise InputError(f"{where}: the quaternion has length {length:.4g}; allowed: 1, in the order x y z w")
+    return Rotation.from_quat([quaternion[order.index(axis)] for axis in "xyzw"]).as_matrix()
 
 
 def _stated_order(line: str) -> str:
     """The order of the quaternion that a head line states, such as `q_w, q_x, q_y, q_z`; "" without one."""
     found = re.findall(r"\bq\w*?_?([wxyz])\b", line)
     return "".join(found) if sorted(found) == list("wxyz") else ""
-
-
-def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> CameraPose:
-    from scipy.spatial.transform import Rotation
-
-    return pose_of(Rotation.from_quat(row[4:]).as_matrix(), row[1:4] * scale, direction, axes)
 
 
 def poses_of_frames(
@@ -104,6 +150,10 @@ def poses_of_frames(
     Raises:  InputError if the stamps are times and the frame rate is unknown.
     """
     stamps = trajectory.stamps
+    if not trajectory.stamped and len(stamps) != count:
+        raise InputError(
+            f"{trajectory.path}: {len(stamps)} poses without stamps for {count} frames; allowed: one pose per frame"
+        )
     if trajectory.counts_frames and stamps[-1] < count:
         found: list[CameraPose | None] = [None] * count
         for stamp, pose in zip(stamps, trajectory.poses):

@@ -24,7 +24,8 @@ from endotsr.untrusted.names import plain_line
 LARGEST_FILE = 1 << 40  # bytes; a video is decoded picture by picture
 # First bytes of the containers. The extension is not sufficient: a decoder would follow a play list.
 STARTS = {
-    0: (b"RIFF", b"\x1aE\xdf\xa3", b"\0\0\1", b"G", b"0&\xb2u"),  # avi, mkv and webm, mpeg, ts, wmv
+    # avi, mkv and webm, mpeg and vob, raw H.264, ts, wmv, flv, mxf, dv
+    0: (b"RIFF", b"\x1aE\xdf\xa3", b"\0\0\1", b"\0\0\0\1", b"G", b"0&\xb2u", b"FLV", b"\x06\x0e+4", b"\x1f\x07\0"),
     4: (b"G", b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot"),  # m2ts; mp4 and mov
 }
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".wmv")
@@ -54,6 +55,24 @@ class VideoFacts(NamedTuple):
     def times(self) -> NDArray[np.float64] | None:
         """(count,) seconds from the first picture, ascending; None: unknown."""
         return self.clock.times
+
+
+def is_video(path: Path) -> bool:
+    """Whether a file is a video by its ending, or by its first bytes; a file that is not a regular one is none."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() in VIDEO_ENDINGS:
+        return True
+    try:
+        with open_regular(path, LARGEST_FILE) as file:
+            begin = file.read(189)
+    except (OSError, InputError):
+        return False
+    if begin.startswith(b"RIFF"):
+        return begin[8:12] == b"AVI "  # other files, such as WebP, begin alike
+    if begin.startswith(b"G"):
+        return begin[188:] == b"G"  # packets of a transport stream
+    return any(begin.startswith(starts, place) for place, starts in STARTS.items())
 
 
 def video_facts(path: Path) -> VideoFacts:

@@ -39,7 +39,8 @@ def recognises(path: Path) -> bool:
 def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. An invalid part is among its faults; an invalid pose is a gap."""
     settings = options.settings or SequenceConfig(
-        masks=MASKS if (path / MASKS).is_dir() else "none", excluded_value=options.excluded_value
+        masks=MASKS if (path / MASKS).is_dir() else "none",
+        excluded_value="black" if options.excluded_value == "black" else "white",
     )
     if path.is_file():
         raise InputError(f"{path}: is a file; allowed: a folder with images/, depth/, {settings.masks}/ and poses")

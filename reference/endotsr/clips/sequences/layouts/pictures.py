@@ -28,6 +28,7 @@ from endotsr.clips.sequences.sources import (
 from endotsr.errors import InputError
 
 PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
+         ("left_frames", "right_frames"), ("left_rectified", "right_rectified"),
          ("Left", "Right"), ("cam0", "cam1"), ("image01", "image02"))  # fmt: skip
 SIDE = re.compile(r"(?:^|[-_. ])(left|right|l|r)(?:[-_. ]|$)|(?<=\d)(l|r)$", re.IGNORECASE)  # in the stem of a name
 
@@ -78,6 +79,11 @@ def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
 def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     """The pictures as a clip. Raises InputError."""
     left, right = find_pictures(path)
+    if options.right is not None:
+        if right:
+            raise InputError(f"{path}: has right pictures, and --right names others; allowed: one of them")
+        right = files_of(options.right, PICTURE_ENDINGS)
+        check_pairing(left, right)
     stereo = "none" if options.stereo == "auto" else options.stereo
     if right and stereo != "none":
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")

@@ -1,6 +1,10 @@
-"""A video file: one picture per frame, or stereo pairs side by side or stacked."""
+"""A video file: one picture per frame, or stereo pairs side by side, stacked, or in a second video.
+
+A folder with two videos whose names state their sides, such as left.mp4 and right.mp4, is a pair as well.
+"""
 
 from collections.abc import Iterator
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
+from endotsr.clips.sequences.layouts.pictures import SIDE
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     halves,
@@ -18,31 +23,47 @@ from endotsr.clips.sequences.sources import (
     stated_poses,
     unit_of,
 )
-from endotsr.clips.sequences.video_file import VIDEO_ENDINGS, VideoFacts, video_facts, video_pictures
+from endotsr.clips.sequences.video_file import VideoFacts, is_video, video_facts, video_pictures
 from endotsr.errors import InputError
+
+SAME_RATE = 0.01  # relative difference of the frame rates of two videos of a pair
 
 
 def recognises(path: Path) -> bool:
-    """Whether a path is a file with the ending of a video."""
-    return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
+    """Whether a path is a video, or a folder with one of the left and one of the right camera."""
+    return is_video(path) or _sides(path) is not None
+
+
+def _sides(path: Path) -> tuple[Path, Path] | None:
+    """The left and the right video of a folder; None unless it has two videos whose names state their sides."""
+    files = [file for file in sorted(path.iterdir()) if is_video(file)] if path.is_dir() else []
+    found = {(side[1] or side[2])[0].lower(): file for file in files if (side := SIDE.search(file.stem))}
+    return (found["l"], found["r"]) if len(files) == 2 and set(found) == {"l", "r"} else None
 
 
 def describe_video(path: Path, options: SourceOptions) -> Clip:
     """The video as a clip. Raises InputError."""
+    path, right = _sides(path) or (path, options.right)
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
     stereo = "none" if options.stereo == "auto" else options.stereo
     width, height = halves(across, down, stereo)
+    if right is not None:
+        _check_right(facts, video_facts(right), path, right)
     rate, times = _clock(facts, options, path)
     camera = stated_camera(options, width, height, path)
     notes = _notes(facts, rate, path) + _turn_notes(facts, quarters, options, path)
     poses, note = stated_poses(options, facts.count, rate, times)
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
-        for i, picture in zip(wanted, video_pictures(path, wanted)):
+        others = video_pictures(right, wanted) if right else repeat(None)
+        for i, picture, other in zip(wanted, video_pictures(path, wanted), others):
             turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
-            yield split_pair(turned, stereo, f"{path}: picture {i}")
+            if other is None:
+                yield split_pair(turned, stereo, f"{path}: picture {i}")
+            else:
+                yield PicturePair(turned, np.ascontiguousarray(np.rot90(other, quarters)))
 
     return Clip(
         layout="video",
@@ -60,6 +81,19 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         times=times,
         notes=[*notes, *camera.notes, *note],
     )
+
+
+def _check_right(left: VideoFacts, right: VideoFacts, path: Path, other: Path) -> None:
+    """Raises InputError unless the pictures of two videos are pairs."""
+    rates = [facts.clock.rate or 0.0 for facts in (left, right)]
+    compared = [(name, getattr(left, name), getattr(right, name))
+                for name in ("count", "width", "height", "turn", "interlaced")]  # fmt: skip
+    if abs(rates[1] - rates[0]) > SAME_RATE * rates[0]:
+        compared.append(("pictures a second", *rates))
+    for name, here, there in compared:
+        if here != there:
+            said = f"{name} {there:g}, of {path.name} {here:g}"
+            raise InputError(f"{other}: {said}; allowed: the right view of each picture")
 
 
 def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float | None, NDArray[np.float64] | None]:
