@@ -97,8 +97,8 @@ def masks_of(files: list[Path | None], excluded_value: str, width: int, height: 
             return None
         pixels = read_picture(path)
         if excluded_value == "nonzero":  # numbers or colours of objects
-            numbered = pixels.reshape(*pixels.shape[:2], -1).any(axis=2)
-            return nearest_pixels(~numbered, width, height, path)
+            numbered = np.atleast_3d(pixels).max(axis=2) > 0
+            return nearest_pixels(np.logical_not(numbered), width, height, path)
         plane = grey_plane(pixels, path)
         values = np.unique(plane)
         if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT_FRACTION:

@@ -89,7 +89,7 @@ def _check_right(left: VideoFacts, right: VideoFacts, path: Path, other: Path) -
     compared = [(name, getattr(left, name), getattr(right, name))
                 for name in ("count", "width", "height", "turn", "interlaced")]  # fmt: skip
     if abs(rates[1] - rates[0]) > SAME_RATE * rates[0]:
-        compared.append(("pictures a second", *rates))
+        compared.append(("pictures a second", rates[0], rates[1]))
     for name, here, there in compared:
         if here != there:
             said = f"{name} {there:g}, of {path.name} {here:g}"
