@@ -1,0 +1,53 @@
+"""Write the tables of the fields of file formats and of related options in docs/guides/prepare.md.
+
+    python docs/make.py recordings.inventories
+
+The tables are the inventories beside the readers and the relations of the commands; nothing is measured.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from endotsr.cli.parts.related_options import RELATIONS
+from endotsr.cli.parts.relations import Needs, shown
+from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.sequences.inventory import Inventory
+from endotsr.clips.sequences.layouts.nerfstudio import FIELDS, FRAME_FIELDS
+from endotsr.results.report.tables import markdown
+from pages.store.marks import write_marked
+
+PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
+INVENTORIES = (FIELDS, FRAME_FIELDS, KALIBR, ROS, OPENCV, INI)
+COMMANDS = ("prepare", "depth", "render", "export")  # of `train`, most related options are settings
+
+
+def fields(inventories: tuple[Inventory, ...] = INVENTORIES) -> str:
+    """Every listed field of every format: used, refused or harmless."""
+    rows = []
+    for inventory in inventories:
+        for use in ("used", "refused", "harmless"):
+            for names, text in getattr(inventory, use).items():
+                rows.append([inventory.about, _code(names.split()), use, text.replace("|", "/")])
+    return markdown(("Format", "Field", "Use", "Meaning or reason"), rows)
+
+
+def options() -> str:
+    """Every relation of the options of `COMMANDS`."""
+    rows = []
+    for command in COMMANDS:
+        for relation in RELATIONS[command]:
+            how = "needs one of" if isinstance(relation, Needs) else "excludes"
+            rows.append(
+                [command, _code(map(shown, relation.first)), how, _code(map(shown, relation.second)), relation.why]
+            )
+    return markdown(("Command", "Option", "Relation", "Other option", "Reason"), rows)
+
+
+def _code(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def main(words: list[str]) -> int:
+    """Rewrite both tables."""
+    write_marked(PAGE, {"fields": fields(), "options": options()}, "inventories")
+    return 0
