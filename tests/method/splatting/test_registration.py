@@ -57,6 +57,26 @@ def test_a_row_of_the_jacobian_is_the_gradient_by_a_correction_of_the_pose():
         np.testing.assert_allclose(np.append(found.d_rotation_vector, found.d_offset), rows[:, k], rtol=1e-10)
 
 
+@pytest.mark.parametrize("name", ["rotation", "translation", "points", "reference"])
+def test_the_gradients_are_the_differences_of_the_residuals(name):
+    rng = np.random.default_rng(2)
+    picture = rng.normal(size=(16, 20))
+    turn, shift, _ = pose_forward(np.eye(3), np.zeros(3), np.array([0.1, -0.05, 0.2]), np.array([0.4, -0.2, 0.7]))
+    points = turn.T @ (points_at(rng.uniform(3, 16, 6), rng.uniform(3, 12, 6), 40.0) - shift[:, None])
+    given = {"rotation": turn, "translation": shift, "points": points, "reference": rng.normal(size=6)}
+    weight = rng.normal(size=6)
+    grads = registration_reverse(weight, registration_forward(*given.values(), picture, CAMERA)[1])
+    found = np.zeros_like(given[name])
+    for at in np.ndindex(found.shape):
+        ends = []
+        for step in (1e-6, -1e-6):
+            moved = given[name].copy()
+            moved[at] += step
+            ends.append(weight @ registration_forward(*(given | {name: moved}).values(), picture, CAMERA)[0])
+        found[at] = (ends[0] - ends[1]) / 2e-6
+    np.testing.assert_allclose(getattr(grads, f"d_{name}"), found, rtol=1e-5, atol=1e-7)
+
+
 def test_shapes_are_checked():
     with pytest.raises(ValueError, match=r"points \(3, 4\) and reference \(3,\)"):
         registration_forward(np.eye(3), np.zeros(3), np.ones((3, 4)), np.ones(3), np.ones((16, 20)), CAMERA)
