@@ -165,7 +165,8 @@ def tables(result: dict[str, Any]) -> dict[str, str]:
     made = [_row(kind, size, name, runs) for (kind, size, name), runs in rows.items() if kind in KINDS]
     real = [_row(kind, "", name, runs) for (kind, _, name), runs in rows.items() if kind == "sinus_endoscopy"]
     view = [
-        [name, f"{runs[0]['left']:.2f}" if "left" in runs[0] else "-", f"{runs[0]['seconds']:.2f}"]
+        [name, f"{runs[0]['left']:.2f}" if "left" in runs[0] else "-", f"{runs[0]['seconds']:.2f}",
+         f"{runs[0]['registered']} of {runs[0]['frames']}"]
         for (kind, _, name), runs in rows.items() if kind == "surgt_davinci"
     ]  # fmt: skip
     head = [
@@ -180,7 +181,7 @@ def tables(result: dict[str, Any]) -> dict[str, str]:
     return {
         "simulated": markdown(head, made) + "\n\n" + about,
         "sinus": markdown(["Clip", "Method", "error", *head[3:4], "step", *head[5:-1]], [row[:-1] for row in real]),
-        "davinci": markdown(["Method", "pixels of the flow left", "s per frame"], view),
+        "davinci": markdown(["Method", "pixels of the flow left", "s per frame", "registered"], view),
     }
 
 
