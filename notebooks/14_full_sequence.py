@@ -519,7 +519,7 @@ assert found["model"] > found["blend"] + 4 > found["copy"] + 6
 # Users need none of these internals. `import endotsr` is enough: the same training with a callback, a picture at a time
 # between two frames, the metrics of the held-out frames, and a run folder for the commands.
 
-# %%
+# %% tags=["open"]
 import tempfile
 
 import endotsr

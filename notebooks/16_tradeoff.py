@@ -195,27 +195,31 @@ def timed_picture(precision, raster):
 
 nothing_lost = CLOSE._replace(alpha_cutoff=1e-14, transmittance_stop=0.0)
 full_size, _ = timed_picture("float64", nothing_lost)
-print("largest error by the stop, 1/255")
-print("alpha_max   stop     error    stop / (1 - alpha_max)")
+lines = [
+    "alpha_max  stop   error, 1/255  bound, 1/255",
+    "---------  -----  ------------  ------------",
+]
 for alpha_max in (1 - 2**-20, 0.999, 0.99):
     whole, _ = timed_picture("float64", nothing_lost._replace(alpha_max=alpha_max))
     for stop in (1e-2, 1e-4, 1e-6):
         raster = nothing_lost._replace(alpha_max=alpha_max, transmittance_stop=stop)
         lost = 255 * np.abs(timed_picture("float64", raster)[0] - whole).max()
         bound = 255 * min(1.0, stop / (1 - alpha_max))
-        print(f"{alpha_max:<10.7g}  {stop:g}  {lost:8.3f}  {bound:8.3f}")
+        lines.append(f"{alpha_max:<9.6g}  {stop:<5.0e}  {lost:<12.3f}  {bound:<12.3f}")
         assert lost < 1.7 * bound, "colours of this scene reach 1.6"
         if alpha_max > 0.9999 and stop == 1e-4:
             assert lost > 50, "the failure"
         if alpha_max == 0.99 and stop == 1e-6:
             assert lost < 0.03, "the repair"
+print("\n".join(lines))
 
 # %% [markdown]
-# A stop of $10^{-4}$ loses a quarter of the range of colours at some pixels. The Gaussian before which a pixel ends may be
-# the opaque one that fills it: with $\alpha=0.9999$ and $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the
-# weight $\alpha T_k$ is lost. In general $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. So the clamp
-# $\alpha_{\max}=0.99$ of the preset `paper` is what makes its stop harmless: at most a hundred times
-# $T_{\mathrm{stop}}$ is lost. Whoever raises one of the two has to lower the other.
+# The bound is $T_{\mathrm{stop}}/(1-\alpha_{\max})$ of the range of colours. A stop of $10^{-4}$ loses a quarter of that range
+# at some pixels. The Gaussian before which a pixel ends may be the opaque one that fills it: with $\alpha=0.9999$ and
+# $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the weight $\alpha T_k$ is lost. In general
+# $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. So the clamp $\alpha_{\max}=0.99$ of the preset `paper` is
+# what makes its stop harmless: at most a hundred times $T_{\mathrm{stop}}$ is lost. Whoever raises one of the two has to
+# lower the other.
 #
 # ## The front of settings
 #
@@ -258,8 +262,9 @@ axis.loglog(
 axis.axhline(0.5, color="0.5", ls="--", lw=1)
 axis.annotate(
     "half a step of 8 bit",
-    (0, 0.5),
+    (1, 0.5),
     xycoords=("axes fraction", "data"),
+    ha="right",
     va="bottom",
     color="0.4",
 )
