@@ -3,6 +3,7 @@
 import ast
 import inspect
 import re
+from importlib import import_module
 from typing import Any
 
 from book_map import equations
@@ -138,9 +139,16 @@ def skip(app: Sphinx, what: str, name: str, found: Any, skipped: bool, options: 
     return True if is_field else None
 
 
+def module_of_source(app: Sphinx | None, module: str, name: str) -> str | None:
+    """The documented module of an alias such as `dict[str, float]`, whose module is `builtins`; None for others."""
+    found = getattr(import_module(module), name.partition(".")[0], None)
+    return None if str(getattr(found, "__module__", "")).startswith("endotsr") else module
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("docstring", DocstringDirective)
     app.connect("builder-inited", write_api)
     app.connect("autodoc-process-docstring", process)
     app.connect("autodoc-skip-member", skip)
+    app.connect("viewcode-follow-imported", module_of_source)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -30,3 +30,9 @@ def test_names_of_the_package_in_a_page_are_defined_where_the_page_says(file):
     public = {*api_pages.definitions()}
     named = {*ROLE.findall(file.read_text(encoding="utf-8"))} - {*api_pages.modules()}
     assert {name for name in named if name not in public and name.rpartition(".")[0] not in public} == set()
+
+
+def test_an_alias_of_a_builtin_has_its_source_where_it_is_documented():
+    records = "endotsr.results.evaluation.records"
+    assert api_pages.module_of_source(None, records, "MeasureRow") == records
+    assert api_pages.module_of_source(None, "endotsr", "Run") is None, "the module that defines the class"
