@@ -11,7 +11,10 @@ from common_folder import written
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import grown, read_png, write_png
-from endotsr.clips.sequences.carry_masks import ClipFlows, carried_once, carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import LEAST_GAIN, ClipFlows, carried_once, carry_masks, motion_of
+from endotsr.clips.simulator.frames import make_scene, simulated_frames
+from endotsr.clips.simulator.scenes import named_scene
+from endotsr.config import with_settings
 from endotsr.errors import InputError
 
 SIZE = (60, 80)
@@ -76,6 +79,38 @@ def test_an_empty_and_a_full_key_are_keys():
     assert np.all(carry_masks(still, {0: full, 2: full}).excluded)
     assert carry_masks(still, {0: empty, 2: empty}).agreement == [1.0] * 3
     assert carry_masks(still, {0: empty, 2: full}).distrusted == [1]
+
+
+def test_one_key_is_carried_to_all_frames_and_none_is_trusted():
+    motion, masks = sliding(7)
+    found = carry_masks(motion, {3: masks[3]})
+    assert all(map(np.array_equal, found.excluded, masks))
+    assert found.distrusted == [0, 1, 2, 4, 5, 6] and found.next_key in (0, 6) and found.gain == pytest.approx(3 / 7)
+
+
+def test_an_instrument_that_stops_keeps_its_place():
+    motion, masks = sliding(10)
+    for i in range(5, 9):
+        motion.forward[i][:] = motion.backward[i][:] = 0
+    true = masks[:6] + 4 * [masks[5]]
+    found = carry_masks(motion, {0: true[0], 9: true[9]})
+    assert all(map(np.array_equal, found.excluded, true)) and found.next_key is None and found.gain < LEAST_GAIN
+
+
+def test_an_instrument_is_carried_through_smoke():
+    """Copies of the nearest key miss 45 % of the instrument in the worst frame."""
+    settings = with_settings(named_scene("smoke"), width=160, height=128, frames=13)
+    frames = list(simulated_frames(make_scene(settings)))
+    true = [frame.excluded for frame in frames]
+    motion = motion_of([frame.image.transpose(1, 2, 0) for frame in frames])
+    keys = {i: true[i] for i in (0, 6, 12)}
+    found = carry_masks(motion, keys, margin=2).excluded
+    between = [i for i in range(13) if i not in keys]
+    recall = [(found[i] & true[i]).sum() / true[i].sum() for i in between]
+    lost = [(found[i] & ~true[i]).sum() / (~true[i]).sum() for i in between]
+    nearest = [true[min(keys, key=lambda k, i=i: abs(k - i))] for i in between]
+    copied = [(plane & true[i]).sum() / true[i].sum() for plane, i in zip(nearest, between, strict=True)]
+    assert min(recall) > 0.97 and max(lost) < 0.06 and min(copied) < 0.6
 
 
 def test_frames_beyond_the_keys_are_named_and_drawn_next():

@@ -12,6 +12,7 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.drawing import displacement, drawing_of, even_frames, plausible_drafts
 from endotsr.clips.sequences.drawn_masks import FORMAT, MOST_POINTS, key_masks, read_drawn
 from endotsr.clips.sequences.mask_shapes import MaskShape, filled, inside_polygon, near_line, shapes_of
+from endotsr.clips.sequences.propose_masks import Proposal
 from endotsr.errors import InputError
 
 WIDTH, HEIGHT = 50, 40
@@ -156,21 +157,27 @@ def test_the_first_page_shows_even_frames_and_a_later_one_the_next(tmp_path):
     pictures = 3 * [np.random.default_rng(0).integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)]
     colour = [np.zeros((HEIGHT, WIDTH), bool) for _ in range(3)]
     colour[0][10:20, 10:20] = colour[1][10:20, 10:20] = True
-    first = drawing_of(clip(), pictures, 2, colour)
+    border = np.zeros((HEIGHT, WIDTH), bool)
+    border[:, :8] = True
+    proposal = Proposal([plane | border for plane in colour], "", border=border)
+    first = drawing_of(clip(), pictures, 2, proposal)
+    np.testing.assert_array_equal(filled(first.never, WIDTH, HEIGHT), border)
+    assert first.frames[0].draft and filled(first.frames[0].draft.shapes, WIDTH, HEIGHT)[5:, 12:].sum() > 50
+    assert not filled(first.frames[0].draft.shapes, WIDTH, HEIGHT)[:, :8].any()
     assert [(f.frame, f.key, f.draft and f.draft.origin) for f in first.frames] == [
         (0, False, "colour"),
         (2, False, None),
     ]
     assert first.frames[0].ahead is not None and first.frames[0].back is None and first.columns == 3
     file = read(tmp_path, content(keys=[{"frame": 0, "name": "a", "shapes": [square()]}]))
-    later = drawing_of(clip(), pictures, 2, [], file)
+    later = drawing_of(clip(), pictures, 2, None, file)
     assert [(f.frame, f.key, f.draft and f.draft.origin) for f in later.frames] == [
         (0, True, None),
         (2, False, "carried"),
     ]
     for wanted in (0, 61):
         with pytest.raises(InputError, match="use 1 to 60"):
-            drawing_of(clip(), pictures, wanted, [])
+            drawing_of(clip(), pictures, wanted, None)
 
 
 def test_a_draft_that_its_neighbours_lack_is_not_offered():

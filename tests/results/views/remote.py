@@ -16,7 +16,7 @@ from typing import Any
 
 from browser import FLAGS, browser
 
-SECONDS = 60  # to wait for an answer on a loaded machine
+SECONDS = 200  # to wait for an answer on a loaded machine
 MODIFIERS = {"shift": 8, "control": 2}
 
 

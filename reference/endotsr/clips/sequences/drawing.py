@@ -22,7 +22,8 @@ from endotsr.clips.sequences.carry_masks import (
 )
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
-from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, Origin, shapes_of
+from endotsr.clips.sequences.mask_shapes import LARGEST, Origin, MaskShape, shapes_of
+from endotsr.clips.sequences.propose_masks import Proposal
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -71,13 +72,13 @@ def even_frames(count: int, wanted: int) -> list[int]:
 
 
 def drawing_of(
-    clip: Clip, pictures: Sequence[Picture], wanted: int, colour: list[BoolArray], drawn: DrawnFile | None = None
+    clip: Clip, pictures: Sequence[Picture], wanted: int, colour: Proposal | None, drawn: DrawnFile | None = None
 ) -> DrawnClip:
     """The content of the page.
 
     pictures   (H, W, 3) of all frames
     wanted     number of frames of a first page
-    colour     masks (H, W) by colour of all frames, True = instrument; empty: no drafts by colour
+    colour     masks by colour, which become drafts; the dark border of all frames is drawn as *never tissue*
     drawn      the file of an earlier page
 
     Raises:  InputError for a number of frames that is not allowed, and for pictures that are too large.
@@ -93,8 +94,9 @@ def drawing_of(
         shown, drafts = _next_frames(motion, key_masks(drawn).keys)
     else:
         shown = even_frames(len(pictures), wanted)
-        offered = plausible_drafts(motion, colour)
-        drafts = {i: Draft("colour", shapes_of(colour[i], "colour")) for i in shown if i in offered}
+        instruments = instruments_of(colour)
+        offered = plausible_drafts(motion, instruments)
+        drafts = {i: Draft("colour", shapes_of(instruments[i], "colour")) for i in shown if i in offered}
     step = max(STEP, math.ceil(width / MOST_COLUMNS))
     nodes = np.stack(np.meshgrid(np.arange(step / 2, width, step), np.arange(step / 2, height, step)))
     columns, points = nodes.shape[2], nodes.reshape(2, -1)
@@ -102,13 +104,21 @@ def drawing_of(
     for before, i, after in zip((None, *shown), shown, (*shown[1:], None)):
         ahead, back = (None if k is None else displacement(motion, i, k, points) for k in (after, before))
         frames.append(_frame(clip, pictures, i, keys.get(i), drafts.get(i))._replace(ahead=ahead, back=back))
-    return DrawnClip(len(pictures), width, height, frames, drawn.never if drawn else [], step, columns)
+    border = shapes_of(colour.border, "colour") if colour and colour.border is not None else []
+    return DrawnClip(len(pictures), width, height, frames, drawn.never if drawn else border, step, columns)
+
+
+def instruments_of(colour: Proposal | None) -> list[BoolArray]:
+    """The masks by colour (H, W) of all frames without the border of the field of view; empty without a proposal."""
+    if colour is None or colour.border is None:
+        return colour.excluded if colour else []
+    return [plane & ~colour.border for plane in colour.excluded]
 
 
 def plausible_drafts(motion: ClipFlows, colour: list[BoolArray]) -> set[int]:
     """Frames whose draft is offered: the dense flow carries it to the draft of each neighbour.
 
-    Tissue that looks like metal is marked in some frames and not in their neighbours. An instrument stays.
+    A region that is marked in one frame and not in its neighbours is hardly an instrument.
 
     Edges:   frames without marked pixels, and a clip of one frame, have no draft.
     """

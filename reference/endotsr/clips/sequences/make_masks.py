@@ -138,7 +138,7 @@ def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:
     """
     pictures = list(left_pictures(clip))
     if keys is None:
-        return drawing_of(clip, pictures, wanted, propose_masks(pictures).excluded)
+        return drawing_of(clip, pictures, wanted, propose_masks(pictures))
     height, width = pictures[0].shape[:2]
     if keys.is_dir():
         found = [
@@ -148,7 +148,7 @@ def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:
         drawn = DrawnFile(format=FORMAT, frames=clip.count, width=width, height=height, keys=found)
     else:
         drawn = read_drawn(keys, clip, width, height)
-    return drawing_of(clip, pictures, wanted, [], drawn)
+    return drawing_of(clip, pictures, wanted, None, drawn)
 
 
 def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = None) -> Proposal:

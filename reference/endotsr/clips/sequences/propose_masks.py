@@ -53,6 +53,7 @@ class Proposal(NamedTuple):
     kind: str = "proposed"  # or `carried`: how the frames that no person drew got their masks
     drawn: tuple[int, ...] = ()  # frames that a person drew
     never: BoolArray | None = None  # (H, W) True where no frame shows tissue, as drawn by a person
+    border: BoolArray | None = None  # (H, W) True outside the field of view; part of the excluded pixels
 
     @property
     def found(self) -> bool:
@@ -88,7 +89,7 @@ def propose_masks(pictures: Iterable[Picture]) -> Proposal:
     excluded = [_enlarged(plane | outside, size) for plane, size in zip(widened, sizes)]
     fraction = float(border.mean())
     said = f"field of view: {1 - fraction:.1%} of the picture, the dark border of all frames is excluded; {reason}"
-    return Proposal(excluded, said, fraction, _without_tissue(excluded, 1 - fraction))
+    return Proposal(excluded, said, fraction, _without_tissue(excluded, 1 - fraction), border=border)
 
 
 def _without_tissue(excluded: list[BoolArray], view: float) -> tuple[int, ...]:
