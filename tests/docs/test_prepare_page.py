@@ -76,7 +76,7 @@ def test_every_layout_has_its_section():
         assert f"\n## {title}\n" in text
 
 
-@pytest.mark.parametrize(("name", "tables"), [("masks_keys", ("table", "draft_table"))])
+@pytest.mark.parametrize(("name", "tables"), [("masks_keys", ("table", "draft_table")), ("masks_training", ("table",))])
 def test_a_table_of_the_guide_on_masks_is_what_its_result_says(name, tables):
     made = importlib.import_module(f"pages.recordings.{name}")
     found, text = json.loads(made.FILE.read_text(encoding="utf-8")), made.PAGE.read_text(encoding="utf-8")

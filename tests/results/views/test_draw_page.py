@@ -224,6 +224,25 @@ def test_a_draft_is_used_only_when_it_is_accepted(opened):
     assert (key.frame, key.shapes[0].origin) == (2, "colour") and "Draft" not in opened.said()
 
 
+def tinted(page: Page, folder: Path, x: float, y: float) -> bool:
+    """Whether the window shows the colour of instruments at a point of the picture."""
+    page.remote.picture(folder / "shot.png")
+    column, row = (round(value) for value in page.at(x, y))
+    red, green, _ = read_png(folder / "shot.png")[row - 2 : row + 3, column - 2 : column + 3].mean(axis=(0, 1))
+    return bool(green > red + 40)
+
+
+def test_a_mask_is_shown_on_its_own_frame_until_it_is_undone(opened, tmp_path):
+    opened.polygon((40, 40), (140, 40), (140, 100), (40, 100))
+    assert tinted(opened, tmp_path, 90, 70) and not tinted(opened, tmp_path, 200, 70)
+    opened.keys("...")
+    assert not tinted(opened, tmp_path, 90, 70)
+    opened.keys(",,,")
+    assert tinted(opened, tmp_path, 90, 70)
+    opened.keys("z")
+    assert not tinted(opened, tmp_path, 90, 70)
+
+
 def test_a_frame_without_an_instrument_is_a_key(opened):
     opened.press("none")
     (key,) = opened.saved().keys

@@ -58,9 +58,8 @@ function outline(target, points) {
   points.forEach(([x, y], i) => (i ? target.lineTo(x, y) : target.moveTo(x, y)));
 }
 function fill(layer, shapes, colour) {
+  layer.width = width;  // empties the layer and resets its state
   const target = layer.getContext("2d");
-  target.globalCompositeOperation = "source-over";
-  target.clearRect(0, 0, width, height);
   target.fillStyle = target.strokeStyle = colour;
   target.lineCap = target.lineJoin = "round";
   for (const shape of shapes) {
@@ -97,7 +96,9 @@ function paint() {
   context.imageSmoothingEnabled = view.scale < 3;
   if (pictures[at].complete && pictures[at].naturalWidth) context.drawImage(pictures[at], 0, 0, width, height);
   for (const name of ["never", "instrument"]) {
-    fill(layers[name], drawn(name), TINT[name]);
+    const shapes = drawn(name);
+    if (!shapes.length) continue;
+    fill(layers[name], shapes, TINT[name]);
     context.globalAlpha = 0.45;
     context.drawImage(layers[name], 0, 0);
     context.globalAlpha = 1;
