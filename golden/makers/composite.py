@@ -47,9 +47,7 @@ def _opaque_exact() -> Spec:
                 ("divide_by_one_minus_alpha",), raster_settings(EXACT), inputs, without=("d_background",))  # fmt: skip
 
 
-def _tile_case(
-    case: str, title: str, flags: tuple[str, ...], u: list[float], v: list[float], size: list[float]
-) -> Spec:
+def tile_case(case: str, title: str, flags: tuple[str, ...], u: list[float], v: list[float], size: list[float]) -> Spec:
     """Three discs in preset legacy, with their centres and the variances of their axes."""
     seeds, (width, height) = Seeds("composite", case), (48, 20)
     shapes = {
@@ -79,8 +77,8 @@ def _tile_ends() -> list[Spec]:
     flags = ("tiles_from_the_mean", "tiles_root_without_floor", "tiles_unbounded")
     ends = "Where the tiles of a Gaussian end: centre less half a pixel, the root at least 0.1"
     return [
-        _tile_case("tiles", ends, flags, [46.75, 47.25, 24.3], [8.2, 11.7, 10.25], [99.9, 99.9, 4.0]),
-        _tile_case("tile_root", "A disc whose radius is just below 5: no more than 0.1 stands under the root",
+        tile_case("tiles", ends, flags, [46.75, 47.25, 24.3], [8.2, 11.7, 10.25], [99.9, 99.9, 4.0]),
+        tile_case("tile_root", "A disc whose radius is just below 5: no more than 0.1 stands under the root",
                    ("tiles_unbounded",), [12.0, 30.0, 28.0], [10.2, 9.4, 6.5], [2.458, 9.0, 30.0]),
     ]  # fmt: skip
 

@@ -54,15 +54,28 @@ def _inputs(seeds: Seeds, moving: bool) -> dict[str, Made]:
     }  # fmt: skip
 
 
-def _decisions() -> list[Spec]:
-    def spec(case: str, title: str, flags: tuple[str, ...], moving=False, change=None, **config: Any) -> Spec:
-        inputs = _inputs(Seeds("density", case), moving)
-        if change:
-            change(inputs)
-        density = msgspec.to_builtins(DensityConfig(gradient_threshold=0.25, extent=30.0, **config))
-        settings = {"width": 16, "height": 8, "density": density | ({"extent": "cameras"} if moving else {})}
-        return Spec("density", case, "density", title, flags, settings, inputs, ("d_mean2d",))
+def density_spec(
+    case: str, title: str, flags: tuple[str, ...], moving: bool = False, change: Any = None, **config: Any
+) -> Spec:
+    """One densification of the same Gaussians, with some settings."""
+    inputs = _inputs(Seeds("density", case), moving)
+    if change:
+        change(inputs)
+    density = msgspec.to_builtins(DensityConfig(**{"gradient_threshold": 0.25, "extent": 30.0, **config}))
+    settings = {"width": 16, "height": 8, "density": density | ({"extent": "cameras"} if moving else {})}
+    return Spec("density", case, "density", title, flags, settings, inputs, ("d_mean2d",))
 
+
+def spread_gradients(inputs: dict[str, Made]) -> None:
+    """Gaussians that differ in their gradients, not in the order of the index: k / 8 + 1 / 4 times 1 / 4."""
+    rank = permutation("density/spread", COUNT)
+    size = np.zeros((VIEWS, 2, COUNT))
+    size[:, 0] = (0.25 + rank / 8) / 4
+    text = "(1/4 + rank / 8) / 4 in x, 0 in y, rank of the words of density/spread"
+    inputs["d_mean2d"] = changed(inputs["d_mean2d"], ..., size, text)
+
+
+def _decisions() -> list[Spec]:
     def tie(inputs: dict[str, Made]) -> None:
         d = inputs["d_mean2d"]
         d = changed(d, ..., d.array[:, :, :1] * 0 + 2.0**-3, "1/8 everywhere: all equally steep")
@@ -77,12 +90,13 @@ def _decisions() -> list[Spec]:
              "screen_gradient_without_half",
              "density_norm_of_sum", "candidates_above_the_threshold")  # fmt: skip
     return [
-        spec("clone_split_prune", "Who is pruned, cloned and split, and in which order the new ones stand", flags),
-        spec("maximum", "No room for all: the steepest, equals by index", ("first_candidates_win",), change=tie,
-             maximum=14),
-        spec("extent_of_cameras", "The extent that divides clones from splits, from moving cameras",
+        density_spec("clone_split_prune", "Who is pruned, cloned and split, and in which order the new ones stand",
+                     flags),
+        density_spec("maximum", "No room for all: the steepest, equals by index", ("first_candidates_win",),
+                     change=tie, maximum=14),
+        density_spec("extent_of_cameras", "The extent that divides clones from splits, from moving cameras",
              ("extent_without_margin",), moving=True, dense_fraction=0.5),
-        spec("all_pruned", "Nothing is left", ("faint_ones_densified",), change=faint),
+        density_spec("all_pruned", "Nothing is left", ("faint_ones_densified",), change=faint),
     ]  # fmt: skip
 
 

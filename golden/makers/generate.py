@@ -105,7 +105,7 @@ def _plain_or_none(path: Path) -> NDArray | None:
 
 
 def write(folder: Path, families: Iterable[str] = ()) -> list[str]:
-    """Replace the generated files of these families, or of all; returns one line for each change.
+    """Replace the generated files of these families or cases (FAMILY/CASE), or of all; one line for each change.
 
     An expected value that agrees with the stored one within its float64 tolerance keeps the stored bytes, and the
     manifest the class of machine that wrote them; a case in which nothing else changed keeps its description, too.
@@ -114,8 +114,8 @@ def write(folder: Path, families: Iterable[str] = ()) -> list[str]:
     Raises: InputError for an unknown family, or if other families are not stored.
     """
     wanted, known = set(families), {spec.family for spec in all_specs()}
-    if unknown := sorted(wanted - known):
-        raise InputError(f"write: {unknown[0]!r} is not a family; use one of: {', '.join(sorted(known))}")
+    if unknown := sorted(wanted - known - {spec.name for spec in all_specs()}):
+        raise InputError(f"write: {unknown[0]!r} is no family and no case; families: {', '.join(sorted(known))}")
     version = (folder / "VERSION").read_text(encoding="utf-8").strip()
     try:
         published = read_struct(folder / "manifest.json", Manifest)
@@ -123,13 +123,13 @@ def write(folder: Path, families: Iterable[str] = ()) -> list[str]:
         published = None
     if wanted and published is None:
         raise InputError(f"{folder}/manifest.json: cannot be read; write all families first")
-    chosen = [spec for spec in all_specs() if spec.family in wanted]
+    chosen = [spec for spec in all_specs() if wanted & {spec.family, spec.name}]
     solved = solve_these(chosen, all_wrong_ports().values()) if wanted else solve_all()
     lines = [line for one in solved for line in moved(folder, one)]
     cases = [kept_where_equal(folder, published, one) for one in solved]
     if wanted and published is not None:
         rest = [f"{family}/{name}" for family, names in published.families.items() for name in names]
-        cases += [stored_files(folder, published, name) for name in rest if name.split("/")[0] not in wanted]
+        cases += [stored_files(folder, published, name) for name in rest if not wanted & {name.split("/")[0], name}]
     files = rendered_files(cases, all_wrong_ports(), version, published)
     for root in GENERATED:
         shutil.rmtree(folder / root, ignore_errors=True)

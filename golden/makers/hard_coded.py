@@ -36,7 +36,6 @@ FREE = {
     "initialisation.motion": "tracked motion needs optical flow, which no case has",
     "training.visits_per_frame": "the length of a run; a case states its number of iterations",
     "training.bridge_fraction": "times between frames need optical flow, which no case has",
-    "density.growth": "growth to a budget is an option that is not part of the paper",
     "training.coarse_start": "an option that is not part of the paper",
     "training.seed": "random draws are inputs of the cases",
     "training.threads": "changes no result",

@@ -75,6 +75,8 @@ class Wrong(NamedTuple):
 def answers(wrong_port: WrongPort, questions: Iterable[Question]) -> dict[str, Wrong]:
     """The answers of the wrong port, by case, to the questions on which it is examined."""
     found, examined = {}, [question for question in questions if is_examined(wrong_port, question)]
+    if not examined:
+        return {}
     with changed_copy(wrong_port.edits) as operation, np.errstate(all="ignore"):
         for question in examined:
 

@@ -35,8 +35,6 @@ static Rules rules_of(const Request *request)
     rules.drop_depth = setting_is(request, "raster.deviations.drop_depth_to_z", "true");
     rules.pass_clamped = setting_is(request, "raster.deviations.pass_clamped_alpha", "true");
     rules.conic = setting_is(request, "raster.deviations.conic_epsilon", "true");
-    rules.width = (int)setting(request, "width");
-    rules.height = (int)setting(request, "height");
     return rules;
 }
 
@@ -175,6 +173,8 @@ void composite(Request *request)
     const real *d_depth = in_real(request, "d_depth_image"), *d_opacity = in_real(request, "d_opacity_image");
     long n = in_size(request, "depth", 0);
     Rules rules = rules_of(request);
+    rules.width = (int)setting(request, "width");
+    rules.height = (int)setting(request, "height");
     long pixels = (long)rules.width * rules.height;
     real *colour = out_real(request, "colour_image", 3 * pixels), *depth = out_real(request, "depth_image", pixels);
     real *opacity = out_real(request, "opacity_image", pixels), *d_background = out_real(request, "d_background", 3);
@@ -202,4 +202,77 @@ void composite(Request *request)
     free(splats);
     free(hits);
     free(sums);
+}
+
+/* Whether the box of the ellipse of alpha >= cutoff holds a pixel centre. */
+static bool in_a_box(const Splat *splat, const Rules *rules)
+{
+    real reach = 2 * log(splat->opacity / rules->cutoff), centre[2] = {splat->u, splat->v};
+    real variance[2] = {splat->a, splat->c};
+    int size[2] = {rules->width, rules->height};
+    for (int k = 0; k < 2; k++) {
+        real half = sqrt(fmax(reach, (real)0) * variance[k]);
+        real first = ceil(centre[k] - half - (real)0.5), last = floor(centre[k] + half - (real)0.5);
+        if (!(reach >= 0) || fmin(last, (real)(size[k] - 1)) < fmax(first, (real)0))
+            return false;
+    }
+    return true;
+}
+
+/* The visible Gaussians of `render`, front to back; returns how many. */
+static long screened(Request *request, const Rules *rules, long n, Splat *splats, uint8_t *visible)
+{
+    real *mean = scratch(request, 2 * n), *cover = scratch(request, 3 * n), *determinant = scratch(request, n);
+    real *depth = scratch(request, n), *colour = scratch(request, 3 * n), centre[3] = {0, 0, 0};
+    const real *logit = in_real(request, "opacity_logit"), *w = in_real(request, "rotation_matrix");
+    const real *d = in_real(request, "translation");
+    long found = 0;
+    for (int k = 0; k < 9; k++)
+        centre[k % 3] -= w[k] * d[k / 3];
+    projected(request, n, visible, mean, cover, determinant, depth);
+    coloured(request, centre, n, colour);
+    for (long i = 0; i < n; i++) {
+        real a = cover[i], b = cover[n + i], c = cover[2 * n + i];
+        if (!visible[i])
+            continue;
+        Splat *s = &splats[found++];
+        *s = (Splat){.u = mean[i], .v = mean[n + i], .m = b / c, .r = 1 / c, .a_big = c / determinant[i], .z = depth[i],
+                     .opacity = 1 / (1 + exp(-logit[i])), .a = a, .b = b, .c = c, .determinant = determinant[i],
+                     .index = i, .rgb = {colour[i], colour[n + i], colour[2 * n + i]}};
+        reach(s, rules);
+        visible[i] = in_a_box(s, rules);
+    }
+    qsort(splats, (size_t)found, sizeof *splats, nearer);
+    return found;
+}
+
+/* The images of a camera; this port has no reverse pass of `render`. */
+void render(Request *request)
+{
+    const real *background = in_real(request, "background");
+    long n = in_size(request, "opacity_logit", 0);
+    Rules rules = rules_of(request);
+    rules.width = (int)setting(request, "camera.width");
+    rules.height = (int)setting(request, "camera.height");
+    long pixels = (long)rules.width * rules.height;
+    real *colour = out_real(request, "colour_image", 3 * pixels), *depth = out_real(request, "depth_image", pixels);
+    real *opacity = out_real(request, "opacity_image", pixels);
+    Splat *splats = zeros(n, sizeof *splats);
+    Hit *hits = zeros(n, sizeof *hits);
+    long shown = screened(request, &rules, n, splats, out_boolean(request, "visible", n));
+    for (long p = 0; p < pixels; p++) {
+        real left;
+        long found = gather(splats, shown, &rules, (int)(p % rules.width), (int)(p / rules.width), hits, &left);
+        for (long k = 0; k < found; k++) {
+            real share = hits[k].alpha * hits[k].light;
+            for (int c = 0; c < 3; c++)
+                colour[c * pixels + p] += share * hits[k].splat->rgb[c];
+            depth[p] += share * hits[k].splat->z;
+            opacity[p] = opacity[p] + share;
+        }
+        for (int c = 0; c < 3; c++)
+            colour[c * pixels + p] += background[c] * left;
+    }
+    free(splats);
+    free(hits);
 }

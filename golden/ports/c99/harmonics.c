@@ -75,3 +75,27 @@ void harmonics(Request *request)
         }
     }
 }
+
+/* Colours of `render`, without a reverse pass. */
+void coloured(Request *request, const real centre[3], long n, real *colour)
+{
+    const real *coefficients = in_real(request, "harmonics"), *residual = in_real(request, "residual");
+    const real *position = in_real(request, "position");
+    int degree = (int)setting(request, "degree");
+    for (long i = 0; i < n; i++) {
+        real v[3], row[16][4], square = 0;
+        for (int k = 0; k < 3; k++) {
+            v[k] = position[i + k * n] - centre[k];
+            square += v[k] * v[k];
+        }
+        real inverse = square > 0 ? 1 / sqrt(square) : 0;
+        int used = square > 0 ? (degree + 1) * (degree + 1) : 1;
+        basis(v[0] * inverse, v[1] * inverse, v[2] * inverse, row);
+        for (long c = 0; c < 3; c++) {
+            real value = row[0][0] * residual[i + c * n] + (real)0.5;
+            for (int k = 0; k < used; k++)
+                value += row[k][0] * coefficients[(3 * k + c) * n + i];
+            colour[c * n + i] = value > 0 ? value : 0;
+        }
+    }
+}

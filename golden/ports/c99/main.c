@@ -23,6 +23,8 @@ static const struct {
     {"atoms", atoms},           {"appearance", appearance}, {"motion", motion},           {"matern", matern},
     {"laplacian", laplacian},   {"calibration", calibration}, {"deformation", deformation},
     {"covariance", covariance}, {"projection", projection}, {"harmonics", harmonics},     {"composite", composite},
+    {"masked_l1", masked_l1},   {"masked_ssim", masked_ssim}, {"normalised_depth", normalised_depth},
+    {"smoothness", smoothness}, {"render", render},
 };
 
 static Operation *operation_named(const char *name)

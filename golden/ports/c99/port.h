@@ -71,6 +71,10 @@ uint64_t *out_unsigned(Request *request, const char *name, long count);
 uint8_t *out_boolean(Request *request, const char *name, long count);
 real *scratch(Request *request, long count);
 
+/* Forward passes that `render` is made of; visible Gaussians only. */
+void projected(Request *request, long n, uint8_t *visible, real *mean, real *cover, real *determinant, real *depth);
+void coloured(Request *request, const real centre[3], long n, real *colour);
+
 /* The operations, one function each. */
 typedef void Operation(Request *request);
 Operation reading, generator;                                                        /* reading.c */
@@ -78,6 +82,7 @@ Operation frequencies, dictionary, atoms, appearance, motion, matern, deformatio
 Operation laplacian, calibration;                                                    /* laplacian.c */
 Operation covariance, projection;                                                    /* projection.c */
 Operation harmonics;                                                                 /* harmonics.c */
-Operation composite;                                                                 /* composite.c */
+Operation composite, render;                                                         /* composite.c */
+Operation masked_l1, masked_ssim, normalised_depth, smoothness;                      /* losses.c */
 
 #endif

@@ -217,3 +217,48 @@ void projection(Request *request)
         }
     }
 }
+
+/* e^2 + e |M|^2 + the sum over k < m of (S_k S_m (T_0k T_1m - T_0m T_1k))^2: no difference of nearly equal numbers. */
+static real determinant_of(const View *view, const real s[3], real e)
+{
+    real sum = e * e;
+    for (int k = 0; k < 3; k++) {
+        real u = s[k] * view->t[0][k], v = s[k] * view->t[1][k];
+        sum += e * (u * u + v * v);
+        for (int m = k + 1; m < 3; m++) {
+            real minor = s[k] * s[m] * (view->t[0][k] * view->t[1][m] - view->t[0][m] * view->t[1][k]);
+            sum += minor * minor;
+        }
+    }
+    return sum;
+}
+
+/* Screen Gaussians of `render`, from its raw parameters, without a reverse pass. */
+void projected(Request *request, long n, uint8_t *visible, real *mean, real *cover, real *determinant, real *depth)
+{
+    const real *quaternion = in_real(request, "quaternion"), *log_scale = in_real(request, "log_scale");
+    const real *position = in_real(request, "position");
+    real principal[2] = {(real)setting(request, "camera.cx"), (real)setting(request, "camera.cy")};
+    Lens lens = lens_of(request);
+    for (long i = 0; i < n; i++) {
+        View view;
+        real q[4], r[3][3], s[3], inverse_norm;
+        visible[i] = seen(&lens, position + i, n, &view);
+        if (!visible[i])
+            continue;
+        unit(quaternion + i, n, q, &inverse_norm);
+        rotation_of(q, r);
+        for (int k = 0; k < 3; k++)
+            s[k] = exp(fmin(fmax(log_scale[k * n + i], -LARGEST_LOG_SCALE), LARGEST_LOG_SCALE));
+        linearise(&lens, &r[0][0], 1, &view);
+        depth[i] = view.point[2];
+        determinant[i] = determinant_of(&view, s, lens.low_pass);
+        for (int k = 0; k < 2; k++)
+            mean[k * n + i] = lens.focal[k] * view.point[k] / view.point[2] + principal[k];
+        for (int e = 0; e < 3; e++) {
+            cover[e * n + i] = e != 1 ? lens.low_pass : 0;
+            for (int k = 0; k < 3; k++)
+                cover[e * n + i] += s[k] * s[k] * view.t[e / 2][k] * view.t[(e + 1) / 2][k];
+        }
+    }
+}

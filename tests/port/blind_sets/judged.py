@@ -1,6 +1,6 @@
 """Judge each mistake of a blind set once, and print its sentence and the answer of the report.
 
-    python tests/port/blind_sets/judged.py SET.toml [NUMBER ...] [--out FILE.json]
+    python tests/port/blind_sets/judged.py SET.toml [NUMBER ...] [--out FILE.json] [--search SECONDS]
 
 The outcome of each answer is given by a reader, by the protocol of tests/port/blind.py. The file of `--out` has the
 answers by number, so that two versions of the judge can be compared.
@@ -28,15 +28,16 @@ SECONDS = 16.0  # of the search, as `golden run`
 training_mistakes.OPERATIONS = (*training_mistakes.OPERATIONS, "objective")
 
 
-def answer_to(entry: dict) -> list[str]:
+def answer_to(entry: dict, seconds: float) -> list[str]:
     """The first answer of the report, and the cases that it refuses."""
     if "edit" in entry:
-        report = measure.report_on([tuple(pair) for pair in entry["edit"]], SECONDS)
+        report = measure.report_on([tuple(pair) for pair in entry["edit"]], seconds)
     else:
         with tempfile.TemporaryDirectory() as scratch:
             edits = tuple(Edit(*change) for change in entry["changes"])
             report = training_mistakes.in_reference(measure.GOLDEN, edits, Path(scratch))
-            explain(measure.GOLDEN, report, Path(scratch), SECONDS)
+            if seconds:
+                explain(measure.GOLDEN, report, Path(scratch), seconds)
     asked = [case for case in report.cases if any(o.status == "refused" for o in case.outputs)]
     return [*answer(report), f"refused cases: {', '.join(case.name for case in asked) or 'none'}"]
 
@@ -47,12 +48,13 @@ def main(words: list[str]) -> int:
     parser.add_argument("set", type=Path)
     parser.add_argument("numbers", nargs="*", type=int)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--search", type=float, default=SECONDS, metavar="SECONDS")
     options = parser.parse_args(words)
     table, answers = tomllib.loads(options.set.read_text(encoding="utf-8")), {}
     entries = [*table.get("by_hand", []), *table.get("reference", [])]
     for entry in entries:
         if not options.numbers or entry["number"] in options.numbers:
-            began, lines = time.monotonic(), answer_to(entry)
+            began, lines = time.monotonic(), answer_to(entry, options.search)
             answers[str(entry["number"])] = lines
             print(f"{entry['number']} {entry['operation']}: {entry['text']} ({time.monotonic() - began:.0f} s)")
             print(*(f"    {line}" for line in lines), sep="\n", flush=True)

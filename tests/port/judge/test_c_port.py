@@ -6,6 +6,7 @@ import subprocess
 import pytest
 
 from endotsr.cli.golden import run
+from endotsr.port.judge.certificate import read_certificate
 from endotsr.port.judge.command import run_port, write_requests
 from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import declared, judge
@@ -16,15 +17,18 @@ FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2"]
 PORTED = {
     "reading", "generator", "frequencies", "dictionary", "atoms", "appearance", "motion", "matern", "laplacian",
     "calibration", "deformation", "covariance", "projection", "harmonics", "composite",
+    "masked_l1", "masked_ssim", "normalised_depth", "smoothness",
 }  # fmt: skip
 
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc or gcc) on this machine")
 
 
-def compiled(sources, folder, real):
+def compiled(sources, folder, real, *, strict=True):
+    """The program; what a part leaves out may leave functions without a use."""
+    flags = FLAGS if strict else ["-std=c99", "-O2"]
     port = folder / f"port_{real}"
     files = sorted(map(str, sources.glob("*.c")))
-    done = subprocess.run([str(COMPILER), *FLAGS, f"-DREAL={real}", "-o", str(port), *files, "-lm"],
+    done = subprocess.run([str(COMPILER), *flags, f"-DREAL={real}", "-o", str(port), *files, "-lm"],
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr[:2000]
     return port
@@ -69,3 +73,59 @@ def test_a_mistake_in_its_source_is_named(tmp_path):
     refused = {case.name.split("/")[0] for case in report.cases if case.status == "refused"}
     assert refused == {"composite"} and report.level == 0
     assert report.suspects[0].flag == "pixel_corner_sample" and report.suspects[0].named
+
+
+def part(folder, kept, edits=()):
+    """The port with these operations alone in its table, and some lines of composite.c taken out or replaced."""
+    sources = shutil.copytree(SOURCES, folder / "c99")
+    main = sources / "main.c"
+    text, (head, rest) = main.read_text(), main.read_text().split("OPERATIONS[] = {\n")
+    rows = "".join(f'    {{"{name}", {name}}},\n' for name in kept)
+    main.write_text(f"{head}OPERATIONS[] = {{\n{rows}}};{rest.partition('};')[2]}")
+    assert main.read_text() != text
+    file = sources / "composite.c"
+    for old, new in edits:
+        assert file.read_text().count(old) == 1
+        file.write_text(file.read_text().replace(old, new))
+    return sources
+
+
+RENDERER = ("reading", "generator", "covariance", "projection", "harmonics", "composite", "render")
+LOSSES = ("reading", "generator", "masked_l1", "masked_ssim", "normalised_depth", "smoothness", "laplacian", "matern")
+NO_REVERSE = (
+    ("        pixel_reverse(hits, found, &rules, background, g, sums);\n", ""),
+    ("    write_gradients(request, splats, sums, &rules, n);\n", ""),
+)
+TEXTBOOK = (  # the conic of most CUDA kernels
+    ("exp(-(s->r * dy * dy + s->a_big * eta * eta) / 2)",
+     "exp(-(s->c * dx * dx - 2 * s->b * dx * dy + s->a * dy * dy) / (s->a * s->c - s->b * s->b) / 2)"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("precision", "real"), [("float64", "double"), ("float32", "float")])
+@pytest.mark.parametrize(
+    ("profile", "kept", "edits", "said"),
+    [
+        ("renderer-forward", RENDERER, NO_REVERSE, "renderer (forward), level 3"),
+        ("losses", LOSSES, (), "losses, level 2"),
+    ],
+)
+def test_a_port_of_a_part_claims_this_part(tmp_path, capsys, profile, kept, edits, said, precision, real):
+    sources = part(tmp_path, kept, edits)
+    port = compiled(sources, tmp_path, real, strict=False)
+    certificate = tmp_path / "c.json"
+    words = ["--port", f"{port} {{requests}} {{outputs}}", "--precision", precision, "--profile", profile]
+    assert run(["run", *words, "--certificate", str(certificate)]) == 0
+    text = capsys.readouterr().out
+    assert text.splitlines()[-1].endswith(f"{said}, {precision}") and f"  {said}: " in text
+    assert read_certificate(certificate).profile == profile
+    assert run(["run", *words[:-1], "method", "--search", "0"]) == 1
+
+
+def test_a_port_with_the_textbook_conic_is_told_that_only_needles_fail(tmp_path, capsys):
+    port = compiled(part(tmp_path, RENDERER, TEXTBOOK), tmp_path, "float", strict=False)
+    words = ["--port", f"{port} {{requests}} {{outputs}}", "--precision", "float32", "--profile", "renderer-forward"]
+    assert run(["run", *words, "--search", "0"]) == 1
+    first, rewrite = capsys.readouterr().out.splitlines()[:2]
+    assert first.startswith("only needles fail: render/long_needle, ") and "times the tolerance" in first
+    assert "sum of squares" in rewrite

@@ -59,7 +59,7 @@ def test_a_whole_port_claims_every_profile(golden, answered):
 @pytest.mark.parametrize("name", PROFILES)
 def test_a_profile_alone_has_its_last_level(golden, answered, name):
     report = judge(golden, answered, "float32", profile=name, again=answered)
-    assert report.passed and report.level == CLAIMS[name]
+    assert report.passed and report.level == CLAIMS[name] and said(report) == {name: CLAIMS[name]}
     assert report.claim == f"golden {golden.short_version}, {PROFILES[name].title}, level {report.level}, float32"
 
 

@@ -27,6 +27,9 @@ def first(got, others=None):
         (RIGHT * [[1], [-1], [1]], "5 of 15 entries have the opposite sign"),
         (RIGHT * [[1], [0.5], [1]], "only at [1] of axis 0, there times 1/2"),
         (RIGHT - 0.5, "plus -0.5"),
+        ((1 + 3e-9) * RIGHT, "times 1 + 3e-09 (a constant rounded to float32 differs by up to 6e-8)"),
+        (0.9995 * RIGHT, "times 1 - 0.0005"),
+        (np.where(RIGHT > 30, RIGHT + 2.0, RIGHT), "only at [1, 2] of axis 0"),
         (np.minimum(RIGHT, 20.0), "clamped above 20"),
         (np.where(RIGHT > 50, np.nan, RIGHT), "2 of 15 entries not finite"),
         (RIGHT, ""),
@@ -54,3 +57,38 @@ def test_every_second_row_or_pixel_is_told():
         found = relations(np.where(wrong, factor * right, right), right, "max", 1e-12, {})
         assert any(one.text.startswith("only at ") and text in one.text for one in found)
     assert not any("odd" in one.text for one in relations(factor * right, right, "max", 1e-12, {}))
+
+
+HIDDEN = np.array([[4.5, 0.0, 7.25, 3.0, 9.0], [2.0, 0.0, 6.5, 1.5, 8.0]])  # Gaussian 1 is hidden
+
+
+@pytest.mark.parametrize(
+    ("shift", "text"),
+    [((-0.5, 0.0), "plus (-0.5, 0) along axis 0, where it is wrong"),
+     ((0.5, -0.25), "plus (0.5, -0.25) along axis 0, where it is wrong"),
+     ((0.25, 0.25), "plus 0.25, where it is wrong")],
+)  # fmt: skip
+def test_an_offset_of_rows_is_told_though_hidden_gaussians_are_right(shift, text):
+    seen = HIDDEN != 0
+    got = HIDDEN + seen * np.array(shift)[:, None]
+    texts = [r.text for r in relations(got, HIDDEN, "max", 1e-12, {"visible": seen[0]})]
+    assert text in texts
+    assert "only at every visible Gaussian of axis 1" in " ".join(texts)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("float32", "single precision (2^-24)"), ("float16", "half precision (2^-11)")]
+)
+def test_the_size_of_rounding_errors_is_told(kind, name):
+    right = np.sqrt(np.arange(1.0, 200.0))
+    texts = [r.text for r in relations(right.astype(kind).astype(float), right, "max", 1e-12, {})]
+    assert name in texts[-1]
+    assert "precision" not in relations(right * (1 + 1e-4), right, "max", 1e-12, {})[-1].text
+    assert "precision" not in relations(right + 3e-8 * np.abs(np.sin(right)), right, "max", 1e-12, {})[-1].text
+
+
+def test_long_lists_of_indices_are_counted():
+    right = np.sqrt(np.arange(1.0, 101.0)).reshape(2, 50)
+    got = right.copy()
+    got[0, 3:40] *= np.linspace(1.1, 1.5, 37)
+    assert "only at 37 of 50 indices of axis 1" in [r.text for r in relations(got, right, "max", 1e-12, {})]

@@ -120,7 +120,7 @@ def density(i, s, k):
     scale = np.exp(i["log_scale"].real)
     large = {"max": scale.max(0), "min": scale.min(0), "mean": scale.mean(0)}[k("size", "max")]
     threshold = d["gradient_threshold"]
-    wanted = ~pruned & (mean >= threshold)
+    wanted = ~pruned & ((mean > 0) if d["growth"] == "budget" else (mean >= threshold))
     if k("pruned also split", False):
         wanted = mean >= threshold
     room = max(d["maximum"] - (~pruned).sum() + k("room", 0), 0)

@@ -266,7 +266,7 @@ def test_one_family_is_written_alone_and_other_bits_are_not_noise(copy):
     paths = ("case.json", "expected/translation.npy", "expected/d_phi.npy", "expected/d_motion_coefficients.npy")
     assert changed <= {"manifest.json", *(f"{case}/{path}" for path in paths)}
     read_golden(copy)  # checksums and all
-    with pytest.raises(SystemExit, match="'motoin' is not a family; use one of: adam, "):
+    with pytest.raises(SystemExit, match="'motoin' is no family and no case; families: adam, "):
         make.main(["write", "motoin", "--golden", str(copy)])
 
 

@@ -18,6 +18,13 @@ PARTS = {
     "determinism": ("objective",),
 }  # fmt: skip
 """Operations that an operation is composed of."""
+ORDER = (
+    "reading", "generator", "frequencies", "dictionary", "atoms", "appearance", "motion", "deformation", "covariance",
+    "projection", "harmonics", "composite", "exposure", "pose", "registration", "masked_l1", "masked_ssim",
+    "normalised_depth", "smoothness", "laplacian", "matern", "calibration", "adam", "schedule", "density",
+    "initialisation", "scene", "render", "objective", "training", "determinism",
+)  # fmt: skip
+"""Operations in the order of an iteration, then those composed of others."""
 MOST_CASES = 4  # listed by name
 
 
@@ -28,7 +35,7 @@ def made_of(operation: str) -> set[str]:
 
 
 def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
-    """Lines on the first operation with a refused output, by level and then in the order of the cases; [] = none.
+    """Lines on the first operation with a refused output, by level and then in the order of the method; [] = none.
 
     reports   case reports of the judge, with the relations of their outputs
     """
@@ -53,7 +60,10 @@ def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
     if 2 * len(bad) <= len(mine):
         titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:MOST_CASES])
         titles += "; and below" * (len(bad) > MOST_CASES)
-        lines.append(f"  only in {len(bad)} of its {len(mine)} cases: {titles}")
+        outputs = list(dict.fromkeys(o.name for _, o in refused))
+        less = len(outputs) < len({o.name for r in mine for o in r.outputs if r.name in bad})
+        where = f"; wrong there: {', '.join(outputs)}" if less else ""
+        lines.append(f"  only in {len(bad)} of its {len(mine)} cases: {titles}{where}")
     return lines
 
 
@@ -71,11 +81,15 @@ def _follows(case: Case, output: str) -> bool:
 
 
 def first_wrong(cases: Sequence[Case], reports: Sequence[Any]) -> tuple[int, Case | None]:
-    """The first case with a refused output, by level and then in the order of the cases, and that level."""
-    known = {case.name: case for case in cases}
-    wrong = [(o.level, k, r.name) for k, r in enumerate(reports) for o in r.outputs if o.status == "refused"]
-    wrong = [one for one in wrong if one[2] in known]
-    return (min(wrong)[0], known[min(wrong)[2]]) if wrong else (0, None)
+    """The first case with a refused output, by level, then in the order of the method, and that level."""
+    known, place = {case.name: case for case in cases}, {name: k for k, name in enumerate(ORDER)}
+    wrong = [
+        (o.level, place.get(known[r.name].operation, len(ORDER)), k, r.name)
+        for k, r in enumerate(reports)
+        for o in r.outputs
+        if o.status == "refused" and r.name in known
+    ]
+    return (min(wrong)[0], known[min(wrong)[-1]]) if wrong else (0, None)
 
 
 def _direction(mine: Sequence[Any], refused: Sequence[tuple[Any, Any]]) -> str:

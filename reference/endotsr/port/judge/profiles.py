@@ -46,12 +46,14 @@ PROFILES = {
     ),
     "renderer": Profile(
         "renderer with gradients", (*_FILES, *_SCREEN, "render"),
-        {1: "shape, projection, colour and compositing of Gaussians, forward", 2: "the same, forward and reverse",
+        {1: "shape, projection, colour and compositing of Gaussians, forward",
+         2: "shape, projection, colour and compositing of Gaussians, forward and reverse",
          3: "images, and their gradients with respect to every parameter and to the pose"},
     ),
     "losses": Profile(
         "losses", (*_FILES, *_LOSSES),
-        {1: "values of L1, SSIM, depth, smoothness, Laplacian and Matern terms", 2: "these values and their gradients"},
+        {1: "values of L1, SSIM, depth, smoothness, Laplacian and Matern terms",
+         2: "L1, SSIM, depth, smoothness, Laplacian and Matern terms, and their gradients"},
     ),
     "optimiser": Profile(
         "optimiser and density", (*_FILES, *_DECISIONS),
@@ -65,7 +67,7 @@ PROFILES = {
     "training": Profile(
         "training", (*_METHOD, "training", "determinism"),
         {4: "the method, and trajectories of training from calibration to density control",
-         5: "the same, with the same bits in two runs"},
+         5: "the method, and trajectories of training, with the same bits in two runs"},
     ),
 }  # fmt: skip
 """By the name that `--profile` takes."""

@@ -36,7 +36,7 @@ def golden_test(
 
     target = read_golden(golden_folder(golden))
     cases = [case for case in target.cases if case.level <= level]
-    known = _known(known_failures, {case.name for case in target.cases})
+    known = known_of(known_failures, {case.name for case in target.cases})
     marks = {True: [pytest.mark.xfail(strict=True, reason="known failure of the port")], False: []}
 
     @pytest.mark.parametrize("case", [pytest.param(c, id=c.name, marks=marks[c.name in known]) for c in cases])
@@ -71,7 +71,8 @@ def explain(report: CaseReport) -> str:
     return "\n".join([*lines, f"  made for {', '.join(report.made_for)}"] if report.made_for else lines)
 
 
-def _known(file: str | Path | None, names: set[str]) -> set[str]:
+def known_of(file: str | Path | None, names: set[str]) -> set[str]:
+    """The cases that a file of known failures lists. Raises: InputError for an unreadable file or an unknown case."""
     if file is None:
         return set()
     try:

@@ -24,8 +24,10 @@ from endotsr.port.judge.store import Golden
 
 NEAR = 2e-3  # allowed deviation of a fingerprint from a mistake's, relative to the difference of right and wrong
 ROUNDINGS = 4.0  # allowed deviation of a fingerprint, in tolerances of one entry times the root of their number
+MOST_PAIRED = 40  # mistakes with the most agreeing outputs that are tried in pairs
 LIKE = 1.5  # decades within which the sizes of two rounding mistakes count as equal
 NAMED = 0.5  # lowest score of a named mistake
+CERTAIN = 0.999  # score from which a name stands above a line of the search
 MENTIONED = 0.4  # lowest score of a partial resemblance
 
 
@@ -70,8 +72,24 @@ class Suspect(msgspec.Struct, kw_only=True):
 
     @property
     def named(self) -> bool:
-        """Whether it explains enough to be named."""
-        return self.score >= NAMED
+        """Whether it explains enough to be named, and not on the evidence of one case that others contradict."""
+        return self.score >= NAMED and not contradicted(self.evidence)
+
+    @property
+    def whole(self) -> bool:
+        """Whether every refused output is explained and no other is expected."""
+        return self.named and self.score > CERTAIN
+
+
+def contradicted(evidence: Evidence) -> bool:
+    """Whether a single case has the values of a mistake, and another case of the same family has not.
+
+    Other families say nothing here: a port may make a mistake in one of two operations that share a rule.
+    """
+    agreeing = {name.rpartition("/")[0] for name in evidence.agrees}
+    family = {case.partition("/")[0] for case in agreeing}
+    against = {name.rpartition("/")[0] for name in (*evidence.differs, *evidence.passes, *evidence.unexplained)}
+    return len(agreeing) == 1 and any(case.partition("/")[0] in family for case in against - agreeing)
 
 
 def evidence_of(case: Case, taken: Mapping[str, Taken], precision: str) -> dict[str, Evidence]:
@@ -167,3 +185,29 @@ def suspects_of(golden: Golden, evidence: Mapping[str, Evidence]) -> list[Suspec
         if flag in evidence and evidence[flag].score >= MENTIONED
     ]
     return sorted(found, key=lambda s: (-round(s.score, 6), -len(s.evidence.agrees), s.evidence.unlike))
+
+
+class TwoMistakes(NamedTuple):
+    """Two mistakes that together explain what neither explains alone."""
+
+    first: str
+    second: str
+    agrees: tuple[int, int]
+    """outputs with the values of the one, and of the other"""
+
+
+def pair_of(evidence: Mapping[str, Evidence]) -> TwoMistakes | None:
+    """The pair of mistakes that explains every refused output, if there is one and no other does.
+
+    Each has to be recognised by outputs of its own. Two mistakes in one output have the fingerprint of neither.
+    """
+    refused = {n for one in evidence.values() for n in (*one.agrees, *one.fits, *one.differs, *one.unexplained)}
+    likely = sorted((f for f, one in evidence.items() if one.agrees), key=lambda f: -len(evidence[f].agrees))
+    found = []
+    for k, first in enumerate(likely[:MOST_PAIRED]):
+        for second in likely[k + 1 : MOST_PAIRED]:
+            a, b = (set(evidence[flag].agrees) for flag in (first, second))
+            passed = {*evidence[first].passes, *evidence[second].passes}
+            if a - b and b - a and a | b >= refused and len(passed) <= len(refused):
+                found.append(TwoMistakes(first, second, (len(a), len(b))))
+    return found[0] if len(found) == 1 else None

@@ -18,6 +18,9 @@ from endotsr.port.judge.compare import scale_of
 FITS = 4.0  # residual of a relation, in tolerances
 DIFFERS = 3.0  # smallest difference, in multiples of FITS; below it, relations are indistinguishable from rounding
 SMALLEST_BOARD = 4  # smallest number of rows and columns for a significant alternation
+CLOSE_TO_ONE = 1e-3  # smaller differences of a factor from 1 are printed as such
+FEWEST_ROUNDED = 8  # entries from which the size of rounding errors is told
+MOST_INDICES = 8  # indices of an axis that are listed
 LARGEST_PERMUTED = 16  # longest axis that is searched for a permutation
 KNOWN = {
     "2": 2.0, "3": 3.0, "4": 4.0, "5": 5.0, "6": 6.0, "9": 9.0, "1/2": 0.5, "1/3": 1 / 3, "1/4": 0.25, "1/5": 0.2,
@@ -84,7 +87,20 @@ def relations(
         return [Relation(kind="nan", text=f"{_part_of(broken)} not finite")]
     if not pair.telling:
         return [Relation(kind="entries", text="the difference is of the size of rounding")]
-    search = (_times, _orders, _signs, _clamps, _axes, _plus, _matrices, _arrays, _regions, _parities, _entries)
+    search = (
+        _times,
+        _orders,
+        _signs,
+        _clamps,
+        _axes,
+        _plus,
+        _offsets,
+        _matrices,
+        _arrays,
+        _regions,
+        _parities,
+        _entries,
+    )
     return [relation for one in search for relation in one(pair, others)]
 
 
@@ -97,6 +113,15 @@ def number_text(value: float) -> str:
     return f"{value:.6g}"
 
 
+def factor_text(factor: float) -> str:
+    """A factor as text; of one close to 1, the difference from 1, which shows a constant of few digits."""
+    off = factor - 1.0
+    if not 0 < abs(off) < CLOSE_TO_ONE:
+        return number_text(factor)
+    size = " (a constant rounded to float32 differs by up to 6e-8)" if abs(off) < 2.0**-24 else ""
+    return f"1 {'+' if off > 0 else '-'} {abs(off):.2g}{size}"
+
+
 def _times(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     square = float((pair.expected**2).sum())
     if not square:
@@ -105,7 +130,7 @@ def _times(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation
     if not pair.got.any():
         yield Relation(kind="zero", text="0 everywhere", value=0.0)
     elif pair.close(factor * pair.expected, factor):
-        text = "has the opposite sign" if math.isclose(factor, -1.0, rel_tol=1e-5) else f"times {number_text(factor)}"
+        text = "has the opposite sign" if math.isclose(factor, -1.0, rel_tol=1e-5) else f"times {factor_text(factor)}"
         yield Relation(kind="times", text=text, value=factor)
 
 
@@ -191,8 +216,16 @@ def _axes(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]
             continue
         inner = [_inside(pair.part(axis, int(k))) for k in bad]
         same = inner[0] if all(i == inner[0] for i in inner) else ""
-        where = f"only at {[int(k) for k in bad]} of axis {axis}" + (f", there {same}" if same else "")
+        where = f"only at {_indices(bad, size, others)} of axis {axis}" + (f", there {same}" if same else "")
         yield Relation(kind="axis", text=where, index=(axis, *(int(k) for k in bad)))
+
+
+def _indices(bad: NDArray, size: int, others: Mapping[str, NDArray]) -> str:
+    """Indices of an axis: every visible Gaussian, or a list, or their number if there are many."""
+    visible = others.get("visible")
+    if visible is not None and visible.shape == (size,) and np.array_equal(np.flatnonzero(visible), bad):
+        return "every visible Gaussian"
+    return f"{[int(k) for k in bad]}" if len(bad) <= MOST_INDICES else f"{len(bad)} of {size} indices"
 
 
 def _inside(pair: OutputPair) -> str:
@@ -217,6 +250,25 @@ def _plus(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]
         if off[0].size > 1 and pair.close(pair.expected + added):
             shown = ", ".join(f"{a:.4g}" for a in along)
             yield Relation(kind="plus", text=f"plus ({shown}) along axis 0", value=float(along[0]))
+
+
+def _offsets(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+    """A constant added where entries are wrong, one for each row of axis 0; others, such as hidden ones, are right."""
+    if pair.got.ndim < 2 or pair.wrong.all() or len(pair.got) > LARGEST_PERMUTED:
+        return
+    off, rows = pair.got - pair.expected, []
+    for row, wrong, unit in zip(off, pair.wrong, pair.unit):
+        if not wrong.any():
+            rows.append(0.0)
+            continue
+        value = float(np.median(row[wrong]))
+        if wrong.sum() < 2 or not (np.abs(row[wrong] - value) <= FITS * unit[wrong]).all():
+            return
+        rows.append(value)
+    if pair.wrong.any():
+        each = f"({', '.join(f'{a:.4g}' for a in rows)}) along axis 0"
+        text = f"plus {rows[0]:.6g}" if len(set(rows)) == 1 else f"plus {each}"
+        yield Relation(kind="plus", text=f"{text}, where it is wrong", value=rows[0])
 
 
 TRANSFORMS = {
@@ -288,8 +340,26 @@ def _parities(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relat
             yield Relation(kind="where", text=f"only at {text}, counted from 0", value=2.0)
 
 
+ROUNDED = {"single precision (2^-24)": 2.0**-24, "half precision (2^-11)": 2.0**-11}
+
+
+def _rounded(pair: OutputPair) -> str:
+    """The precision whose rounding errors the relative errors look like: of both signs, and none much larger."""
+    where = pair.wrong & (pair.expected != 0)
+    if where.sum() < FEWEST_ROUNDED:
+        return ""
+    off = (pair.got[where] - pair.expected[where]) / np.abs(pair.expected[where])
+    typical = float(np.median(np.abs(off)))
+    mixed = 4 * min((off > 0).sum(), (off < 0).sum()) > len(off) / 2
+    for name, unit in ROUNDED.items():
+        if mixed and unit / 16 < typical < 4 * unit:
+            return f"; the relative errors, typically {typical:.1g}, are of the size of rounding to {name}"
+    return ""
+
+
 def _entries(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    yield Relation(kind="entries", text=f"{_part_of(pair.wrong)} {_have(pair.wrong)} another value")
+    text = f"{_part_of(pair.wrong)} {_have(pair.wrong)} another value{_rounded(pair)}"
+    yield Relation(kind="entries", text=text)
 
 
 def _part_of(where: NDArray) -> str:

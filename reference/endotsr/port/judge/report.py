@@ -56,11 +56,22 @@ def as_table(report: Report, *, everything: bool = False) -> str:
 
 
 def answer(report: Report, *, everything: bool = False) -> list[str]:
-    """The faults: how the port failed, the first wrong operation, its explanations and resemblances."""
+    """The faults: how the port failed, the first wrong operation, its explanations and resemblances.
+
+    A known mistake that explains everything stands above a change of the definition that was searched, which stands
+    above the others.
+    """
+    known = _suspects(report, everything=everything)
+    certain = bool(report.suspects) and report.suspects[0].whole
+    explanations = [*known, *report.causes] if certain else [*report.causes, *known]
     return [
-        *report.failures, *report.needles, *report.diagnosis[:1], *report.inside, *report.causes,
-        *_suspects(report, everything=everything), *report.diagnosis[1:],
-    ]  # fmt: skip
+        *report.failures,
+        *report.needles,
+        *report.diagnosis[:1],
+        *report.inside,
+        *explanations,
+        *report.diagnosis[1:],
+    ]
 
 
 def _level(case: CaseReport) -> int:
@@ -103,6 +114,8 @@ def _suspects(report: Report, *, everything: bool) -> list[str]:
     lines += [f"  and {len(named) - most} more, which {MORE}"] if len(named) > most else []
     if named:
         return lines
+    if report.pair:
+        return [f"looks like two mistakes at once: {' and '.join(report.pair)}; each has outputs of its own"]
     names = ", ".join(f"{s.flag} ({s.score:.2f})" for s in (report.suspects if everything else report.suspects[:3]))
     more = f", and {len(report.suspects) - 3} more, which {MORE}" if len(report.suspects) > 3 and not everything else ""
     return [f"{UNKNOWN}; resembles in part, of 1: {names}{more}"] if names else [] if report.causes else [UNKNOWN]

@@ -28,7 +28,16 @@ from endotsr.port.judge.profiles import (
     profile_claims,
     without_reverse,
 )
-from endotsr.port.judge.recognise import NAMED, Evidence, Suspect, Taken, evidence_of, merged, suspects_of
+from endotsr.port.judge.recognise import (
+    NAMED,
+    Evidence,
+    Suspect,
+    Taken,
+    evidence_of,
+    merged,
+    pair_of,
+    suspects_of,
+)
 from endotsr.port.judge.relate import relations
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.trajectory import FirstWrong, first_wrong_iteration
@@ -98,6 +107,8 @@ class Report(msgspec.Struct, kw_only=True):
     cases: list[CaseReport]
     suspects: list[Suspect]
     notes: list[str]
+    pair: tuple[str, ...] = ()
+    """two known mistakes that together explain every refused output, if none does alone"""
     diagnosis: list[str] = []
     """the first wrong operation and the relations of its outputs to the expected ones; empty if nothing is refused"""
     causes: list[str] = []
@@ -211,13 +222,16 @@ def conclude(
     counts = {k: _count(reports, k) for k in LEVELS if k <= level}
     reached = complete_level(counts, gaps=bool(profile))
     _, first = first_wrong(golden.cases, reports)
+    evidence = merged(r.evidence for r in reports)
+    suspects = suspects_of(golden, evidence)
+    pair = None if any(one.named for one in suspects) else pair_of(evidence)
     return Report(
         version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
         claim=_claim(golden, reached, precision, without, profile), levels=counts, cases=reports,
-        suspects=suspects_of(golden, merged(r.evidence for r in reports)), notes=notes,
+        suspects=suspects, notes=notes, pair=(pair.first, pair.second) if pair else (),
         diagnosis=diagnosis(golden.cases, reports), first_wrong=first.operation if first else "",
         needles=only_needles(_off(golden, reports, precision)), profile=profile,
-        profiles=profile_claims(_graded(reports)),
+        profiles=[one for one in profile_claims(_graded(reports)) if profile in ("", one.profile)],
     )  # fmt: skip
 
 

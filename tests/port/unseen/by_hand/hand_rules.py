@@ -129,7 +129,7 @@ def density(i, s):
     visits = i["visible"].sum(0)
     mean = np.where(i["visible"], norms, 0).sum(0) / np.maximum(visits, 1)
     pruned = 1 / (1 + np.exp(-i["opacity_logit"])) < d["prune_opacity"]
-    chosen = ~pruned & (mean >= d["gradient_threshold"])
+    chosen = ~pruned & ((mean > 0) if d["growth"] == "budget" else (mean >= d["gradient_threshold"]))
     room = max(d["maximum"] - (~pruned).sum(), 0)
     if chosen.sum() > room:
         order = np.argsort(np.where(chosen, -mean, np.inf), kind="stable")[:room]

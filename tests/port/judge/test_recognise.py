@@ -1,0 +1,65 @@
+"""Names by evidence: of a contradicted case, of two mistakes at once, and their place beside a line of the search."""
+
+import pytest
+
+from endotsr.port.judge.diagnose import ORDER, first_wrong
+from endotsr.port.judge.recognise import Evidence, Suspect, contradicted, pair_of
+from endotsr.port.judge.report import answer
+from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
+
+
+def suspect(evidence):
+    return Suspect(flag="flag", title="Title", wrong="a; right: b", score=evidence.score, evidence=evidence)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "named"),
+    [
+        (Evidence(agrees=["composite/a/x", "composite/a/y"]), True),
+        (Evidence(agrees=["composite/a/x", "composite/a/y"], passes=["composite/b/x"]), False),
+        (Evidence(agrees=["composite/a/x"], fits=["composite/c/x"] * 9, differs=["composite/b/x"]), False),
+        (Evidence(agrees=["composite/a/x", "composite/b/x"], passes=["composite/c/x"]), True),
+        (Evidence(agrees=["composite/a/x"], passes=["composite/a/y"]), True),  # one pass of the two alone
+        (Evidence(agrees=["masked_l1/equal/x"], passes=["laplacian/equal/x"]), True),  # two operations share a rule
+    ],
+)
+def test_one_case_that_others_contradict_gives_no_name(evidence, named):
+    assert contradicted(evidence) != named
+    assert suspect(evidence).named == named
+
+
+def test_two_mistakes_in_two_outputs_are_told():
+    one = Evidence(agrees=["d/a/x", "d/b/x"], unexplained=["d/a/y", "d/b/y"])
+    two = Evidence(agrees=["d/a/y", "d/b/y"], unexplained=["d/a/x", "d/b/x"])
+    assert pair_of({"one": one, "two": two})[:2] == ("one", "two")
+    less = Evidence(agrees=["d/a/y"], differs=["d/b/y"], unexplained=["d/a/x", "d/b/x"])
+    assert pair_of({"one": one, "two": less}) is None
+    assert pair_of({"one": one, "two": two, "three": two}) is None, "not alone"
+    assert pair_of({"one": one}) is None
+
+
+def report(score_one):
+    evidence = Evidence(agrees=["d/a/x"], passes=[] if score_one else ["d/a/y"] * 3)
+    case = CaseReport(name="d/a", title="", operation="density", level=1, status="refused")
+    return Report(version="4.1.0", precision="float64", asked_level=1, level=0, without=(), claim="", levels={},
+                  cases=[case], suspects=[suspect(evidence)], notes=[], diagnosis=["first wrong: density"],
+                  causes=["your outputs are those of the definition with `2`"])  # fmt: skip
+
+
+def test_a_name_that_explains_everything_stands_above_a_line_of_the_search():
+    lines = answer(report(True))
+    assert lines.index("looks like:") < lines.index(report(True).causes[0])
+    lines = answer(report(False))
+    assert lines.index("looks like:") > lines.index(report(False).causes[0])
+
+
+def test_the_first_wrong_operation_is_that_of_the_method():
+    golden = read_golden(golden_folder())
+    assert {case.operation for case in golden.cases} == set(ORDER)
+    refused = [OutputReport(name="d_rendered", level=2, status="refused", reason="")]
+    reports = [
+        CaseReport(name=name, title="", operation=name.split("/")[0], level=1, status="refused", outputs=refused)
+        for name in ("laplacian/equal", "masked_l1/equal")
+    ]
+    assert first_wrong(golden.cases, reports)[1].operation == "masked_l1"
