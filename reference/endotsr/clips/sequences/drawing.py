@@ -22,7 +22,7 @@ from endotsr.clips.sequences.carry_masks import (
 )
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
-from endotsr.clips.sequences.mask_shapes import LARGEST, Origin, MaskShape, shapes_of
+from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, Origin, shapes_of
 from endotsr.clips.sequences.propose_masks import Proposal
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
