@@ -207,7 +207,8 @@ assert swing[both] < swing[alone] - 2
 #     moved = np.stack([warp_cubic(image, factor * field) for image, factor in zip(images, factors, strict=True)])
 #     image = _mixed(moved, images, seen, both, weights)
 #     depth = _blended(depth, known, weights)
-#     mask = np.tensordot(weights, seen, 1) > 0
+#     used = seen & (weights > 0)[:, None, None]
+#     mask = used[0] | used[1]
 #     time = (1.0 - fraction) * float(sequence.times[earlier]) + fraction * float(sequence.times[later])
 #     camera = camera_between(sequence.cameras[earlier], sequence.cameras[later], fraction)
 #     return Frame(np.ascontiguousarray(np.clip(image, 0, 1)), mask, depth, time, camera)
@@ -225,7 +226,8 @@ assert swing[both] < swing[alone] - 2
 #     """
 #     of_moved, of_still = _difference(moved), _difference(still)
 #     fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the unwarped pair: (18.7), (18.9)
-#     return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)  # (18.6)
+#     at_rest = weights[0] * still[0] + weights[1] * still[1]  # a matrix product would start library threads
+#     return (1 - fraction) * _blended(moved, seen, weights) + fraction * at_rest  # (18.6)
 # ```
 #
 # <!-- definition: endotsr.clips.sequences.between._difference -->

@@ -22,7 +22,7 @@ from unittest import mock
 
 from endotsr.cli.main import main as endotsr
 from endotsr.cli.parts import progress, waiting
-from endotsr.clips.sequences.checks.duration import COMPILATION, Plan, Standing, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.checks.duration import COMPILATION, TimedCommand, Standing, assumed_unit, estimated_seconds
 from endotsr.results.evaluation.metrics import psnr
 from endotsr.results.report import live_page
 from endotsr.results.report.live_page import LivePage
@@ -69,7 +69,7 @@ class Heard:
         self.trained, self.largest_rise, self._least = 0.0, 0.0, float("inf")
         self._about: LivePage | None = None
 
-    def first_line(self, plan: Plan, unit: float | None, compiled: bool) -> str:
+    def first_line(self, plan: TimedCommand, unit: float | None, compiled: bool) -> str:
         """In place of `waiting_line`."""
         found = estimated_seconds(plan, unit or assumed_unit(plan.threads))
         left = sum(found) - found.reading + (0.0 if compiled else COMPILATION)
