@@ -22,7 +22,7 @@ from unittest import mock
 
 from endotsr.cli.main import main as endotsr
 from endotsr.cli.parts import progress, waiting
-from endotsr.clips.sequences.checks.duration import COMPILATION, TimedCommand, Standing, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
 from endotsr.results.evaluation.metrics import psnr
 from endotsr.results.report import live_page
 from endotsr.results.report.live_page import LivePage
