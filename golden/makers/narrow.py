@@ -105,7 +105,7 @@ def _screens() -> list[Spec]:
     return [
         Spec("composite", "close_depths", "composite", "Overlapping Gaussians with depths a thousandth apart",
              ("order_by_index", "depths_in_steps"), raster_settings(PAPER), inputs),
-        tile_case("next_tile", tiles, ("tiles_with_the_last",), [7.45, 23.4, 30.0], [8.2, 7.4, 10.0], [9.0, 9.0, 4.0]),
+        tile_case("next_tile", tiles, ("tiles_unbounded",), [7.45, 23.4, 30.0], [8.2, 7.4, 10.0], [9.0, 9.0, 4.0]),
     ]  # fmt: skip
 
 

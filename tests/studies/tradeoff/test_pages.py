@@ -79,7 +79,7 @@ def test_three_sentences_with_the_figures_of_the_measurement(result):
     sentences = advice(result)
     assert len(sentences) == 3 and all(s.endswith(".") for s in sentences)
     paper = next(p for p in result["points"] if p["name"] == "paper")
-    assert f"{paper['error']['max'] * 255:.2g}/255 at the worst pixel" in sentences[0]
+    assert f"its error at the worst pixel {paper['error']['max'] * 255:.2g}/255" in sentences[0]
 
 
 def test_the_factor_of_the_cutoff_is_the_largest_of_the_sweep(result):
