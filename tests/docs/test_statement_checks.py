@@ -114,7 +114,8 @@ def test_every_released_program_is_named():
         r"\b(?:the|a) released (?:code|program|implementation)\b(?! (?:of|called|named) )", re.IGNORECASE
     )
     files = [f for pattern in PLACES for f in ROOT.glob(pattern)]
-    files = [f for f in files if f.name != "references.md"]  # which names them
+    # The references name them; the list of cases is written by the build of the book, from the titles of the cases.
+    files = [f for f in files if f.name not in ("references.md", "golden_cases.md")]
     assert [f.name for f in files if words.search(f.read_text(encoding="utf-8"))] == []
 
 

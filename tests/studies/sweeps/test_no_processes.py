@@ -8,6 +8,7 @@ import pytest
 
 from endotsr.studies.sweeps import local
 from endotsr.studies.sweeps.execute import FINISHED, INTERRUPTED, Outcome
+from endotsr.training.runs.stopping import stop_asked
 
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
 
@@ -44,6 +45,7 @@ def test_a_signal_stops_them(without, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         found.extend(outcome for outcome in local.local_outcomes([object()] * 3, 1, 1) if outcome is not None)
     assert len(found) <= 1
+    assert not stop_asked(), "the next training in this process would stop at once"
 
 
 def test_here_processes_can_be_used():

@@ -163,12 +163,11 @@ def _work(job: Job, threads: int) -> Outcome:
     """In a worker: one run, interruptible between iterations."""
     from endotsr.training.runs.stopping import signals_stop, stop_asked
 
-    try:
-        with signals_stop():
+    with signals_stop():
+        try:
             _working.set()
-            outcome = execute(job, threads)
-    finally:
-        _working.clear()
-        if stop_asked():
-            os._exit(0)  # the parent waits for this process to exit and ignores its outcome
-    return outcome
+            return execute(job, threads)
+        finally:
+            _working.clear()
+            if stop_asked():
+                os._exit(0)  # the parent waits for this process to exit and ignores its outcome

@@ -48,6 +48,7 @@ def signals_stop() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        _asked.clear()  # a later training in this process is not stopped
 
 
 @contextlib.contextmanager
@@ -67,5 +68,5 @@ def finishing() -> Iterator[None]:
 
 
 def stop_asked() -> bool:
-    """Whether a signal has arrived since the command began."""
+    """Whether a signal has arrived in the present block of `signals_stop`."""
     return _asked.is_set()
