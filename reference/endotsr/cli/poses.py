@@ -18,9 +18,9 @@ class PosesOptions:
 
     SEQUENCE is a folder from `endotsr prepare` with depth. The poses are added to its sequence.toml, where their origin
     is stated. Frames that show too little are interpolated, and named. A scope that seems to be still is left as it is,
-    and so is a clip whose depth is a plane (`endotsr depth --flat`).
-    Motion of the whole tissue, as in breathing, cannot be told from motion of the scope. An interrupted command
-    continues where it was. Exit code 1: nothing written, for one of these two reasons.
+    and so is a clip whose depth is a plane (`endotsr depth --flat`). Motion of the whole tissue, as in breathing,
+    cannot be told from motion of the scope. An interrupted command continues where it was. Exit code 1: nothing
+    written, for one of these two reasons.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]

@@ -15,7 +15,6 @@ def groups(tmp_path, monkeypatch):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_text(text)
 
-    monkeypatch.setattr(machine, "CGROUP_LIMITS", ())
     monkeypatch.setattr(machine, "CGROUP_OF_PROCESS", str(tmp_path / "cgroup"))
     places = {"": (str(tmp_path / "v2"), "memory.max"), "memory": (str(tmp_path / "v1"), "memory.limit_in_bytes")}
     monkeypatch.setattr(machine, "CGROUPS", places)
@@ -40,6 +39,6 @@ def test_memory_is_at_most_the_limit(groups):
 
 
 def test_without_control_groups_there_is_no_limit(monkeypatch):
-    monkeypatch.setattr(machine, "CGROUP_LIMITS", ("/nowhere/memory.max",))
+    monkeypatch.setattr(machine, "CGROUPS", {"": ("/nowhere", "memory.max")})
     monkeypatch.setattr(machine, "CGROUP_OF_PROCESS", "/nowhere/cgroup")
     assert machine.container_limit() is None

@@ -1,10 +1,12 @@
 """Profiles: a port of one part claims this part, in words; a part with a gap or a mistake claims less."""
 
 import shutil
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from endotsr.cli import golden as golden_command
 from endotsr.cli.golden import run
 from endotsr.errors import InputError
 from endotsr.port.judge.command import write_requests
@@ -38,6 +40,10 @@ def port(answered, tmp_path):
 
 def said(report):
     return {one.profile: one.level for one in report.profiles}
+
+
+def test_the_command_takes_every_profile():
+    assert get_args(golden_command.Profile) == ("", *PROFILES)
 
 
 def test_every_operation_of_a_profile_has_cases_and_training_has_all_but_the_options(golden):

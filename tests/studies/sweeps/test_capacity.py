@@ -4,8 +4,8 @@ import msgspec
 import pytest
 
 from endotsr.config import PAPER, SHARP
-from endotsr.method.kernels.machine import memory_of_machine
-from endotsr.studies.sweeps.place import Size, capacity, free_memory, run_bytes
+from endotsr.method.kernels.machine import memory_available, memory_of_machine
+from endotsr.studies.sweeps.place import Size, capacity, run_bytes
 
 FULL = Size(63, 640, 512)
 RUN = run_bytes(FULL, PAPER)
@@ -47,10 +47,10 @@ def test_the_scale_is_that_of_the_size_already():
 
 
 def test_memory_of_this_machine_is_found():
-    assert 1e6 < (free_memory() or 0.0) <= (memory_of_machine() or 0) < 1e15
+    assert 1e6 < (memory_available() or 0.0) <= (memory_of_machine() or 0) < 1e15
 
 
 def test_where_memory_is_unknown_little_is_assumed_and_said(monkeypatch):
-    monkeypatch.setattr("endotsr.studies.sweeps.place.free_memory", lambda: None)
+    monkeypatch.setattr("endotsr.studies.sweeps.place.memory_available", lambda: None)
     found = capacity([RUN] * 9, cores=64)
     assert found.workers == 1 and found.reason.endswith("4.0 GB assumed: free memory is unknown")

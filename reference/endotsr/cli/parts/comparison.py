@@ -134,8 +134,9 @@ def _metrics(
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
         return cast("EvaluationRecord", read_json(path / "metrics.json")), sequence
+    from endotsr.clips.sequences.video_file import is_video
     from endotsr.results.evaluation.lpips import load_lpips_weights
-    from endotsr.results.evaluation.pictures import find_pictures, is_video, measure_pictures
+    from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
 
     if not path.is_dir() and not is_video(path):
         return cast("EvaluationRecord", read_json(path)), sequence

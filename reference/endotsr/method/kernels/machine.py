@@ -5,9 +5,8 @@ import os
 import platform
 from pathlib import Path
 
-CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # versions 2 and 1
 CGROUP_OF_PROCESS = "/proc/self/cgroup"
-# By the controllers that a line of this file names: where the groups are, and the name of the file with the limit.
+# Versions 2 and 1. By the controllers that a line of this file names: where the groups are, and the file of the limit.
 CGROUPS = {"": ("/sys/fs/cgroup", "memory.max"), "memory": ("/sys/fs/cgroup/memory", "memory.limit_in_bytes")}
 NO_LIMIT = 1 << 62  # version 1 writes a number near 2^63 instead of `max`
 
@@ -47,7 +46,7 @@ def memory_available() -> int | None:
 
 def container_limit() -> int | None:
     """The least limit of memory, bytes, of the control groups of this process; None without one."""
-    files = [Path(name) for name in CGROUP_LIMITS]
+    files = [Path(top, file) for top, file in CGROUPS.values()]
     try:
         words = [line.split(":", 2) for line in Path(CGROUP_OF_PROCESS).read_text(encoding="utf-8").splitlines()]
     except (OSError, UnicodeError):

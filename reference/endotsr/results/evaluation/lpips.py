@@ -51,17 +51,23 @@ def default_weights_path() -> Path:
     return Path(user_data_dir("endotsr", appauthor=False)) / FILE_NAME
 
 
+def lpips_file(path: str | os.PathLike | None = None) -> Path | None:
+    """The file of the weights: `path`, else that in ENDOTSR_LPIPS, else `default_weights_path()` if it exists."""
+    named = path if path is not None else os.environ.get(ENVIRONMENT) or None
+    if named is not None:
+        return Path(named)
+    fallback = default_weights_path()
+    return fallback if fallback.exists() else None
+
+
 def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | None:
-    """Weights from `path`, else from the file in ENDOTSR_LPIPS, else from `default_weights_path()`, else None.
+    """Weights from the file of `lpips_file`, None without one.
 
     Raises InputError naming file and key if a named file is missing, or a file is unusable.
     `lpips_obstacle(None, ...)` lists the searched locations.
     """
-    named = path if path is not None else os.environ.get(ENVIRONMENT) or None
-    if named is None:
-        fallback = default_weights_path()
-        return _read_weights(fallback) if fallback.exists() else None
-    return _read_weights(Path(named))
+    file = lpips_file(path)
+    return None if file is None else _read_weights(file)
 
 
 def lpips_obstacle(weights: LpipsWeights | None, height: int, width: int) -> str | None:

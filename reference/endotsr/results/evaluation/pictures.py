@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import pictures as stored
 from endotsr.clips.sequences.files import frame_numbers, shortened
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.video_file import VIDEO_ENDINGS, video_facts, video_pictures
+from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array, FloatArray
 from endotsr.results.evaluation.evaluate import evaluate_model
@@ -74,11 +74,6 @@ def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
         f"{folder}: {len(files)} {files[0].suffix} files cannot be paired with the {len(held_out)} held-out frames "
         f"({wanted}); allowed: their names, their numbers, or one file for each, numbered in order"
     )
-
-
-def is_video(path: Path) -> bool:
-    """Whether a path is a file with a video's extension."""
-    return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
 
 
 def _of_video(path: Path, sequence: Sequence) -> Pictures:

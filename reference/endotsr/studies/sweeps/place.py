@@ -12,7 +12,7 @@ from endotsr.clips.sequences.checks.duration import expected_frames
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config, with_settings
 from endotsr.errors import InputError
-from endotsr.method.kernels.machine import memory_available, memory_of_machine, usable_cores
+from endotsr.method.kernels.machine import memory_available, usable_cores
 from endotsr.method.kernels.memory import ASSUMED
 from endotsr.studies.sweeps.execute import Outcome
 from endotsr.studies.sweeps.jobs import Job
@@ -102,7 +102,7 @@ def capacity(
     Two threads train less than twice as fast as one, so a sweep finishes sooner with many runs of few threads.
     """
     cores = cores or usable_cores()
-    known = free_memory() if free is None else free
+    known = memory_available() if free is None else free
     free = ASSUMED if known is None else known
     needed = max(memory, default=0.0)
     by_memory = max(1, int(USABLE * free / needed)) if needed else cores
@@ -111,8 +111,3 @@ def capacity(
     found = f"{free / 1e9:.1f} GB " + ("free" if known is not None else "assumed: free memory is unknown")
     reason = f"{cores} cores, {needed / 1e9:.1f} GB per run, {found}"
     return Capacity(chosen, threads or max(1, cores // chosen), reason)
-
-
-def free_memory() -> float | None:
-    """Free memory in bytes, at most the limit of a container; None if the system does not report it."""
-    return min((value for value in (memory_available(), memory_of_machine()) if value is not None), default=None)
