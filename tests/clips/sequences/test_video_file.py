@@ -123,7 +123,7 @@ def test_a_video_that_shows_nothing_is_refused_by_prepare(tmp_path, capsys):
 
 
 def test_metadata_that_are_no_text_do_not_hide_the_pictures(tmp_path):
-    """A title in another encoding, as recorders write it."""
+    """A title in another encoding, as recorders write it, and as long as before: its element states the length."""
     with av.open(str(tmp_path / "a.mkv"), "w") as container:
         container.metadata["title"] = "OPERATION"
         stream = container.add_stream("libx264", rate=25)
@@ -133,7 +133,9 @@ def test_metadata_that_are_no_text_do_not_hide_the_pictures(tmp_path):
         container.mux(stream.encode())
     data = (tmp_path / "a.mkv").read_bytes()
     assert data.count(b"OPERATION") == 1
-    (tmp_path / "a.mkv").write_bytes(data.replace(b"OPERATION", b"OP\xc4RATI\xff"))
+    title = b"OP\xc4RATI\xffN"
+    assert len(title) == len(b"OPERATION")
+    (tmp_path / "a.mkv").write_bytes(data.replace(b"OPERATION", title))
     assert video_facts(tmp_path / "a.mkv").count == 3
 
 

@@ -282,7 +282,8 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             options: Any = _metadata_ignored(av.__version__)
             container = av.open(file, "r", **options)
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
-            raise InputError(f"{path}: not a video that can be decoded: {plain_line(str(error))}") from None
+            said = getattr(error, "strerror", None) or str(error)  # without the number of the open file
+            raise InputError(f"{path}: not a video that can be decoded: {plain_line(said)}") from None
         with container:
             stream: Any = container.streams.best("video")
             if stream is None or stream.codec_context is None:
