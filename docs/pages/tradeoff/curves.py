@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from endotsr.results.report.labels import Label, place_labels
 from endotsr.results.report.style import GREY, LIGHT, SMALL, name_axes, new_figure
-from pages.tradeoff.figures import logarithmic_axes, save_pictures
-from pages.tradeoff.labels import Label, place_labels
+from endotsr.studies.tradeoff.figure import logarithmic_axes
+from pages.tradeoff.figures import save_pictures
 
 
 def training_figure(result: dict[str, Any]) -> Any:

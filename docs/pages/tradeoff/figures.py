@@ -1,82 +1,21 @@
-"""Work-precision diagrams from `tradeoff.json`: logarithmic, with labelled curves, legible without colour."""
+"""Each dial of the renderer separately, from `tradeoff.json`: a panel of the error against the cost for every dial."""
 
 import math
 from pathlib import Path
 from typing import Any
 
-from endotsr.results.report.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    GREY,
-    INK,
-    NORMAL,
-    ORANGE,
-    SMALL,
-    Sizes,
-    name_axes,
-    new_figure,
-    plain_axes,
-    save,
+from endotsr.results.report.labels import Label, place_labels
+from endotsr.results.report.style import BLUE, FAINT, GREEN, INK, NORMAL, SMALL, new_figure, save
+from endotsr.studies.tradeoff.figure import (
+    FLOOR,
+    cost_factor,
+    cost_name,
+    draw_levels,
+    error_height,
+    logarithmic_axes,
+    main_figure,
 )
 from endotsr.studies.tradeoff.study import cost_of
-from endotsr.studies.tradeoff.text import LEVELS
-from pages.tradeoff.labels import Label, place_labels
-from pages.tradeoff.text import small
-
-TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
-FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn
-
-
-def main_figure(result: dict[str, Any]) -> Any:
-    """Every setting of the joint sweep, the front and the presets: error against time, and against visits."""
-    figure = new_figure(11.0, 5.0)
-    left, right = figure.subplots(1, 2, sharey=True)
-    labels = []
-    for axes, cost in ((left, "forward"), (right, "visits")):
-        labels += _sweep(axes, result, cost)
-        _levels(axes, result)
-        logarithmic_axes(axes, _cost_name(cost))
-        axes.set_ylim(FLOOR / 10, 1000)
-        low, high = axes.get_xlim()
-        axes.set_xlim(low / 4, high * 2)
-    name_axes(left, y="largest error of the image, 1/255", title="Error against time per frame")
-    name_axes(right, title="and against visited pairs")
-    place_labels(figure, labels)
-    return figure
-
-
-def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
-    """Draw the points; returns their labels, presets first."""
-    by_name = {p["name"]: p for p in result["points"]}
-    factor = _factor(cost)
-
-    def at(name: str) -> tuple[float, float]:
-        return cost_of(by_name[name], cost) * factor, _height(by_name[name])
-
-    for precision, marker in (("float64", "s"), ("float32", "o")):
-        chosen = [at(n) for n in result["joint"] if by_name[n]["setting"]["precision"] == precision]
-        if chosen:
-            axes.scatter(*zip(*chosen, strict=True), s=16, marker=marker, color=FAINT, linewidths=0, zorder=2)
-    swept = [n for n in result["fronts"][cost] if n in result["joint"]]
-    if swept:
-        axes.plot(*zip(*map(at, swept), strict=True), color=BLUE, linewidth=1.8, marker="o", markersize=4, zorder=3)
-    labels = []
-    for preset, name in result["presets"].items():
-        axes.plot(*at(name), marker="D", color=ORANGE, markersize=7, zorder=4)
-        text = f"{preset} (error 0 by definition)" if by_name[name]["error"]["max"] == 0 else preset
-        labels.append(Label(axes, text, *at(name), ORANGE, 9, "bold"))
-    return labels + [Label(axes, _short(by_name[name], cost), *at(name), BLUE) for name in swept]
-
-
-def _short(point: dict[str, Any], cost: str) -> str:
-    """Label of a setting: precision (which changes no visit), cutoff, and any other coarse choice."""
-    raster, scale = point["setting"]["raster"], point["setting"]["scale"]
-    cut, stop = raster["alpha_cutoff"], raster["transmittance_stop"]
-    words = [] if cost == "visits" else [point["setting"]["precision"]]
-    words.append(f"cutoff {small(cut)}")
-    words += [f"stop {stop:.0e}".replace("e-0", "e-")] if stop >= 1e-3 else []
-    return ", ".join(words + (["half size"] if scale != 1 else []))
 
 
 def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
@@ -95,8 +34,8 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
     for axes, dial in zip(panels, dials, strict=False):
         labels += _dial(axes, dial, by_name, cost, error)
         if error == "max":
-            _levels(axes, result, named=False)
-        counted = "basis terms" if cost == "visits" and dial["cost"] == "terms" else _cost_name(cost)
+            draw_levels(axes, result, named=False)
+        counted = "basis terms" if cost == "visits" and dial["cost"] == "terms" else cost_name(cost)
         logarithmic_axes(axes, counted, SMALL, title=dial["title"])
         _room(axes)
     for axes in panels[len(dials) :]:
@@ -109,11 +48,11 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
 
 def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, error: str) -> list[Label]:
     """Draw one curve; returns the labels of its points."""
-    factor = _factor(cost)
+    factor = cost_factor(cost)
     points = [by_name[name] for name in dial["points"].values()]
     terms = cost == "visits" and dial["cost"] == "terms"
     xs = [max(p["terms"], 1) if terms else cost_of(p, cost) * factor for p in points]
-    ys = [_height(p, error) for p in points]
+    ys = [error_height(p, error) for p in points]
     if cost != "visits":
         spreads = [p[cost] for p in points]
         below = [(s["median"] - s["low"]) * factor for s in spreads]
@@ -134,42 +73,6 @@ def _room(axes: Any) -> None:
     axes.xaxis.set_major_locator(LogLocator())
     axes.xaxis.set_minor_locator(NullLocator())
     axes.tick_params(labelleft=True)
-
-
-def _height(point: dict[str, Any], error: str = "max") -> float:
-    value = point["error"][error]
-    return max(value * LEVELS if error == "max" else value, FLOOR)
-
-
-def _factor(cost: str) -> float:
-    return 1.0 if cost == "visits" else 1e3
-
-
-def _cost_name(cost: str) -> str:
-    return "visited pixel-Gaussian pairs" if cost == "visits" else TIME[cost]
-
-
-def _levels(axes: Any, result: dict[str, Any], named: bool = True) -> None:
-    """Half a step of an 8-bit picture, and the noise of the sensor."""
-    lines = [(result["lines"]["eight_bit"], "half a step of 8 bit", "--")]
-    if result["lines"]["sensor_noise"]:
-        lines.append((result["lines"]["sensor_noise"], "sensor noise", ":"))
-    for value, label, dashes in lines:
-        axes.axhline(value * LEVELS, color=GREY, linestyle=dashes, linewidth=1, zorder=1)
-        if named:
-            axes.annotate(
-                label, (1, value * LEVELS), xycoords=("axes fraction", "data"), xytext=(-3, 2),
-                textcoords="offset points", ha="right", va="bottom", fontsize=8, color=GREY,
-            )  # fmt: skip
-
-
-def logarithmic_axes(axes: Any, name: str, sizes: Sizes = NORMAL, title: str = "", log_y: bool = True) -> None:
-    """Logarithmic axes in the common style; `name` is the label of the cost axis."""
-    axes.set_xscale("log")
-    if log_y:
-        axes.set_yscale("log")
-    name_axes(axes, name, title=title, sizes=sizes)
-    plain_axes(axes, sizes=sizes)
 
 
 def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:

@@ -5,17 +5,12 @@ from typing import Any
 
 from endotsr.results.report.tables import duration, plain
 from endotsr.studies.tradeoff.study import Ranked, dominates
-from endotsr.studies.tradeoff.text import levels
+from endotsr.studies.tradeoff.text import levels, small
 
 # Dominated presets with the reason to keep them. A test fails for a dominated preset without a reason.
 KEPT = {
     "legacy": "reproduces the released CUDA program, its three-sigma tiles and its gradients, for comparison",
 }
-
-
-def small(number: float) -> str:
-    """A cutoff or a stop: 1/255, 1/1024, 1e-4."""
-    return f"1/{round(1 / number)}" if number > 5e-4 else f"{number:.0e}".replace("e-0", "e-")
 
 
 def advice(result: dict[str, Any]) -> list[str]:

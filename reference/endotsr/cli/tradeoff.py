@@ -10,11 +10,12 @@ from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_folder, write_json
+from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
     from endotsr.studies.tradeoff.scenes import StudyScene
 
-RESULT = "tradeoff.json"  # in the folder of the measurement
+RESULT, PAGE = "tradeoff.json", "tradeoff.html"  # in the folder of the measurement
 
 
 @dataclass
@@ -73,6 +74,7 @@ def _refuse(options: TradeoffOptions) -> None:
 def _measure(options: TradeoffOptions) -> dict[str, Any]:
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.report.tables import plain
+    from endotsr.studies.tradeoff.page import tradeoff_page
     from endotsr.studies.tradeoff.study import described, run_study
     from endotsr.studies.tradeoff.text import COLUMNS, front_rows, made
 
@@ -84,7 +86,8 @@ def _measure(options: TradeoffOptions) -> dict[str, Any]:
     with StepBar("settings") as bar:
         result = described(run_study(scene, begin=bar.begin, step=bar.step))
     write_json(out / RESULT, result)
-    print(made(result), plain(COLUMNS, front_rows(result)), f"figures: {out / RESULT}", sep="\n")
+    replace_text(out / PAGE, tradeoff_page(result))
+    print(made(result), plain(COLUMNS, front_rows(result)), f"page: {out / PAGE}", f"figures: {out / RESULT}", sep="\n")
     return result
 
 

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from pages.tradeoff.figures import dials_figure, draw, main_figure
+from pages.tradeoff.figures import dials_figure, draw
 from pages.tradeoff.study import run_whole_study
 from pages.tradeoff.text import advice, error_over_cutoff
 
+from endotsr.studies.tradeoff.figure import main_figure
 from endotsr.studies.tradeoff.settings import CUTOFFS
 from endotsr.studies.tradeoff.study import described
 

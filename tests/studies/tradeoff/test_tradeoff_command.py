@@ -29,7 +29,7 @@ def test_files(measured):
     assert result["scene"]["name"] == "few" and result["scene"]["width"] == 32
     assert result["threads"] == 2 and result["date"] and result["machine"]["processor"]
     assert all(p["forward"]["low"] <= p["forward"]["median"] <= p["both"]["median"] for p in result["points"])
-    assert {p.name for p in out.iterdir()} == {"tradeoff.json"}
+    assert {p.name for p in out.iterdir()} == {"tradeoff.json", "tradeoff.html"}
 
 
 def test_a_measurement_is_not_overwritten(measured, capsys):

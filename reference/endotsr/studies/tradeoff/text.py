@@ -15,6 +15,11 @@ def milliseconds(seconds: float) -> str:
     return f"{seconds * 1e3:.3g} ms"
 
 
+def small(number: float) -> str:
+    """A cutoff or a stop: 1/255, 1/1024, 1e-4."""
+    return f"1/{round(1 / number)}" if number > 5e-4 else f"{number:.0e}".replace("e-0", "e-")
+
+
 def front_rows(result: dict[str, Any]) -> list[list[str]]:
     """The undominated settings, fastest first: name, times, visits, errors."""
     by_name = {p["name"]: p for p in result["points"]}

@@ -1,11 +1,13 @@
 """Labels of points, each at the first position around its point that is free of other labels and lines."""
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.transforms import Bbox
 
 STEP = 3.0  # pixels between the sampled points of a line
 COINCIDENT = 4.0  # pixels within which points have one common label
@@ -27,6 +29,8 @@ class Label(NamedTuple):
 
 def place_labels(figure: Any, labels: list[Label]) -> None:
     """Write the labels and fix the layout of the figure. A label without a free position is omitted."""
+    from matplotlib.transforms import Bbox
+
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     renderer = figure.canvas.get_renderer()
@@ -76,11 +80,13 @@ def _merged(labels: list[Label]) -> list[Label]:
     return found
 
 
-def _around(point: Any) -> Bbox:
+def _around(point: Any) -> "Bbox":
+    from matplotlib.transforms import Bbox
+
     return Bbox.from_bounds(point[0] - 4, point[1] - 4, 8, 8)
 
 
-def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox], lines: NDArray[np.float64]) -> Bbox | None:
+def _write(label: Label, renderer: Any, room: "Bbox", taken: "list[Bbox]", lines: NDArray[np.float64]) -> "Bbox | None":
     for radius in RADII:
         for right, up in DIRECTIONS:
             text = label.axes.annotate(
@@ -100,7 +106,7 @@ def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox], lines: ND
     return None
 
 
-def _text_box(text: Any, renderer: Any) -> Bbox:
+def _text_box(text: Any, renderer: Any) -> "Bbox":
     """The box of the text, without the line to the point."""
     from matplotlib.text import Text
 

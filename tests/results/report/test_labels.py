@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from pages.tradeoff.labels import Label, _line_points, _text_box, place_labels
 
+from endotsr.results.report.labels import Label, _line_points, _text_box, place_labels
 from endotsr.results.report.style import new_figure
 
 

@@ -1,0 +1,41 @@
+"""The page of a measurement: answers, diagram and table come from its figures."""
+
+import copy
+import json
+from pathlib import Path
+
+from endotsr.studies.tradeoff.page import compared_with_paper, tradeoff_page
+
+RESULT = json.loads((Path(__file__).parents[3] / "docs" / "results" / "tradeoff.json").read_text(encoding="utf-8"))
+POINTS = {point["name"]: point for point in RESULT["points"]}
+
+
+def test_the_sentence_names_the_cheapest_setting_within_a_level():
+    said = compared_with_paper(RESULT)
+    chosen = POINTS[said.split(" is off")[1].partition(". The setting ")[2]]
+    others = [p for p in RESULT["points"] if p["error"]["max"] <= 1 / 255 and p["name"] in RESULT["fronts"]["visits"]]
+    assert chosen in others and chosen["visits"] == min(p["visits"] for p in others)
+    paper = POINTS[RESULT["presets"]["paper"]]
+    assert f"{chosen['visits'] / paper['visits']:.1f} times its visits" in said
+
+
+def test_without_a_setting_within_a_level_the_sentence_says_so():
+    coarse = copy.deepcopy(RESULT)
+    for point in coarse["points"]:
+        point["error"]["max"] = 0.5
+    assert compared_with_paper(coarse).endswith("No measured setting is within one level of 8 bits.")
+
+
+def test_the_page_holds_the_front_the_answers_and_the_diagram():
+    page = tradeoff_page(RESULT)
+    assert all(name in page for name in RESULT["fronts"]["forward"])
+    assert "data:image/svg+xml;base64," in page and "--raster.alpha-cutoff" in page and "<script" not in page
+
+
+def test_a_budget_that_nothing_keeps_has_its_reason_and_names_are_escaped():
+    slow = copy.deepcopy(RESULT)
+    for point in slow["points"]:
+        point["forward"] |= {"median": 9.0, "high": 9.0}
+    slow["scene"]["name"] = "<b>scene"
+    page = tradeoff_page(slow)
+    assert "no measured setting renders" in page and "<b>scene" not in page and "--budget" not in page
