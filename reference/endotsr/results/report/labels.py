@@ -39,7 +39,7 @@ def place_labels(figure: Any, labels: list[Label]) -> None:
         room = Bbox.from_extents(*axes.get_window_extent(renderer).extents).padded(2)
         taken = [text.get_window_extent(renderer) for text in axes.texts]
         taken += [_around(axes.transData.transform((label.x, label.y))) for label in mine]
-        lines = _line_points(axes)
+        lines = line_points(axes)
         for label in mine:
             # A position without lines, or else one without other labels and points.
             box = _write(label, renderer, room, taken, lines) or _write(label, renderer, room, taken, lines[:0])
@@ -47,7 +47,7 @@ def place_labels(figure: Any, labels: list[Label]) -> None:
                 taken.append(box)
 
 
-def _line_points(axes: Any) -> NDArray[np.float64]:
+def line_points(axes: Any) -> NDArray[np.float64]:
     """Points in pixels along every line of the axes, (M, 2)."""
     found = [np.empty((0, 2))]
     for line in axes.lines:
@@ -97,7 +97,7 @@ def _write(label: Label, renderer: Any, room: "Bbox", taken: "list[Bbox]", lines
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.4},
                 arrowprops={"arrowstyle": "-", "color": label.colour, "linewidth": 0.4} if radius > RADII[0] else None,
             )  # fmt: skip
-            box = _text_box(text, renderer)
+            box = text_box(text, renderer)
             inside = box.x0 >= room.x0 and box.x1 <= room.x1 and box.y0 >= room.y0 and box.y1 <= room.y1
             crossed = box.padded(1).count_contains(lines) if len(lines) else 0
             if inside and not crossed and not any(box.overlaps(other) for other in taken):
@@ -106,7 +106,7 @@ def _write(label: Label, renderer: Any, room: "Bbox", taken: "list[Bbox]", lines
     return None
 
 
-def _text_box(text: Any, renderer: Any) -> "Bbox":
+def text_box(text: Any, renderer: Any) -> "Bbox":
     """The box of the text, without the line to the point."""
     from matplotlib.text import Text
 
