@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from endotsr.results.report.labels import Label, line_points, text_box, place_labels
+from endotsr.results.report.labels import Label, line_points, place_labels, text_box
 from endotsr.results.report.style import new_figure
 
 
