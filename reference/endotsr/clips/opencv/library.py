@@ -15,6 +15,8 @@ def cv2_library() -> Any:
     # The library reads these variables when it is loaded.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # AV_LOG_QUIET: its messages name no file
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MOST_PIXELS))
+    # An idle thread of its pool would yield 2000 times after every call, on a core that the kernels use.
+    os.environ.setdefault("OPENCV_THREAD_POOL_ACTIVE_WAIT_WORKER", "0")
     import cv2
 
     # Its messages on standard error name no file, and every failed call raises or returns nothing.
