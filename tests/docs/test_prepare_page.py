@@ -13,7 +13,8 @@ from endotsr.method.splatting.camera import CameraPose
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"
-TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera", "hand_held_training")
+TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera", "hand_held_training",
+          "pose_readings")  # fmt: skip
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
             "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP", "hamlyn": "Hamlyn",
             "scared": "SCARED", "servct": "SERV-CT", "c3vd": "C3VD", "nerfstudio": "nerfstudio"}  # fmt: skip
@@ -82,3 +83,16 @@ def test_a_table_of_the_guide_on_masks_is_what_its_result_says(name, tables):
     found, text = json.loads(made.FILE.read_text(encoding="utf-8")), made.PAGE.read_text(encoding="utf-8")
     for table in tables:
         assert getattr(made, table)(found) in text
+
+
+def test_a_wrong_reading_is_restored_by_its_own_name_alone():
+    from endotsr.clips.poses.agreement import Agreement
+    from pages.recordings.pose_readings import WRONG, restored, world_to_camera
+
+    rng = np.random.default_rng(3)
+    turn, centre = Rotation.from_rotvec(0.3 * rng.normal(size=(6, 3))).as_matrix(), 20 * rng.normal(size=(6, 3))
+    true = world_to_camera(turn, centre)
+    for wrong, name in (("inverse", "inverse"), ("LLFF's axes", "LLFF axes"), ("one frame late", "one frame late")):
+        given = world_to_camera(*WRONG[wrong](turn, centre))
+        said = {r: restored(Agreement("misread", 0, 0, 0, r), given, true) for r in ("inverse", "LLFF axes", name)}
+        assert said == {r: r == name for r in said}
