@@ -86,8 +86,9 @@ def test_a_table_of_the_guide_on_masks_is_what_its_result_says(name, tables):
 
 
 def test_a_wrong_reading_is_restored_by_its_own_name_alone():
-    from endotsr.clips.poses.agreement import Agreement
     from pages.recordings.pose_readings import WRONG, restored, world_to_camera
+
+    from endotsr.clips.poses.agreement import Agreement
 
     rng = np.random.default_rng(3)
     turn, centre = Rotation.from_rotvec(0.3 * rng.normal(size=(6, 3))).as_matrix(), 20 * rng.normal(size=(6, 3))

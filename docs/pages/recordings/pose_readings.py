@@ -135,7 +135,7 @@ def table(result: dict[str, Any]) -> str:
         rows.append([name, *cells])
     seconds = [one["seconds"] * 60 / a["frames"] for a in answers for one in a["verdicts"].values()]
     about = (
-        f"Simulated clips of {FRAMES} frames of {SMALL[0]}x{SMALL[1]}, {result['seeds']} seeds; each recorded clip once."
+        f"Simulated clips of {FRAMES} frames of {SMALL[0]}x{SMALL[1]}, {result['seeds']} seeds; a recorded clip once."
         f" A check takes {min(seconds):.1f} to {max(seconds):.1f} s of processor time for 60 frames,"
         f" {result['machine']['processor']}, {result['date']}."
     )
