@@ -66,8 +66,8 @@ WRONG: dict[str, Callable[[Columns, Columns], tuple[Columns, Columns]]] = {
 
 def poses_of(sequence: Sequence) -> tuple[Columns, Columns]:
     """Rotations (n, 3, 3) and centres (n, 3), camera to world."""
-    turn = np.array([camera.rotation.T for camera in sequence.cameras])
-    shift = np.array([camera.translation for camera in sequence.cameras])
+    turn = np.array([camera.rotation.T for camera in sequence.cameras], np.float64)
+    shift = np.array([camera.translation for camera in sequence.cameras], np.float64)
     return turn, -np.einsum("nij,nj->ni", turn, shift)
 
 
@@ -116,7 +116,8 @@ def measured(clip: str, seed: int, data: Path) -> dict[str, Any]:
 def outcome(name: str, one: dict[str, Any]) -> str:
     """A verdict in words of the table."""
     if name == "as written" or one["verdict"] != "misread":
-        return {"fits": "accepted", "wrong": "refused without a name"}.get(one["verdict"], one["verdict"])
+        said: dict[str, str] = {"fits": "accepted", "wrong": "refused without a name"}
+        return said.get(one["verdict"], str(one["verdict"]))
     return "named" if one["restored"] else f"named wrongly ({one['reading']})"
 
 
