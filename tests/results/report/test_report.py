@@ -190,6 +190,16 @@ def test_the_page_says_where_interpolation_suffices(blend, lpips, said):
     assert sentence in held_out_table(data.evaluation)
 
 
+def test_a_model_below_the_blend_on_its_training_frames_is_said_not_to_be_fitted():
+    data = made_up_data()
+    data.evaluation["held_out"]["mean"] = metrics(28.0)
+    data.evaluation["baselines"]["two_neighbours"]["mean"] = metrics(32.0)
+    for fitted, said in ((31.99, True), (32.0, False)):
+        data.evaluation["training"]["mean"] = metrics(fitted)
+        end = f"{fitted:.2f} dB on its own training frames; a longer training may change this."
+        assert interpolation_sentence(data.evaluation).endswith(end) == said
+
+
 def test_no_verdict_against_a_baseline_without_a_value():
     """Infinite PSNR (a still scene) is no value: saying "above the strongest" would be false."""
     data = made_up_data()

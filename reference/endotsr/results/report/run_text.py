@@ -85,7 +85,8 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
     """A sentence if the blend of the two neighbouring frames predicts the frames between better than the model.
 
     Edges   "" if the model is level or above in PSNR of the tissue, or one of the two has no finite value. Where the
-            model has the lower LPIPS, the sentence is restricted to PSNR.
+            model has the lower LPIPS, the sentence is restricted to PSNR. A second sentence follows if the model is
+            below the blend on its own training frames too: it is not fitted yet.
     """
     blend = metrics["baselines"].get("two_neighbours")
     if blend is None:
@@ -100,7 +101,11 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
         values += f" (LPIPS {perceived[1]:.4f} and {perceived[0]:.4f})"
         scope = "in PSNR, " if perceived[0] < perceived[1] else ""
     sentence = f"{scope}interpolation suffices on this clip for the frames between: the blend of the two neighbouring"
-    return f"{sentence[0].upper()}{sentence[1:]} training frames reaches {values}."
+    sentence = f"{sentence[0].upper()}{sentence[1:]} training frames reaches {values}."
+    fitted = metrics["training"]["mean"].get("psnr_tissue")
+    if fitted is None or fitted >= best:
+        return sentence
+    return f"{sentence} The model has {fitted:.2f} dB on its own training frames; a longer training may change this."
 
 
 def trajectory_sentence(motion: MotionPart) -> str:
