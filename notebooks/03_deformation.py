@@ -17,6 +17,12 @@
 # Endo-TSR does this by ten functions of time, each a sum of $B$ time bases. Every basis has three learned numbers: a
 # weight, a centre and a width.
 #
+# Ten is the number of values that place and shape a Gaussian: the three coordinates of its centre $\mu$, the four of a
+# quaternion $q$ for its orientation, and the three logarithms $s$ of its semi-axes ({doc}`05_covariance` explains the
+# last two). A time basis is a bell: it acts near its centre and vanishes far from it. The sinusoids of
+# {doc}`01_dictionary` act at all times. A pull by an instrument happens once, and a few bells describe it without a
+# change at other times.
+#
 # The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -35,7 +41,9 @@ B, N = 17, 4
 # %% [markdown]
 # ## The equation
 #
-# With $\Delta=t-\theta$ and $\Sigma=\sigma^2+10^{-4}$, element by element:
+# $t$ is the time, normalised to $[0,1)$ over the clip. The indices are the channel $c$ (0 to 9), the basis $j$ (1 to
+# $B$) and the Gaussian $i$ (1 to $N$). For each of these $10BN$ bells there are a weight $w$, a centre $\theta$ and a
+# width $\sigma$. With $\Delta=t-\theta$ and $\Sigma=\sigma^2+10^{-4}$, element by element:
 #
 # $$
 # \psi_{ci}(t)=\sum_{j=1}^{B} w_{cji}\,e_{cji},\qquad
@@ -45,18 +53,26 @@ B, N = 17, 4
 # \end{cases}
 # $$
 #
-# Channels 0-2 belong to the position, 3-6 to the raw quaternion, 7-9 to the log-scale. All are added **before** any
-# activation:
+# The constant $10^{-4}$ keeps $\Sigma$ positive, and with it the bell finite, for every $\sigma$. Channels 0-2 belong
+# to the position, 3-6 to the quaternion, 7-9 to the log-scale. All are added to the stored values, **before** the
+# quaternion is normalised and before the exponential turns a log-scale into a semi-axis:
 #
 # $$
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-# `quartic` is the form that Deform3DGS computes: the exponent is the square of a square, where a
-# Gaussian would halve it. It does not say why. The effect is a bell that is flatter at its centre and ends sooner: it
-# falls below a thousandth at $\Delta=1.62\sqrt\Sigma$, and the Gaussian at $3.72\sqrt\Sigma$. Each basis then acts on a short
-# stretch of time of its own. `gaussian` is the textbook form. The two give 0.0183 and 0.3679 at $\Delta=0.02$,
-# $\sigma=0.01$.
+# $\Delta\mu$ is the translation of component S, if it is active ({doc}`04_motion_and_prior`).
+#
+# `gaussian` is the textbook form of a bell. `quartic` is the form that the released code of Deform3DGS computes
+# ({doc}`/references`): it squares $\Delta^2/\Sigma$ where a Gaussian would halve it. The code gives no reason. The
+# preset `paper` follows it.
+#
+# What the square changes can be computed. Take the distance at which a bell has fallen to one half as its half-width:
+# this is $(\ln2)^{1/4}\sqrt\Sigma=0.91\sqrt\Sigma$ for `quartic` and $(2\ln2)^{1/2}\sqrt\Sigma=1.18\sqrt\Sigma$ for
+# `gaussian`. A thousandth is reached at $1.62\sqrt\Sigma$ and $3.72\sqrt\Sigma$, which is 1.8 and 3.2 half-widths. For
+# the same half-width a quartic bell is flatter at its centre and ends sooner, and a frame changes the weights of fewer
+# bases. The price is the gaps of the next figure. For the same $\sigma$ the two differ much: at $\Delta=0.02$,
+# $\sigma=0.01$ they give 0.0183 and 0.3679.
 #
 # <!-- definition: endotsr.definition.deformation.bell -->
 # ```python
@@ -98,14 +114,26 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
 for basis, reach in (("quartic", 1.6212), ("gaussian", 3.7169)):
     at = reach * np.sqrt(0.05**2 + 1e-4)
     np.testing.assert_allclose(definition.bell(0.0, 0.05, at, basis)[2], 1e-3, rtol=1e-3)
+halves = {"quartic": np.log(2) ** 0.25, "gaussian": np.sqrt(2 * np.log(2))}
+for basis, half in halves.items():
+    at = half * np.sqrt(0.05**2 + 1e-4)
+    np.testing.assert_allclose(definition.bell(0.0, 0.05, at, basis)[2], 0.5, rtol=1e-12)
+found = [
+    halves["quartic"],
+    halves["gaussian"],
+    1.6212 / halves["quartic"],
+    3.7169 / halves["gaussian"],
+]
+np.testing.assert_allclose(found, [0.91, 1.18, 1.8, 3.2], rtol=0.02)
 
 # %% [markdown]
 # ## Figure: which times do the bases cover?
 #
 # At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
 # with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the published width of
-# 0.01 there are times at which no basis exceeds 0.001. Such frames hardly change the weights at first. This is not an
-# error. The preset `sharp` starts at 0.05.
+# 0.01 there are times at which no basis exceeds 0.001, and frames at these times hardly change the weights at first.
+# Training can widen the bases later, as step (3.5) below shows. The preset `sharp` starts at the width 0.05 and has no
+# such gaps.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
@@ -148,7 +176,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_\psi$ for each channel and Gaussian. We need gradients with respect to weight, centre, width and time.
+# $g_x$ is the gradient of the loss with respect to $x$ and has the shape of $x$. The stages after this one give
+# $g_\psi$ for each channel and Gaussian. We need the gradients with respect to weight, centre, width and time.
 #
 # **(3.1) The sum.** $\psi=\sum_jw_je_j$ is linear in the weights and in the values of the bases. So $g_w=e\,g_\psi$ and
 # $g_e=w\,g_\psi$.
@@ -214,8 +243,8 @@ for basis in ("quartic", "gaussian"):
     assert np.array_equal(np.sign(grads.d_fdm_centre)[reached], sign[reached]), "(3.5)"
 
 # %% [markdown]
-# There are two consequences. While all weights are 0, the gradients with respect to centre and width are exactly 0, so
-# only the weights change at first. A width of exactly 0 has gradient 0 and never changes.
+# Two things follow. While all weights are 0, the gradients with respect to centre and width are exactly 0, so only the
+# weights change in the first step. A width of exactly 0 has the gradient 0 and never changes.
 
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)

@@ -13,9 +13,13 @@
 # %% [markdown]
 # # 6. Perspective projection of a Gaussian
 #
-# An affine map sends a Gaussian to a Gaussian, and perspective is not affine. The centre is therefore projected exactly,
-# and the covariance by the first-order expansion of the projection at the centre (EWA). The result is an ellipse on the
-# screen.
+# An affine map sends a Gaussian to a Gaussian, and perspective is not affine. The centre is therefore projected
+# exactly, and the covariance by the first-order expansion of the projection at the centre (EWA splatting,
+# {doc}`/references`). The result is an ellipse on the screen.
+#
+# The input of this stage is a Gaussian with the centre $\mu$, the rotation $R$ and the semi-axes $S$ of
+# {doc}`05_covariance`, and a camera. The output is the centre $(u,v)$ of the ellipse in pixels, its covariance with
+# the entries $a,b,c$, and the depth $z$. {doc}`08_compositing` turns them into colours of pixels.
 #
 # The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`. The optional correction of the camera pose,
 # {eq}`eq-b16` of {doc}`/specification/b16_pose`, comes before it.
@@ -66,10 +70,22 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 # \end{aligned}
 # $$
 #
-# $W,\mathbf d$ are the camera pose, world to camera. Far off the axis the linear expansion grows without bound, so the
-# slope that enters $J$ is clamped, with $\kappa=1.3$ in the presets `paper` and `legacy`. In `exact` there is no clamp.
-# The centre is never clamped. $\varepsilon$ is the low-pass of 0.3 px². No splat then has a standard
-# deviation below $\sqrt{0.3}\approx0.55$ px in any direction.
+# The symbols, in the order of the lines:
+#
+# - The rotation $W$ and the translation $\mathbf d$ take a point from the world to the camera, which looks along its $z$
+#   axis. $f_x,f_y$ are the focal lengths in pixels and $(c_x,c_y)$ is the principal point. $W_{px}$ and $H_{px}$ are the
+#   width and height of the image.
+# - $J$ is the derivative of $(u,v)$ with respect to $(x,y,z)$: how far the pixel moves when the point moves a little. It
+#   contains the slopes $x/z$ and $y/z$. $x',y'$ are the coordinates with the slopes clamped to $\pm L_x$ and $\pm L_y$.
+# - A small displacement of the world moves the pixel by $JW$ times that displacement, and the covariance of the Gaussian
+#   is $R\,\mathrm{diag}(S)^2R^\top$. The covariance on the screen is therefore $JW\,R\,\mathrm{diag}(S)^2R^\top\,(JW)^\top$,
+#   the last line with $T=JWR$.
+#
+# Far off the axis the linear expansion grows without bound. The slope that enters $J$ is clamped for this reason, with
+# $\kappa=1.3$ in the presets `paper` and `legacy`: if the principal point is the centre of the image, the clamp begins
+# $(\kappa-1)/2$ of the width beyond its border. In `exact` there is no clamp. The centre is never clamped. The low-pass
+# $\varepsilon$ of 0.3 px² is added to the variance in both directions. The ellipse on the screen, the splat, thus has
+# a standard deviation of at least $\sqrt{0.3}\approx0.55$ px in any direction.
 #
 # <!-- definition: endotsr.definition.projection.jacobian -->
 # ```python
@@ -122,15 +138,18 @@ for settings, text_settings in presets:
 # %% [markdown]
 # ## The determinant
 #
-# For a needle seen at an angle, $ac-b^2$ is a difference of two large numbers. The specification writes the determinant
-# as a sum of terms that cannot cancel:
+# The renderer needs the inverse of the screen covariance, and for it the determinant $ac-b^2$. For a needle, a
+# Gaussian with one long and two short semi-axes, seen at an angle, this is a difference of two large numbers. In
+# float32 no correct digit may remain. The specification writes the determinant as a sum of terms that cannot cancel:
 #
 # $$
 # \det=\varepsilon^2+\varepsilon\sum_{k=1}^{3}S_k^2\|\mathbf t_k\|^2+\sum_{k<l}\bigl(S_kS_l\,(t_{0k}t_{1l}-t_{1k}t_{0l})\bigr)^2 .
 # $$
 #
-# Here $\mathbf t_k$ are the columns of $T$. The definition uses $ac-b^2$, and in float64 both agree. The kernel uses the
-# sum.
+# Here $\mathbf t_k$ are the columns of $T$ and $t_{0k},t_{1k}$ their entries. The sum is the determinant of
+# $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$: by the formula of Cauchy and Binet, $\det MM^\top$ is the sum
+# of the squares of the $2\times2$ minors of $M$. The definition uses $ac-b^2$, and in float64 both agree. The compiled
+# function uses the sum.
 
 
 # %%
@@ -223,10 +242,13 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_u,g_v$, the gradients $g_a,g_b,g_c$ of the screen covariance, and $g_z^{\mathrm{img}}$ from the depth
-# image. We differentiate from the last line of the equation upward.
+# The stages after this one give the gradients $g_u,g_v$ of the centre, $g_a,g_b,g_c$ of the screen covariance, and
+# $g_z^{\mathrm{img}}$, the gradient with respect to $z$ that comes from the depth image. We differentiate from the
+# last line of the equation upward.
 #
-# **(6.1) The three numbers as a matrix.** $b$ represents two equal entries, which share its gradient equally:
+# **(6.1) The three numbers as a matrix.** A matrix of gradients $G_2$ must give the same change of the loss as the three
+# numbers, $g_a\,\mathrm da+g_b\,\mathrm db+g_c\,\mathrm dc=\langle G_2,\mathrm d\Sigma_2\rangle$. $b$ stands in two entries
+# of the symmetric matrix $\Sigma_2$, so each of the two takes half of its gradient:
 # $G_2=\begin{bmatrix}g_a&g_b/2\\g_b/2&g_c\end{bmatrix}$.
 #
 # **(6.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (5.1), and
@@ -246,27 +268,32 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(6.5) The footprint.** $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer therefore goes from the
-# gradients of the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$, in four
-# steps.
+# **(6.5) The footprint.** $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer of {doc}`08_compositing`
+# does not use $a,b,c$ but three other numbers, the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$, and returns their
+# gradients $g_A,g_m,g_r$. From them one can go directly to $S$ and $T$, without $g_a,g_b,g_c$ as numbers. This takes
+# four steps. (A first reading can skip them: (6.2) and (6.3) give the same gradients in float64.)
 #
 # *The entries.* With the rows $\mathbf t_0,\mathbf t_1$ of $T$: $a=\sum_kS_k^2t_{0k}^2+\varepsilon$,
 # $b=\sum_kS_k^2t_{0k}t_{1k}$ and $c=\sum_kS_k^2t_{1k}^2+\varepsilon$. So $\partial(a,b,c)/\partial
 # S_k=2S_k\,(t_{0k}^2,\ t_{0k}t_{1k},\ t_{1k}^2)$, $\partial(a,b)/\partial t_{0k}=S_k^2\,(2t_{0k},\ t_{1k})$ and
 # $\partial(b,c)/\partial t_{1k}=S_k^2\,(t_{0k},\ 2t_{1k})$.
 #
-# *The semi-axes.* Insert $g_a=-A^2g_A$, $g_b=2A^2m\,g_A+r\,g_m$ and $g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r$ of (8.8). The
-# terms with $g_A$ are $-A^2(t_{0k}^2-2m\,t_{0k}t_{1k}+m^2t_{1k}^2)=-A^2e_k^2$ with $e_k=t_{0k}-m\,t_{1k}$. Those with
-# $g_m$ are $r\,(t_{0k}t_{1k}-m\,t_{1k}^2)=r\,t_{1k}e_k$. The square of a small $e_k$ has taken the place of three large
-# terms.
+# *The semi-axes.* The chain rule from $(A,m,r)$ to $(a,b,c)$, step (8.8) of {doc}`08_compositing`, is $g_a=-A^2g_A$,
+# $g_b=2A^2m\,g_A+r\,g_m$ and $g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r$. Insert it into
+# $g_{S_k}=2S_k\,(g_at_{0k}^2+g_bt_{0k}t_{1k}+g_ct_{1k}^2)$ and collect. The terms with $g_A$ are
+# $-A^2(t_{0k}^2-2m\,t_{0k}t_{1k}+m^2t_{1k}^2)=-A^2e_k^2$ with $e_k=t_{0k}-m\,t_{1k}$. Those with $g_m$ are
+# $r\,(t_{0k}t_{1k}-m\,t_{1k}^2)=r\,t_{1k}e_k$, and the one with $g_r$ is $-r^2t_{1k}^2$. The square of a small $e_k$
+# has taken the place of three large terms.
 #
-# *The entries of $T$.* In the same way $2g_at_{0k}+g_bt_{1k}=-2A^2g_A\,e_k+r\,g_m\,t_{1k}$, and
+# *The entries of $T$.* $g_{T_{0k}}=S_k^2\,(2g_at_{0k}+g_bt_{1k})$ and $g_{T_{1k}}=S_k^2\,(g_bt_{0k}+2g_ct_{1k})$.
+# Inserting as before, $2g_at_{0k}+g_bt_{1k}=-2A^2g_A\,e_k+r\,g_m\,t_{1k}$, and
 # $g_bt_{0k}+2g_ct_{1k}=2A^2m\,g_A\,e_k+r\,g_m\,(t_{0k}-2m\,t_{1k})-2r^2g_r\,t_{1k}$, where
 # $t_{0k}-2m\,t_{1k}=e_k-m\,t_{1k}$.
 #
 # *$e_k$ itself.* $t_{0k}-m\,t_{1k}$ is a difference too. With $m=b/c$ it is $r\,(c\,t_{0k}-b\,t_{1k})$. Insert $b$ and
-# $c$: $\varepsilon t_{0k}$ remains of the low-pass, and the sum over $l$ has the terms
+# $c$ as sums over $l$: the low-pass contributes $\varepsilon t_{0k}$, and each $l$ contributes
 # $S_l^2\,(t_{1l}^2t_{0k}-t_{0l}t_{1l}t_{1k})=S_l^2\,t_{1l}\,(t_{0k}t_{1l}-t_{1k}t_{0l})$. The term $l=k$ is exactly 0.
+# The brackets are the minors of the determinant above.
 #
 # $$
 # \begin{aligned}
@@ -304,8 +331,10 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(6.11) The pose.** The same line gives $g_{\mathbf d}$ and the second part of $g_W$. Both are sums over all Gaussians. (The terms with $g_{\mathbf o}$ come from the
-# viewing directions and are not part of this stage.)
+# **(6.11) The pose.** $(x,y,z)^\top=W\mu+\mathbf d$ also gives the gradient with respect to $\mathbf d$, and the
+# second part of the one with respect to $W$; the first part is that of (6.4). Both are sums over all Gaussians.
+# $\mathbf o=-W^\top\mathbf d$ is the centre of the camera. Its gradient $g_{\mathbf o}$ comes from the viewing
+# directions of {doc}`07_harmonics` and is added there.
 #
 # $$
 # \begin{aligned}
@@ -359,8 +388,8 @@ for settings, text_settings in presets:
 g_d, g_W = text.d_camera.d_translation, text.d_camera.d_rotation
 
 # %% [markdown]
-# The direct form (6.5) is not in the definition; only the kernel needs it. It gives the same gradients as the form through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in
-# {doc}`08_compositing`:
+# The definition does not contain the direct form (6.5); only the compiled function needs it, in float32. It gives the
+# same gradients as the form through $(a,b,c)$:
 
 
 # %%
@@ -426,16 +455,21 @@ for name in ("position", "rotation", "scale"):
 # \end{aligned}
 # $$
 #
-# The projection above has returned the gradients with respect to $W'$ and $\mathbf d'$.
+# A pose that was measured or estimated has small errors, and training can correct them. The correction of one view has
+# six numbers: a rotation vector $\boldsymbol\omega$, whose direction is the axis and whose length $r$ is the angle,
+# and an offset $\boldsymbol\tau$. $[\boldsymbol\omega]_\times$ is the matrix with $[\boldsymbol\omega]_\times\mathbf
+# p=\boldsymbol\omega\times\mathbf p$, and $E$ is its exponential, a rotation. The view is rendered with $W'$ and
+# $\mathbf d'$, and the projection above returns the gradients with respect to them.
 #
 # **(6.12) The two products.** $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
 # $g_{\mathbf d}=E^\top g_{\mathbf d'}$, $g_{\boldsymbol\tau}=g_{\mathbf d'}$ and
 # $G=g_E=g_{W'}W^\top+g_{\mathbf d'}\mathbf d^\top$.
 #
-# **(6.13) The closed form.** Let $K=[\boldsymbol\omega]_\times$. Every entry of $E$ depends on $\omega_i$ through $K$,
-# where $\partial K/\partial\omega_i=[\mathbf e_i]_\times$, and through both factors, whose derivatives are
-# $\omega_i\alpha'$ and $\omega_i\beta'$ with $\alpha'=(\cos r-\alpha)/r^2$ and $\beta'=(\alpha-2\beta)/r^2$. The kernel
-# sums these parts:
+# **(6.13) The closed form.** Let $K=[\boldsymbol\omega]_\times$, so $E=I+\alpha K+\beta K^2$. Every entry of $E$
+# depends on $\omega_i$ in two ways. The first is $K$ itself, with $\partial K/\partial\omega_i=[\mathbf e_i]_\times$.
+# The second is $r$ in the two factors: $\partial r/\partial\omega_i=\omega_i/r$, and their derivatives with respect to
+# $\omega_i$ are $\omega_i\alpha'$ and $\omega_i\beta'$ with $\alpha'=(\cos r-\alpha)/r^2$ and
+# $\beta'=(\alpha-2\beta)/r^2$. The compiled function sums these parts:
 # $g_{\omega_i}=\langle\alpha G+\beta(GK^\top+K^\top G),[\mathbf e_i]_\times\rangle+\omega_i\langle G,\alpha'K+\beta'K^2\rangle$.
 #
 # **(6.14) The definition** needs no derivative of a series. The exponential of the block matrix

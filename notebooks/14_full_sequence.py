@@ -13,8 +13,8 @@
 # %% [markdown]
 # # 14. From one frame to a full sequence
 #
-# The previous notebooks explain all stages. This notebook fits one frame and then a whole clip, evaluates held-out
-# frames, and removes the components of the paper one by one.
+# The previous chapters explain all stages. This chapter puts them together into one iteration, fits one frame and then
+# a whole clip, evaluates held-out frames, and removes the components of the paper one by one.
 #
 # The settings are those of the preset `paper` with a shorter schedule and three changes that suit a few small frames:
 # wider time bases, fewer initial points, and views between the frames. They are not the published method, and the
@@ -95,26 +95,89 @@ print(
 # \end{aligned}
 # $$
 #
-# The terms are those of {doc}`10_base_losses`, {doc}`09_laplacian_pyramid` and {doc}`04_motion_and_prior`. The
-# Laplacian weight is a ramp from iteration $a$ to $b$:
+# $i=1,\dots,T$ counts the iterations. A bracket $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise. The terms
+# are those of earlier chapters:
+#
+# | Term | Chapter | Weight in `paper` |
+# |---|---|---|
+# | $\mathcal L_1$, masked L1 | {doc}`10_base_losses` | $1-w=0.9$ |
+# | $\mathcal S$, masked SSIM | {doc}`10_base_losses` | $w=0.1$ |
+# | $\mathcal L_D$, depth | {doc}`10_base_losses` | $w_D=1$ |
+# | $\mathcal L_{\mathrm{smooth}}$, smoothness | {doc}`10_base_losses` | $w_S=10^{-4}$, from $i_s=1001$ |
+# | $\mathcal L_{\mathrm{msp}}$, Matérn penalty | {doc}`04_motion_and_prior` | $\lambda_{\mathrm{msp}}=1$, after $K_s=3000$ |
+# | $\mathcal L_{\mathrm{lap}}$, Laplacian loss | {doc}`09_laplacian_pyramid` | $\lambda_{\mathrm{lap}}=0.83$ at full weight |
+#
+# The Laplacian weight is a ramp from iteration $a$ to $b$, 1000 and 2500 of the $T=6000$ iterations of `paper`:
 #
 # $$
 # \lambda_{\mathrm{lap}}(i) = \lambda_{\mathrm{lap}}\,\min\!\left(1,\max\!\left(0,\frac{i-a}{b-a}\right)\right).
 # $$
 #
-# One iteration $i$ has these steps, in this order:
+# ## One iteration
 #
-# 1. Set the learning rates of iteration $i$, (12.5), and the active degree of the harmonics.
-# 2. Draw one view: a training frame, uniformly and with replacement. (With `bridge_fraction`, some draws are times between
-#    two frames instead, {doc}`18_between`.)
-# 3. Render it at its time: {eq}`eq-b1` to {eq}`eq-b5`, and A and S once $i>K_s$.
-# 4. Form the objective above.
-# 5. Run the reverse passes.
-# 6. Add the norm of the screen gradient to the statistic of density control, (12.6).
-# 7. Take one Adam step of every array, (12.1) to (12.3).
-# 8. If $i$ is an iteration of density control, prune, clone and split, with the parameters after the step.
+# Before the first iteration the Gaussians are placed ({doc}`13_simulated_scene`), and all moments of Adam and the
+# statistics of density control are 0. Iteration $i$ has these steps, in this order:
 #
-# {doc}`/one_iteration` names the function of each.
+# 1. **Rates and degree.** Compute the learning rates of iteration $i$, (12.5). The active degree of the harmonics is
+#    $\lfloor i/500\rfloor$, and 3 at most.
+# 2. **Residuals.** At $i=K_s+1$, add the arrays $A$ and $C$, filled with 0, with moments 0 and step count 0.
+# 3. **Draw.** Draw one training frame, each with equal probability and independently of the draws before. Held-out
+#    frames are never drawn. (With `bridge_fraction`, some draws are times between two frames, {doc}`18_between`.)
+# 4. **Forward.** At the time $t$ of the frame, compute the deformed Gaussians {eq}`eq-b1`, for $i>K_s$ with the translation
+#    {eq}`eq-3` and the colour residual {eq}`eq-2`. Then compute covariance {eq}`eq-b2`, projection {eq}`eq-b3`, colour
+#    {eq}`eq-b4` and the composited image and depth {eq}`eq-b5`, before a black background.
+# 5. **Losses.** Compare image and depth with the frame and form the objective above.
+# 6. **Reverse.** Run the reverse pass of each stage in the opposite order. The result is the gradient with respect to every
+#    stored array, and the screen gradients $g_u,g_v$ on the way.
+# 7. **Statistic.** While $i<4000$, add the norm of the screen gradient of every visible Gaussian to its statistic, (12.6).
+# 8. **Adam.** Take one step of every array that has a gradient, (12.1) and (12.2), with the rates of step 1.
+# 9. **Density control.** If $i$ is a multiple of 100 and $500<i<4000$, prune, clone and split with the parameters after
+#    the step, and set all statistics to 0 ({doc}`12_optimiser_and_density`).
+#
+# The numbers are those of `paper`. All draws, of frames and of the children of splits, come from one generator with
+# the seed of the run. The definition is as long as the list:
+#
+# <!-- definition: endotsr.definition.train.weights_at -->
+# ```python
+# def weights_at(iteration, config):
+#     """Weights of the image terms at this iteration."""
+#     loss = config.loss
+#     ramp = schedules.laplacian_ramp(iteration, config)
+#     smoothness = loss.smoothness_weight if schedules.smoothness_active(iteration, config) else 0.0
+#     return LossWeights(loss.ssim_weight, loss.depth_weight, smoothness, ramp * loss.lambda_lap)
+# ```
+#
+# <!-- definition: endotsr.definition.train.iterate -->
+# ```python
+# def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges):
+#     """One iteration on a uniformly drawn training frame: the new state and the ViewGradients."""
+#     i = state.iteration + 1
+#     o = config.optimiser
+#     if schedules.residuals_active(i, config) and not schedules.residuals_active(i - 1, config):
+#         state = activated(state, config)
+#     frame = frame_of(sequence, sequence.train_index[rng.integers(len(sequence.train_index))])
+#     view = view_gradients(
+#         state.gaussians, spectral, frame_targets(frame, config), weights_at(i, config), config, frame.camera,
+#         frame.time, edges, raster=raster, degree=schedules.active_degree(i, config),
+#     )
+#     statistics = state.statistics
+#     adam = state.adam
+#     gaussians = state.gaussians
+#     if schedules.statistics_active(i, config):
+#         statistics = gather_statistics(statistics, view.d_mean2d, view.visible, frame.camera.width, frame.camera.height)
+#     if not (schedules.densify_now(i, config) and o.legacy_skip):
+#         rates = schedules.learning_rates(i, config)
+#         given = (arrays(gaussians), view.gradients, rates, o.beta1, o.beta2, o.epsilon)
+#         adam, parameters = adam_update(adam, *given)
+#         gaussians = gaussians._replace(**parameters)
+#     state = State(gaussians, adam, statistics, i)
+#     return controlled(state, sequence, config, rng) if schedules.densify_now(i, config) else state, view
+# ```
+#
+# `view_gradients`, printed in {doc}`00_why`, is steps 4 to 6. `controlled` is step 9: it calls `densify` and gives new
+# Gaussians the moments 0.
+#
+# {doc}`/one_iteration` names the compiled function of each step.
 #
 # The transcription takes the terms that an iteration reports and forms the sum of the text. It is compared with
 # **every** iteration of the run below.
@@ -190,13 +253,13 @@ still = replace(
     model=replace(config.model, deformation=False, appearance=False, spectral_motion=False),
     training=replace(config.training, bridge_fraction=0.0),
 )
-one_state, one_shop, one_log = train(alone, still)
+one_state, one_constants, one_log = train(alone, still)
 others = sequence.train_index[len(sequence.train_index) // 2 :]
 print(
-    f"the fitted frame: {score(one_state, one_shop, [first]):.1f} dB; "
-    f"later frames: {score(one_state, one_shop, others):.1f} dB"
+    f"the fitted frame: {score(one_state, one_constants, [first]):.1f} dB; "
+    f"later frames: {score(one_state, one_constants, others):.1f} dB"
 )
-assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, (
+assert score(one_state, one_constants, [first]) > score(one_state, one_constants, others) + 5, (
     "it was fitted to one time only"
 )
 
@@ -254,7 +317,7 @@ axes[1].plot(
     label="held-out frames",
 )
 axes[1].plot(
-    [score(one_state, one_shop, [k]) for k in range(sequence.count)],
+    [score(one_state, one_constants, [k]) for k in range(sequence.count)],
     color="0.6",
     label="the fit of one frame",
 )
