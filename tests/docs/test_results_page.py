@@ -62,6 +62,13 @@ def test_the_readme_compares_with_flow_as_recorded():
         assert flow < found["held_out"]["mean"]["lpips"], "LPIPS of flow is better for every gap"
 
 
+def test_on_cutting_interpolation_is_ahead_in_psnr_and_sharp_in_lpips():
+    names = ("flow.cutting", "blend.cutting", "flow_tissue.cutting", "sharp.cutting")
+    means = [figures.value(figures.FIGURES[name]) for name in names]
+    assert means == sorted(means, reverse=True)
+    assert figures.value(figures.FIGURES["sharp.lpips.cutting"]) < figures.value(figures.FIGURES["flow.lpips.cutting"])
+
+
 def test_the_readme_states_the_minutes_that_were_timed():
     text = readme_presets.PAGE.read_text(encoding="utf-8")
     assert replaced(text, readme_presets.parts(), readme_presets.PAGE, "presets") == text
