@@ -1,6 +1,7 @@
 """Measure the cost of accuracy in time, and write docs/tradeoff.md.
 
-    python docs/make.py tradeoff render [SPLATS.npz ...]    the simulated scene, then trained scenes
+    python docs/make.py tradeoff render [SCENE ...]         the simulated scene, then SPLATS.npz or run folders
+    python docs/make.py tradeoff scene SCENE ...            trained scenes alone
     python docs/make.py tradeoff train SEQUENCE [OPTIONS]   trainings; `train --help` lists OPTIONS
     python docs/make.py tradeoff draw DIR                   pictures of a measurement of `endotsr tradeoff --out DIR`
     python docs/make.py tradeoff                            rewrite pictures and page from the files
@@ -36,13 +37,18 @@ COMMAND = "python docs/make.py tradeoff render"
 WORK = DOCS / "_build" / "tradeoff"
 
 
-def measure(name: str, splats: Path | None = None) -> None:
-    """One scene, simulated or from a file of Gaussians, to docs/results/NAME.json."""
-    options = TradeoffOptions(splats=splats)
+def measure(name: str, options: TradeoffOptions) -> None:
+    """One scene, simulated, of a run, or from a file of Gaussians, to docs/results/NAME.json."""
     use_threads(options.threads)
     with StepBar("settings") as bar:
         found = run_whole_study(chosen_scene(options), begin=bar.begin, step=bar.step)
     write_json(RESULTS / f"{name}.json", described(found))
+
+
+def measure_trained(scene: Path) -> None:
+    """A run folder or a file of Gaussians, to docs/results/tradeoff_NAME.json."""
+    options = TradeoffOptions(run=scene) if scene.is_dir() else TradeoffOptions(splats=scene)
+    measure(f"tradeoff_{scene.stem.removesuffix('_splats')}", options)
 
 
 def draw_measured(folder: Path) -> None:
@@ -105,9 +111,10 @@ def main(words: list[str]) -> None:
         if words[:1] == ["draw"] and len(words) == 2:
             return draw_measured(Path(words[1]))
         if words[:1] == ["render"]:
-            measure("tradeoff")
-            for splats in words[1:]:
-                measure(f"tradeoff_{Path(splats).stem.removesuffix('_splats')}", Path(splats))
+            measure("tradeoff", TradeoffOptions())
+        if words[:1] in (["render"], ["scene"]):
+            for scene in words[1:]:
+                measure_trained(Path(scene))
         elif words[:1] == ["train"] and len(words) > 1:
             train(words[1], words[2:])
         elif words:
