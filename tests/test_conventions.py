@@ -102,6 +102,12 @@ STAGES = [(file, name) for file in SOURCES for name in public_functions(file) if
 
 
 @pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
+def test_no_two_test_files_have_one_name():
+    """Files without a package are imported by their name: the second one would not be collected."""
+    names = [file.name for file in (ROOT / "tests").rglob("*.py") if file.name != "conftest.py"]
+    assert sorted(names) == sorted(set(names))
+
+
 def test_every_forward_has_a_reverse_directly_below_it(file, name):
     functions = public_functions(file)
     reverse = name.removesuffix("_forward") + "_reverse"

@@ -190,3 +190,17 @@ def test_a_missing_block_counts_as_zero():
     without = frame(prepare(scene, ACCURATE._replace(frequencies=0)))[0]
     assert errors(without, whole).gradients["residual"] == 1
     assert CLOSE.alpha_cutoff == 1e-9
+
+
+def test_settings_of_one_precision_share_their_arrays():
+    """A hundred casts of a trained scene would need tens of gigabytes."""
+    scene, shared = moving_scene(count=6, width=16), {}
+    coarse = ACCURATE._replace(raster=CLOSE._replace(alpha_cutoff=1e-4))
+    one, two = (prepare(scene, setting, shared) for setting in (ACCURATE, coarse))
+    assert one.gaussians is two.gaussians and one.d_colour is two.d_colour
+    fewer, small = (
+        prepare(scene, ACCURATE._replace(bases=1), shared),
+        prepare(scene, ACCURATE._replace(scale=0.5), shared),
+    )
+    assert fewer.gaussians.fdm_weight.shape[1] == 1 < one.gaussians.fdm_weight.shape[1]
+    assert small.gaussians is one.gaussians and small.d_colour.shape[-1] == 8

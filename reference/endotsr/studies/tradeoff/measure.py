@@ -58,16 +58,34 @@ class RenderErrors(NamedTuple):
         return max(self.gradients.values(), default=0.0)
 
 
-def prepare(scene: StudyScene, setting: Setting) -> Prepared:
-    """Cast the scene, remove the terms that the setting omits, and draw the weights of the functional."""
-    gaussians, spectral = _reduced(scene, setting)
-    camera = scaled(scene.camera, setting.scale)
-    d_colour, d_depth = _weights(scene)
+Shared = dict[tuple[Any, ...], Any]  # arrays that several settings have in common
+
+
+def prepare(scene: StudyScene, setting: Setting, shared: Shared | None = None) -> Prepared:
+    """Cast the scene, remove the terms that the setting omits, and draw the weights of the functional.
+
+    shared   arrays of other settings of the same scene, to which those of this one are added: a trained scene in two
+             precisions takes hundreds of megabytes, and a study has a hundred settings
+    """
+    shared = {} if shared is None else shared
+    cast = (setting.precision, setting.bases, setting.frequencies)
+    if cast not in shared:
+        gaussians, spectral = _reduced(scene, setting)
+        shared[cast] = in_precision(gaussians, setting.precision), spectral
+    if (setting.precision, setting.scale) not in shared:
+        shared[setting.precision, setting.scale] = _functional(scene, setting)
+    gaussians, spectral = shared[cast]
+    d_colour, d_depth = shared[setting.precision, setting.scale]
+    return Prepared(scene, setting, gaussians, spectral, scaled(scene.camera, setting.scale), d_colour, d_depth)
+
+
+def _functional(scene: StudyScene, setting: Setting) -> tuple[FloatArray, FloatArray]:
+    """The weights of the functional for pictures of the setting's size."""
+    camera, (d_colour, d_depth) = scaled(scene.camera, setting.scale), _weights(scene)
     if setting.scale != 1:
         rows, columns = upsampling(camera.height, scene.camera.height), upsampling(camera.width, scene.camera.width)
         d_colour, d_depth = rows.T @ d_colour @ columns, rows.T @ d_depth @ columns
-    weights = (np.ascontiguousarray(w, setting.precision) for w in (d_colour, d_depth))
-    return Prepared(scene, setting, in_precision(gaussians, setting.precision), spectral, camera, *weights)
+    return np.ascontiguousarray(d_colour, setting.precision), np.ascontiguousarray(d_depth, setting.precision)
 
 
 def _weights(scene: StudyScene) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.studies.tradeoff.measure import Prepared, RenderedFrame, errors, frame, prepare, seconds, terms
+from endotsr.studies.tradeoff.measure import Prepared, RenderedFrame, Shared, errors, frame, prepare, seconds, terms
 from endotsr.studies.tradeoff.results import FORMAT
 from endotsr.studies.tradeoff.scenes import StudyScene
 from endotsr.studies.tradeoff.settings import CLOSE, Setting, joint, presets
@@ -76,7 +76,8 @@ def run_study(
     reference, reference_visits = frame(prepare(scene, aim))
     step(1)
     keep("reference", reference)
-    prepared = [prepare(scene, setting) for setting in plan.names]
+    shared: Shared = {}
+    prepared = [prepare(scene, setting, shared) for setting in plan.names]
     points = []
     for number, (ready, (setting, name)) in enumerate(zip(prepared, plan.names.items())):
         found, visits = (reference, reference_visits) if setting == aim else frame(ready)
