@@ -102,12 +102,6 @@ STAGES = [(file, name) for file in SOURCES for name in public_functions(file) if
 
 
 @pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
-def test_no_two_test_files_have_one_name():
-    """Files without a package are imported by their name: the second one would not be collected."""
-    names = [file.name for file in (ROOT / "tests").rglob("*.py") if file.name != "conftest.py"]
-    assert sorted(names) == sorted(set(names))
-
-
 def test_every_forward_has_a_reverse_directly_below_it(file, name):
     functions = public_functions(file)
     reverse = name.removesuffix("_forward") + "_reverse"
@@ -249,3 +243,9 @@ def test_selection_by_word_is_the_registry():
     collected = {line.strip() for line in done.stdout.splitlines() if "::" in line}
     wanted = {f"tests/test_{WORD}.py::test_{WORD}[{seed}-{name}]" for name in all_pairs() for seed in (0, 1)}
     assert collected == wanted, done.stdout[-2000:]
+
+
+def test_no_two_test_files_have_one_name():
+    """Files without a package are imported by their name: the second one would not be collected."""
+    names = [file.name for file in (ROOT / "tests").rglob("*.py") if file.name != "conftest.py"]
+    assert sorted(names) == sorted(set(names))
