@@ -129,10 +129,7 @@ plt.show()
 #     if pose_saved is not None:
 #         d_pose = pose_reverse(*d_scene.d_camera, saved=pose_saved)[2:]
 #     gradients = scene_reverse(d_scene, scene_saved)
-#     if gaussians.motion_coefficients is not None:
-#         terms["matern_penalty"], saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
-#         loss = loss + config.loss.lambda_msp * terms["matern_penalty"]
-#         gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, saved)
+#     loss = loss + penalties(gaussians, spectral, config.loss, terms, gradients)
 #     return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered, d_scene.visible, d_scene.d_mean2d)
 # ```
 

@@ -15,21 +15,31 @@ PACKAGE = "reference/endotsr/"
 FORMATTED = ("reference", "golden", "tests", "notebooks", "docs/_extensions", "docs/pages", "docs/make.py")
 # Hold for the whole package: names, words, layers. Less than a minute together.
 ALWAYS = ("tests/test_layout.py", "tests/test_conventions.py", "tests/docs/test_glossary.py")
-# Beginning of a changed path -> command whose output depends on it.
+# Beginning of a changed path -> commands whose output depends on it.
+CONSTANTS, INVENTORIES = "python tests/port/unseen/by_hand/constants.py", "python docs/make.py recordings.inventories"
 MAKERS = {
-    "notebooks/": "python docs/make.py book.chapters",
-    f"{PACKAGE}config.py": "python tests/port/unseen/by_hand/constants.py",
-    "golden/cases/": "python tests/port/unseen/by_hand/constants.py",
+    f"{PACKAGE}config.py": ("python docs/make.py book.settings", CONSTANTS),
+    f"{PACKAGE}definition/": ("python docs/make.py book.definitions",),
+    f"{PACKAGE}clips/sequences/layouts/": (INVENTORIES,),
+    f"{PACKAGE}clips/sequences/calibration_fields.py": (INVENTORIES,),
+    f"{PACKAGE}cli/parts/related_options.py": (INVENTORIES,),
+    "notebooks/": ("python docs/make.py book.chapters",),
+    "golden/cases/": (CONSTANTS,),
 }
 # Beginning of a changed path -> tests beside those of its room.
 MORE = {
     f"{PACKAGE}definition/": ("tests/definition", "tests/test_specification.py"),
     f"{PACKAGE}method/": ("tests/test_gradcheck.py", "tests/definition/test_twins.py"),
-    f"{PACKAGE}port/stages/": ("tests/test_gradcheck.py", "tests/definition/test_twins.py"),
+    f"{PACKAGE}port/stages/": (
+        "tests/test_gradcheck.py",
+        "tests/definition/test_twins.py",
+        "tests/docs/test_equation_map.py",
+    ),
+    f"{PACKAGE}clips/sequences/": ("tests/docs/test_prepare_page.py",),
     f"{PACKAGE}config.py": ("tests/test_specification.py", "tests/cli/test_cli_options.py", "tests/port/vectors"),
     f"{PACKAGE}api.py": ("tests/test_api.py",),
     f"{PACKAGE}cli/": ("tests/cli",),
-    "golden/": ("tests/port/vectors",),
+    "golden/": ("tests/port/vectors", "tests/port/judge/test_profiles.py", "tests/docs/test_equation_map.py"),
     "docs/specification/": ("tests/test_specification.py", "tests/docs/test_derivations.py"),
     "docs/": ("tests/docs",),
     "README.md": ("tests/docs/test_readme.py",),
@@ -50,8 +60,12 @@ def changed(revision: str | None) -> list[str]:
 
 
 def makers(paths: list[str]) -> list[str]:
-    """Programs whose output depends on the paths; a record belongs to the programs that name it."""
-    found = [command for start, command in MAKERS.items() if any(path.startswith(start) for path in paths)]
+    """Programs whose output depends on the paths: cases of a family, tables of pages. A record belongs to the programs that name it."""
+    tables = [
+        name for start, names in MAKERS.items() if any(path.startswith(start) for path in paths) for name in names
+    ]
+    families = [Path(path).stem for path in paths if path.startswith("golden/makers/") and path.endswith(".toml")]
+    found = [*(f"python golden/make.py write {name}" for name in families), *tables]
     records = {Path(path).name for path in paths if path.startswith("docs/results/") and path.endswith(".json")}
     for file in sorted((ROOT / "docs" / "pages").glob("*/*.py")):
         text = file.read_text(encoding="utf-8")

@@ -14,6 +14,7 @@ def test_a_record_reaches_the_pages_that_read_it():
     assert after.makers(["docs/results/levers.json"]) == ["python docs/make.py full_size.levers"]
     assert "python docs/make.py book.chapters" in after.makers(["notebooks/03_deformation.py"])
     assert after.makers(["README.md"]) == []
+    assert after.makers(["golden/makers/depth.toml"]) == ["python golden/make.py write depth"]
 
 
 def test_a_folder_takes_the_place_of_its_files():
@@ -25,5 +26,5 @@ def test_a_folder_takes_the_place_of_its_files():
 def test_every_path_of_the_tables_exists():
     tests = {test for names in after.MORE.values() for test in names} | {*after.ALWAYS, *after.FORMATTED}
     starts = {*after.MAKERS, *after.MORE}
-    programs = {command.split()[1] for command in after.MAKERS.values()}
+    programs = {command.split()[1] for commands in after.MAKERS.values() for command in commands}
     assert not [path for path in tests | starts | programs if not (after.ROOT / path).exists()]

@@ -28,16 +28,7 @@ import msgspec
 from endotsr.clips.sequences.record import SequenceRecord, record_of
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
-from endotsr.config import (
-    PAPER,
-    Config,
-    checked,
-    config_from_dict,
-    lengthened,
-    merged,
-    refuse_unknown_keys,
-    with_iterations,
-)
+from endotsr.config import PAPER, Config, config_from_dict, lengthened, merged, with_iterations
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
@@ -48,6 +39,7 @@ from endotsr.training.runs.log import RunLog, log_until
 from endotsr.training.runs.machine import now, peak_memory_bytes
 from endotsr.training.runs.model import Model, load_model, load_training, save_training
 from endotsr.training.runs.records import ResumedEntry, RunRecord
+from endotsr.untrusted.sections import checked, refuse_unknown_keys
 from endotsr.untrusted.toml import read_toml
 
 if TYPE_CHECKING:

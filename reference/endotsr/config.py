@@ -5,27 +5,25 @@ Iterations count from 1. Lengths are in scene units (millimetres for EndoNeRF).
 """
 
 import math
-import re
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.sections import (
+    Count,
+    Fraction,
+    NonNegative,
+    Positive,
+    PositiveCount,
+    Section,
+    SectionType,
+    checked,
+    refuse_unknown_keys,
+)
 from endotsr.untrusted.toml import read_toml, toml_text
-
-SectionType = TypeVar("SectionType", bound=msgspec.Struct)
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-NonNegative = Annotated[float, msgspec.Meta(ge=0)]
-Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
-Count = Annotated[int, msgspec.Meta(ge=0)]
-PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
-
-
-class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A section of settings, also of the simulator: frozen, fields by name only, unknown keys rejected."""
 
 
 class SequenceConfig(Section, frozen=True, kw_only=True):
@@ -253,6 +251,26 @@ class Config(Section, frozen=True, kw_only=True):
     initialisation: InitialisationConfig = InitialisationConfig()
     training: TrainingConfig = TrainingConfig()
 
+    def refuse_contradictions(self, where: str) -> None:
+        """Raise InputError for settings that are allowed individually but not in combination."""
+        model, loss, (low, high) = self.model, self.loss, self.sequence.depth_percentiles
+        if model.frequency_max < model.frequency_min or (
+            model.frequencies > 1 and model.frequency_max == model.frequency_min
+        ):
+            raise InputError(
+                f"{where}: model.frequency_max = {model.frequency_max:g} is not allowed; "
+                f"allowed: a number > model.frequency_min = {model.frequency_min:g}"
+            )
+        if loss.laplacian_full < loss.laplacian_from:
+            raise InputError(
+                f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
+                f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
+            )
+        if not 0 <= low < high <= 100:
+            raise InputError(
+                f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: 0 <= low < high <= 100"
+            )
+
 
 PAPER = Config()
 
@@ -353,18 +371,6 @@ def config_from_dict(data: Keys, where: str = "configuration") -> Config:
     return checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
 
 
-def checked(data: Keys, kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
-    """A section from plain data, with types and ranges checked. Raises InputError with key and allowed values."""
-    _refuse_non_finite(data, where, prefix)
-    try:
-        found = msgspec.convert(data, kind, strict=True)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {_explain(str(error), data, kind, prefix)}") from None
-    if isinstance(found, Config):
-        _refuse_contradictions(found, where)
-    return found
-
-
 def load_config(path: Path) -> Config:
     """Read a TOML file. Raises InputError with file, key and allowed values."""
     return config_from_dict(read_toml(path), str(path))
@@ -409,89 +415,6 @@ def without_former_keys(data: Keys, where: str, bridge_fraction: float = 0.0) ->
     if found == sum(map(len, FORMER.values())) and "iterations" in data["training"]:
         out["training"] = out["training"] | {"visits_per_frame": 0}
     return out
-
-
-def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") -> None:
-    """Raise InputError for a key that `struct` does not have."""
-    fields = {f.name: f.type for f in msgspec.structs.fields(struct)}
-    for key, value in data.items():
-        if key not in fields:
-            raise InputError(f"{where}: unknown key {prefix}{key}; allowed: {', '.join(fields)}")
-        if isinstance(value, dict) and is_section(fields[key]):
-            refuse_unknown_keys(value, fields[key], where, f"{prefix}{key}.")
-
-
-def is_section(kind: Any) -> bool:
-    """Whether a type is a section of settings."""
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
-
-
-def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
-    for key, value in data.items():
-        if isinstance(value, dict):
-            _refuse_non_finite(value, where, f"{prefix}{key}.")
-        for number in value if isinstance(value, list | tuple) else [value]:
-            if isinstance(number, float) and not math.isfinite(number):
-                raise InputError(f"{where}: {prefix}{key} = {value!r} is not allowed; allowed: finite numbers")
-
-
-def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
-    """Key, value and allowed values, from the message `... - at `$.section.key`` of the type check."""
-    found = re.search(r"`\$\.([\w.]+)", message)
-    place = f"{found[1]}." if found else ""
-    if missing := re.search(r"missing required field `(\w+)`", message):
-        return f"{prefix}{place}{missing[1]} is missing"
-    if not found:
-        return message
-    value: Any = data
-    for name in found[1].split("."):
-        kind = next(filter(is_section, get_args(kind)), kind)  # an optional section
-        kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
-        value = value[name]
-    return f"{prefix}{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
-
-
-def allowed_values(kind: Any) -> str:
-    """The allowed values of a type in words: `a number > 0`, `quartic, gaussian`, ..."""
-    origin, arguments = get_origin(kind), get_args(kind)
-    if origin is Literal:
-        return ", ".join(map(str, arguments))
-    if origin in (Union, UnionType):
-        return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
-    if origin is tuple:
-        many = "a list" if arguments[-1] is Ellipsis else f"{len(arguments)} values"
-        return f"{many}, each {allowed_values(arguments[0])}"
-    if origin is Annotated:
-        limits = [(">", arguments[1].gt), (">=", arguments[1].ge), ("<", arguments[1].lt), ("<=", arguments[1].le)]
-        words = " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
-        least = f", at least {arguments[1].min_length} of them" if arguments[1].min_length else ""
-        return f"{allowed_values(arguments[0])} {words}".rstrip() + least
-    if origin is dict:
-        return "a table of keys"
-    if is_section(kind):
-        return "a section of settings"
-    return {bool: "true, false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]
-
-
-def _refuse_contradictions(config: Config, where: str) -> None:
-    """Raise InputError for settings that are allowed individually but not in combination."""
-    model, loss, (low, high) = config.model, config.loss, config.sequence.depth_percentiles
-    if model.frequency_max < model.frequency_min or (
-        model.frequencies > 1 and model.frequency_max == model.frequency_min
-    ):
-        raise InputError(
-            f"{where}: model.frequency_max = {model.frequency_max:g} is not allowed; "
-            f"allowed: a number > model.frequency_min = {model.frequency_min:g}"
-        )
-    if loss.laplacian_full < loss.laplacian_from:
-        raise InputError(
-            f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
-            f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
-        )
-    if not 0 <= low < high <= 100:
-        raise InputError(
-            f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: 0 <= low < high <= 100"
-        )
 
 
 def config_to_toml(config: Config) -> str:

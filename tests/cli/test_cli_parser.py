@@ -12,8 +12,9 @@ from endotsr.cli.parts.mistakes import option_names
 from endotsr.cli.parts.parser import converted, parse, parse_known
 from endotsr.cli.simulate import SimulateOptions
 from endotsr.cli.train import TrainOptions
-from endotsr.config import PAPER, Config, NonNegative
+from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import NonNegative
 
 
 @dataclass

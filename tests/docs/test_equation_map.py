@@ -7,6 +7,7 @@ from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_de
 from package_names import DEFINITION, NOTEBOOKS, ROOT, definitions, equation_pages, linkable  # pyright: ignore[reportMissingImports]
 
 from endotsr.port.gradcheck import all_pairs
+from endotsr.port.judge.about import PAGES
 
 PAPER = ["1", "1b", *"234567"]
 ROWS = {row.label: row for row in equations()}
@@ -52,7 +53,14 @@ def test_everything_named_exists(row: Equation):
 
 
 def test_every_pair_stands_in_the_map():
-    assert {pair.name for row in ROWS.values() for pair in row.pairs} == set(all_pairs())
+    missing = set(all_pairs()) - {pair.name for row in ROWS.values() for pair in row.pairs}
+    assert not missing, f"no page of docs/specification defines the equation of {sorted(missing)}"
+
+
+def test_a_request_names_the_page_of_its_equation():
+    labels = {case["equation"] for cases in golden_cases().values() for case in cases} - {""}
+    pages = {label: ROWS[label.lower()].page for label in labels}
+    assert {equation: PAGES.get(equation) for equation in pages} == pages, "add it to PAGES in port/judge/about.py"
 
 
 def test_every_reason_belongs_to_an_equation():

@@ -65,9 +65,8 @@ def test_errors_of_a_path_do_not_depend_on_the_world_but_on_the_unit():
 
 
 def test_the_tables_of_fields_and_options_are_current():
-    """They are written by `python docs/make.py recordings.inventories`."""
     made, text = importlib.import_module("pages.recordings.inventories"), PAGE.read_text(encoding="utf-8")
-    assert made.fields() in text and made.options() in text
+    assert made.fields() in text and made.options() in text, "run: python docs/make.py recordings.inventories"
 
 
 def test_every_layout_has_its_section():

@@ -1,7 +1,9 @@
 """One page of the book as HTML, without the others: python docs/make.py book.preview PAGE [FOLDER]
 
-    python docs/make.py book.preview docs/specification/b06_masked_l1.md     a page of text, about five seconds
-    python docs/make.py book.preview notebooks/01_dictionary.py              a chapter, executed at the small size
+    python docs/make.py book.preview b06_masked_l1     a page of text, about five seconds
+    python docs/make.py book.preview 01_dictionary     a chapter, executed at the small size
+
+PAGE is the name of a page of `docs` or of a notebook, or its path.
 
 The page has the style, the formulas and the figures of the book. Links to other pages and to the API stay plain text.
 FOLDER is docs/_build/preview by default.
@@ -40,11 +42,22 @@ def inside_docs(page: Path) -> Path:
     return copy
 
 
+def page_of(name: str) -> Path:
+    """The file of a page, by its path or by its name without folder and ending."""
+    if Path(name).is_file():
+        return Path(name).resolve()
+    below = [*DOCS.glob("*.md"), *DOCS.glob("[a-z]*/*.md"), *(ROOT / "notebooks").glob("*.py")]
+    found = [file for file in below if file.stem == Path(name).stem]
+    if len(found) != 1:
+        sys.exit(f"{name}: {len(found)} pages have this name: {', '.join(map(str, found)) or 'use the path of a page'}")
+    return found[0]
+
+
 def main(words: list[str]) -> None:
     """Build the page and print its path. Exits with the code of sphinx-build."""
-    if not 1 <= len(words) <= 2 or not Path(words[0]).is_file():
+    if not 1 <= len(words) <= 2:
         sys.exit(__doc__)
-    page = inside_docs(Path(words[0]).resolve())
+    page = inside_docs(page_of(words[0]))
     out = Path(words[1] if len(words) > 1 else DOCS / "_build" / "preview").resolve()
     relative = page.relative_to(DOCS)
     text = CONFIGURATION.format(

@@ -16,6 +16,11 @@ LossWeights = namedtuple("LossWeights", "ssim depth smoothness laplacian")  # in
 ImageLoss = namedtuple("ImageLoss", "loss terms d_colour d_depth")
 
 
+def full_weights(loss, laplacian):
+    """The weights of all terms without their schedules; `laplacian` is lambda_lap."""
+    return LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, laplacian)
+
+
 def frame_targets(frame, config):
     """Targets of a Frame: image (3, H, W), mask (H, W), prior depth (H, W)."""
     target = ssim_target(frame.image, frame.mask)

@@ -11,7 +11,7 @@ from endotsr.definition.density_control import densify, empty_statistics, gather
 from endotsr.definition.initialisation import activate_residuals, initialise
 from endotsr.definition.laplacian import laplacian_loss_forward, laplacian_loss_reverse
 from endotsr.definition.metrics import psnr_tissue
-from endotsr.definition.objective import Frame, LossWeights, frame_targets, no_edges, photometric_loss
+from endotsr.definition.objective import Frame, frame_targets, full_weights, no_edges, photometric_loss
 from endotsr.definition.render import render_forward
 from endotsr.definition.scene import arrays, scene_at, spectral_from
 from endotsr.definition.settings import PAPER
@@ -33,10 +33,8 @@ def frame_of(sequence, k):
 
 def weights_at(iteration, config):
     """Weights of the image terms at this iteration."""
-    loss = config.loss
-    ramp = schedules.laplacian_ramp(iteration, config)
-    smoothness = loss.smoothness_weight if schedules.smoothness_active(iteration, config) else 0.0
-    return LossWeights(loss.ssim_weight, loss.depth_weight, smoothness, ramp * loss.lambda_lap)
+    weights = full_weights(config.loss, schedules.laplacian_ramp(iteration, config) * config.loss.lambda_lap)
+    return weights if schedules.smoothness_active(iteration, config) else weights._replace(smoothness=0.0)
 
 
 def activated(state, config):

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +35,8 @@ class Format(NamedTuple):
 def result(clip: Clip) -> object:
     """Everything that a clip says, comparable."""
     first = next(clip.pictures([0])).left
-    arrays = [clip.masks and clip.masks(0), clip.depth and clip.depth(0), clip.points and clip.points(0), clip.times]
+    arrays = [clip.masks and clip.masks(0), clip.depth and clip.depth(0), clip.points and clip.points(0)]
+    arrays += [value for f in fields(clip) if isinstance(value := getattr(clip, f.name), np.ndarray)]
     return (clip.names, clip.intrinsics, first.tobytes(), clip.unit, clip.rate, clip.baseline,
             [None if a is None else np.asarray(a).tobytes() for a in arrays],
             None if clip.poses is None else [p and (p.rotation.tobytes(), p.translation.tobytes()) for p in clip.poses],

@@ -50,7 +50,8 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
                "opencv": OTHER_NAMES}.get(name, set())  # fmt: skip
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
-        assert pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried), pattern
+        known = pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried)
+        assert known, f"field_inputs.py: give {name!r} a value of {pattern}, and another value that changes the clip"
 
 
 ALIASES = {"image_width", "width", "image_height", "height", "camera_matrix", "K", "k", "distortion_coefficients", "D",

@@ -1,16 +1,19 @@
 """The registry of stages: what it says of itself is true, and what does not fit together is refused."""
 
 import importlib
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from endotsr.config import LossConfig
 from endotsr.port.contract import all_operations
 from endotsr.port.gradcheck import all_pairs, pair_of
 from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.stages import registry
 from endotsr.port.stages.registry import all_stages
+from endotsr.port.stages.scene import CHECKED
 from endotsr.port.stages.stage import Stage, Variant, real_of, split_blocks
 from makers.registry import JUDGED
 
@@ -134,8 +137,16 @@ def test_a_name_is_registered_once(monkeypatch, other, message):
 def test_the_checks_are_the_variants_in_the_order_of_the_specification():
     assert list(all_pairs()) == [variant.name for stage in STAGES.values() for variant in stage.variants]
     labels = [pair.equation for pair in all_pairs().values()]
-    order = ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10)), "B13", "B16", "B19", "6"]
-    assert list(dict.fromkeys(labels)) == order
+    *parts, whole = dict.fromkeys(labels)
+    numbers = [(label[0] == "B", int(re.sub(r"\D", "", label)), label) for label in parts]
+    assert numbers == sorted(numbers) and whole == "6", "sort STAGE_MODULES and the stages of a module"
+
+
+def test_the_check_of_the_objective_has_every_weight():
+    """A weight of 0 hides a wrong gradient of its term in `view_pass` or `image_loss`."""
+    weights = {name for name in LossConfig.__struct_fields__ if name.endswith("_weight") or name.startswith("lambda_")}
+    missing = {name for name in weights if not CHECKED["loss"].get(name)}
+    assert not missing, f"add to CHECKED in reference/endotsr/port/stages/scene.py: {sorted(missing)}"
 
 
 def test_blocks_of_some_inputs_and_the_others_whole():

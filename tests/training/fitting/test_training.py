@@ -29,6 +29,7 @@ from endotsr.training.fitting.checkpoint_values import check_lengths
 from endotsr.training.fitting.divergence import Diverged
 from endotsr.training.fitting.fused.step import optimise
 from endotsr.training.fitting.model import render_at
+from endotsr.training.fitting.records import TERMS, LogEntry
 from endotsr.training.fitting.schedules import densify_now
 from endotsr.training.fitting.state import new_training, save_state, state_from_checkpoint, training_constants
 from endotsr.training.fitting.trainer import calibrated_weight, train, training_step
@@ -115,6 +116,8 @@ def test_loss_falls_and_every_part_takes_part(finished):
     assert np.mean([e["depth"] for e in late]) < 0.8 * np.mean([e["depth"] for e in early])
     assert [e["iteration"] for e in log] == list(range(1, LENGTH + 1))
     assert all(np.isfinite(e["loss"]) for e in log)
+    timed = "seconds"  # added by the command
+    assert {timed, *TERMS, *(key for entry in log for key in entry)} == set(LogEntry.__annotations__)
     assert ["smoothness" in e for e in log] == [i >= 10 for i in range(1, LENGTH + 1)]
     assert ["laplacian" in e for e in log] == [i > 15 for i in range(1, LENGTH + 1)]
     assert ["matern_penalty" in e for e in log] == [i > ACTIVATED for i in range(1, LENGTH + 1)]

@@ -20,7 +20,7 @@ from endotsr.config import (
     TrainingConfig,
 )
 from endotsr.training.fitting.adam import adam_update
-from endotsr.training.fitting.objective import LossWeights
+from endotsr.training.fitting.objective import LossWeights, full_weights
 from endotsr.training.fitting.sampling import drawn_view
 from endotsr.training.fitting.schedules import learning_rates
 from endotsr.training.fitting.state import new_training, training_constants
@@ -70,7 +70,7 @@ def plain_step(state, constants):
     index, t, _ = (state.drawn or drawn_view(copy.deepcopy(state.rng), constants.sequence, config.training)).view
     column = int(np.flatnonzero(constants.sequence.train_index == index)[0])
     loss, o = config.loss, config.optimiser
-    weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, state.lambda_lap)
+    weights = full_weights(loss, state.lambda_lap)
     view = view_gradients(
         state.gaussians, constants.spectral, constants.targets_of(index), weights, config,
         constants.sequence.cameras[index], t,

@@ -8,11 +8,12 @@ import msgspec
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.result import JsonFile
-from endotsr.config import PAPER, Section, SequenceConfig
+from endotsr.config import PAPER, SequenceConfig
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
 from endotsr.training.runs.files import read_json, write_json
 from endotsr.training.runs.folder import open_run
+from endotsr.untrusted.sections import Section
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import msgspec
 
-from endotsr.config import is_section
+from endotsr.untrusted.sections import is_section
 
 REQUIRED: Any = dataclasses.MISSING  # the default of a required option
 METAVARS = {int: "INT", float: "FLOAT", str: "TEXT"}

@@ -12,7 +12,7 @@ from types import NoneType
 from typing import Annotated, Any, get_args, get_origin
 
 from endotsr.cli.parts.fields import REQUIRED, Field
-from endotsr.config import allowed_values
+from endotsr.untrusted.sections import allowed_values
 
 WIDEST = 120  # maximum characters per line
 GAP = 2  # characters between name and help, and before the name

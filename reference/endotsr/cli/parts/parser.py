@@ -21,10 +21,11 @@ from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
 from endotsr.cli.parts.related_options import FACTS, RELATIONS
 from endotsr.cli.parts.relations import check_relations
-from endotsr.config import allowed_values, checked, merged
+from endotsr.config import merged
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_unwritable
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.sections import allowed_values, checked
 
 T = TypeVar("T")
 HELP_ALL = "--help-all"

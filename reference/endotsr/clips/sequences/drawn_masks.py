@@ -18,11 +18,11 @@ import msgspec
 
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, filled
-from endotsr.config import Section
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.untrusted.json import Count, Text, read_json, typed
 from endotsr.untrusted.names import shown
+from endotsr.untrusted.sections import Section
 
 FORMAT = "endotsr-keys-1"
 LARGEST_FILE = 16 << 20  # bytes

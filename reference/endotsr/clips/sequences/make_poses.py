@@ -26,10 +26,10 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.trajectory import filled
 from endotsr.clips.sequences.view_frames import views_of
-from endotsr.config import Section
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose
 from endotsr.untrusted.json import read_json, typed
+from endotsr.untrusted.sections import Section
 from endotsr.untrusted.writing import replace_text
 
 PARTIAL = "poses.partial.json"

@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Section
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.untrusted.sections import Section
 
 MOST_POINTS = 5000  # of a shape; a freehand outline around a large picture has about 1000
 LARGEST = 1 << 15  # px, of a coordinate or radius: the longest side of a picture that a page shows

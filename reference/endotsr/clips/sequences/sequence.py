@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from endotsr.config import Section, SequenceConfig
+from endotsr.config import SequenceConfig
 from endotsr.method.splatting.camera import Camera
 from endotsr.untrusted.names import file_name
+from endotsr.untrusted.sections import Section
 
 IN_MEMORY = "arrays in memory"  # source of a sequence that Python made
 

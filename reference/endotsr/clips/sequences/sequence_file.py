@@ -45,9 +45,9 @@ import numpy as np
 
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, scene_factor
 from endotsr.clips.sequences.clip import Assumed
-from endotsr.config import Section, checked, refuse_unknown_keys
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
+from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
 from endotsr.untrusted.toml import read_toml, toml_text
 
 FILE_NAME = "sequence.toml"

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.stereo import match_pair
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Picture
-from endotsr.config import Fraction, Positive, Section
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import Fraction, Positive, Section
 
 MULTIPLE = 16  # of the number of searched disparities, required by OpenCV
 MOST = 512  # searched disparities; more indicate a wrong calibration

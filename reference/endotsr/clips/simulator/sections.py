@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from endotsr.config import Fraction, NonNegative, Positive, PositiveCount, Section
+from endotsr.untrusted.sections import Fraction, NonNegative, Positive, PositiveCount, Section
 
 
 class Effect(Section, frozen=True, kw_only=True):

@@ -9,8 +9,8 @@ from typing import Annotated
 import msgspec
 
 from endotsr.clips.simulator import sections
-from endotsr.config import Count, NonNegative, Positive, Section
 from endotsr.errors import InputError
+from endotsr.untrusted.sections import Count, NonNegative, Positive, Section
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]

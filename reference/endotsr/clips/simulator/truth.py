@@ -26,12 +26,12 @@ from endotsr.clips.simulator.gain import GainSpectrum, gain_series, gain_spectru
 from endotsr.clips.simulator.scenes import effects_on
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.trajectories import MaterialTracks
-from endotsr.config import checked
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.untrusted.arrays import read_npz
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.names import shown
+from endotsr.untrusted.sections import checked
 
 TRUTH = "truth"
 FORMAT = 1

@@ -175,7 +175,7 @@ def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
     config = Config(model=model_of(settings), loss=loss)
     frame = objective.Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera)
     laplacian = loss.lambda_lap if config.model.laplacian else 0.0
-    weights = objective.LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, laplacian)
+    weights = objective.full_weights(loss, laplacian)
     exposed = (inputs["exposure_log_gain"], inputs["exposure_bias"]) if "exposure_bias" in inputs else None
     found = view.view_gradients(
         _gaussians(inputs), _spectral(inputs, settings), objective.frame_targets(frame, config), weights, config,

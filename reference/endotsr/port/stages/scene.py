@@ -23,7 +23,7 @@ from endotsr.port.stages.requests import (
 )
 from endotsr.port.stages.stage import Blocks, Found, Inputs, Settings, Stage, Variant, split_blocks
 from endotsr.training.fitting.model import SceneSaved, scene_at
-from endotsr.training.fitting.objective import LossWeights, Targets, frame_targets
+from endotsr.training.fitting.objective import Targets, frame_targets, full_weights
 from endotsr.training.fitting.view import ViewGradients, view_gradients
 from endotsr.training.scene.parameters import Exposure
 
@@ -57,7 +57,7 @@ def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSave
     config = Config(model=model_of(settings), loss=loss)
     frame = Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera)
     targets = frame_targets(frame, config)
-    weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, loss.lambda_lap)
+    weights = full_weights(loss, loss.lambda_lap)
     view = view_gradients(
         gaussians_of(inputs), spectral_of(inputs, settings), targets, weights, config, camera, settings["t"],
         inputs.get("edges"), exposure=_exposure(inputs), raster=raster_of(settings), degree=settings["degree"],

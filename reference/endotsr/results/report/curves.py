@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from endotsr.results.evaluation.records import EvaluationRecord
 from endotsr.results.report import parts
 from endotsr.results.report.style import LIGHT, THEMES, Theme, encoded, legend, name_axes, new_figure, plain_axes
-from endotsr.training.fitting.records import LogEntry
+from endotsr.training.fitting.records import TERMS, LogEntry
 
 LogEntries = list[LogEntry]
-
-TERMS = ("l1", "ssim", "depth", "smoothness", "matern_penalty", "laplacian")
 
 
 @dataclass(frozen=True)

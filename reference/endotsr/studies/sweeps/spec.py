@@ -22,21 +22,12 @@ from typing import Annotated, Any, NamedTuple, get_args
 import msgspec
 
 from endotsr.clips.simulator.settings import SimulatorSettings
-from endotsr.config import (
-    Config,
-    Section,
-    SequenceConfig,
-    checked,
-    config_from_dict,
-    merged,
-    refuse_unknown_keys,
-    with_iterations,
-    without_former_keys,
-)
+from endotsr.config import Config, SequenceConfig, config_from_dict, merged, with_iterations, without_former_keys
 from endotsr.errors import InputError
 from endotsr.results.evaluation.measures import check_measures
 from endotsr.training.runs.sources import SIMULATED
 from endotsr.untrusted.json import Keys, Text, integer
+from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
 from endotsr.untrusted.toml import read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")

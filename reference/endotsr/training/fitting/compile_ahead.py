@@ -118,11 +118,11 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
     from endotsr.clips.sequences.between_kernels import moved_priors
     from endotsr.method.losses.masked_ssim import stored_target
     from endotsr.method.splatting.render import RenderOut
-    from endotsr.training.fitting.objective import LossWeights, image_loss
+    from endotsr.training.fitting.objective import full_weights, image_loss
 
-    config, loss = constants.config, constants.config.loss
+    config = constants.config
     frame = constants.sequence.frame(0, config.training.precision)
-    later = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, float(config.model.laplacian))
+    later = full_weights(config.loss, float(config.model.laplacian))
     weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
     seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no loss term is zero, so every kernel runs
     image_loss(seen, constants.targets_of(0), weights, config.loss)

@@ -57,6 +57,11 @@ class LossWeights(NamedTuple):
     laplacian: float
 
 
+def full_weights(loss: LossConfig, laplacian: float) -> LossWeights:
+    """The weights of all terms without their schedules; `laplacian` is lambda_lap, stated or calibrated."""
+    return LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, laplacian)
+
+
 class ImageLoss(NamedTuple):
     """Value, terms and gradient with respect to the images."""
 

@@ -5,18 +5,26 @@ from typing import NamedTuple, Required, TypedDict
 from endotsr.untrusted.json import Keys
 
 
-class LogEntry(TypedDict, total=False):
-    """One line of log.jsonl; loss terms are unweighted, and inactive terms are missing."""
+class LossTerms(TypedDict, total=False):
+    """The terms of equation (6), unweighted; a term that is not evaluated is missing."""
 
-    iteration: Required[int]  # from 1
-    frame: Required[int]
-    loss: Required[float]
     l1: float
     ssim: float
     depth: float
     smoothness: float
     matern_penalty: float
     laplacian: float
+
+
+TERMS = tuple(LossTerms.__annotations__)
+
+
+class LogEntry(LossTerms, total=False):
+    """One line of log.jsonl."""
+
+    iteration: Required[int]  # from 1
+    frame: Required[int]
+    loss: Required[float]
     psnr: float | None  # dB, over the tissue of the view; None for a perfect render or without tissue
     gaussians: Required[int]
     seconds: float

@@ -27,7 +27,7 @@ from endotsr.training.fitting.coarse_start import coarse_ends, coarse_start
 from endotsr.training.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.training.fitting.fused.step import optimise
 from endotsr.training.fitting.model import SceneGrads, SceneSaved, scene_reverse
-from endotsr.training.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on
+from endotsr.training.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, full_weights
 from endotsr.training.fitting.records import LogEntry, RngState
 from endotsr.training.fitting.sampling import View, drawn_view
 from endotsr.training.fitting.schedules import (
@@ -158,9 +158,8 @@ def training_step(state: TrainingState, constants: TrainingConstants, timer: Tim
 
 def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:
     """The weights of the image terms at this iteration."""
-    smoothness = config.loss.smoothness_weight if smoothness_active(iteration, config) else 0.0
-    laplacian = laplacian_ramp(iteration, config) * (state.lambda_lap or 0.0)
-    return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, laplacian)
+    weights = full_weights(config.loss, laplacian_ramp(iteration, config) * (state.lambda_lap or 0.0))
+    return weights if smoothness_active(iteration, config) else weights._replace(smoothness=0.0)
 
 
 def _activate_residuals(state: TrainingState, config: Config) -> None:

@@ -11,12 +11,13 @@ import msgspec
 from endotsr.clips.sequences.sequence import IN_MEMORY, Sequence
 from endotsr.clips.sequences.splits import split_frames
 from endotsr.clips.simulator.settings import SimulatorSettings
-from endotsr.config import Config, checked
+from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_inside
 from endotsr.training.runs.folder import RunFolder
 from endotsr.training.runs.machine import machine, now, versions
 from endotsr.training.runs.records import InputPart, RunRecord
+from endotsr.untrusted.sections import checked
 
 if TYPE_CHECKING:
     from endotsr.method.kernels.arrays import FloatArray
