@@ -60,12 +60,11 @@ def changed(revision: str | None) -> list[str]:
 
 
 def makers(paths: list[str]) -> list[str]:
-    """Programs whose output depends on the paths: cases of a family, tables of pages. A record belongs to the programs that name it."""
-    tables = [
-        name for start, names in MAKERS.items() if any(path.startswith(start) for path in paths) for name in names
-    ]
+    """Programs whose output depends on the paths; a record belongs to the programs that name it."""
+    touched = [names for start, names in MAKERS.items() if any(path.startswith(start) for path in paths)]
     families = [Path(path).stem for path in paths if path.startswith("golden/makers/") and path.endswith(".toml")]
-    found = [*(f"python golden/make.py write {name}" for name in families), *tables]
+    found = [f"python golden/make.py write {name}" for name in families]
+    found += [name for names in touched for name in names]
     records = {Path(path).name for path in paths if path.startswith("docs/results/") and path.endswith(".json")}
     for file in sorted((ROOT / "docs" / "pages").glob("*/*.py")):
         text = file.read_text(encoding="utf-8")
