@@ -39,7 +39,7 @@ def value_of(cell: str) -> object:
 def row_of(field: Field, stored: dict[str, list[str]]) -> str:
     """The row of a key: the stored one with the default of the code, else a new one."""
     default = list(field.default) if isinstance(field.default, tuple) else field.default
-    old, *rest = stored.get(field.key) or [None, field.help, equation_of(field.key)]
+    old, *rest = stored.get(field.key) or ["", field.help, equation_of(field.key)]
     shown = default if isinstance(default, str) and default else msgspec.json.encode(default).decode()
     return f"| {' | '.join((f'`{field.key}`', old if old and value_of(old) == default else shown, *rest))} |\n"
 
