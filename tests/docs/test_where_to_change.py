@@ -20,7 +20,7 @@ CHANGES = {  # the most files of code that a change may take
     "optimiser": 5,
     "effect of the simulator": 4,
     "row of the report": 1,
-    "key of a reader": 1,
+    "key of a reader": 5,
 }
 
 SECTIONS = re.findall(r"^## \d+\. (.+?)\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
