@@ -37,7 +37,7 @@ MORE = {
         "tests/definition/test_twins.py",
         "tests/docs/test_equation_map.py",
     ),
-    f"{PACKAGE}clips/sequences/": ("tests/docs/test_prepare_page.py",),
+    f"{PACKAGE}clips/sequences/": ("tests/docs/test_generated_pages.py",),
     f"{PACKAGE}config.py": ("tests/test_specification.py", "tests/cli/test_cli_options.py", "tests/port/vectors"),
     f"{PACKAGE}api.py": ("tests/test_api.py",),
     f"{PACKAGE}cli/": ("tests/cli",),

@@ -4,7 +4,7 @@ import re
 
 import pytest
 from pages.book import chapters
-from pages.store.marks import read_json, replaced
+from pages.store.marks import read_json
 
 from endotsr.errors import InputError
 
@@ -37,11 +37,6 @@ def test_a_chapter_that_begins_with_an_equation_has_no_motive():
     title, _, rest = tail.partition("\n#\n# ")
     chapter = chapters.chapter_of(f"{head}\n# # {title}\n#\n# ## The equation\n# {rest}")
     assert chapters.missing("05_covariance", chapter) == ["motive"]
-
-
-def test_the_committed_table_is_what_the_notebooks_have():
-    text, times = chapters.PAGE.read_text(encoding="utf-8"), read_json(chapters.FILE, chapters.COMMAND)
-    assert replaced(text, {"table": chapters.table(chapters.chapters(), times)}, chapters.PAGE, "chapters") == text
 
 
 def test_every_chapter_was_timed_and_the_book_takes_ten_minutes_at_most():

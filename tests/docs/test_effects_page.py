@@ -9,20 +9,10 @@ from pages.effects import parts as effects_parts
 from pages.effects import study as effects_study
 from pages.effects.parts import ANSWERED
 from pages.store.intervals import interval, shown
-from pages.store.marks import replaced
 
 from endotsr.clips.effects.inspect import EFFECTS
 from endotsr.clips.effects.savings import MEASURED
 from endotsr.errors import InputError
-
-MARKED = re.compile(r"<!-- effects:(\w+):start -->")
-
-
-def test_committed_page_is_what_the_results_say():
-    text = effects.PAGE.read_text(encoding="utf-8")
-    made = effects.fragments(effects.read())
-    assert sorted(MARKED.findall(text)) == sorted(made)
-    assert replaced(text, made, effects.PAGE, "effects") == text
 
 
 def test_every_effect_has_its_row():

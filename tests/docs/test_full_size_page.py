@@ -10,19 +10,13 @@ from pages.full_size import page as full_size
 from pages.full_size import pictures as full_size_pictures
 from pages.full_size import text as full_size_text
 from pages.full_size.text import psnr
-from pages.store.marks import read_json, replaced
+from pages.store.marks import read_json
 
 from endotsr.errors import InputError
 
 RUNS = read_json(full_size.FILE, full_size.COMMAND)
 NOTEBOOK = Path(__file__).parents[2] / "notebooks" / "14_full_sequence.py"
 LARGEST = 2_000_000  # bytes of all stored files
-
-
-def test_committed_page_is_what_the_stored_runs_say():
-    text, made = full_size.PAGE.read_text(encoding="utf-8"), full_size_text.fragments(RUNS)
-    assert set(re.findall(r"<!-- full_size:(\w+):start -->", text)) == set(made)
-    assert replaced(text, made, full_size.PAGE, "full_size") == text
 
 
 def test_stored_files_are_small_and_every_one_is_shown():

@@ -5,18 +5,12 @@ from pathlib import Path
 
 import pytest
 from pages.claims import paper
-from pages.store.marks import replaced
 from pages.store.published import BY_NAME, SEVEN_OTHERS
 
 from endotsr import __version__
 from endotsr.errors import InputError
 
 ROOT = Path(__file__).parents[2]
-
-
-def test_the_committed_page_is_made_by_its_command():
-    text = paper.PAGE.read_text(encoding="utf-8")
-    assert replaced(text, paper.parts(), paper.PAGE, "paper") == text
 
 
 def test_every_equation_of_the_paper_has_a_sentence():

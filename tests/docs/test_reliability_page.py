@@ -5,12 +5,6 @@ import re
 
 import pytest
 from pages.book import reliability
-from pages.store.marks import replaced
-
-
-def test_the_tables_are_those_of_the_results():
-    text = reliability.PAGE.read_text(encoding="utf-8")
-    assert replaced(text, reliability.parts(), reliability.PAGE, "reliability") == text
 
 
 @pytest.mark.parametrize("name", reliability.MAKERS)

@@ -1,8 +1,8 @@
 """Chapter 14 and the page of the presets say what the records of the running clip say; the extract is of such a run."""
 
 import numpy as np
-from pages.book import presets, running_clip, running_scene
-from pages.store.marks import read_json, replaced
+from pages.book import running_clip, running_scene
+from pages.store.marks import read_json
 from running_clip import FOLDER, load
 
 from endotsr.method.splatting.render import render_forward
@@ -32,12 +32,6 @@ def test_three_seeds_are_above_the_blend_and_level_with_flow():
     assert [run["seed"] for run in RECORD["runs"]] == [0, 1, 2]
     assert (found["model"] > found["two_neighbours"] + 2).all()
     assert (abs(found["model"] - found["flow_interpolation"]) < 0.1).all()
-
-
-def test_the_page_of_the_presets_has_the_tables_of_the_records():
-    text = presets.PAGE.read_text(encoding="utf-8")
-    made = {"recorded": presets.recorded(), "simulated": presets.simulated()}
-    assert replaced(text, made, presets.PAGE, "presets") == text
 
 
 def rendered(clip, scene):

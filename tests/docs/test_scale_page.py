@@ -5,11 +5,6 @@ import json
 from pages.bench import scale
 
 
-def test_the_table_and_the_recorded_runs_are_those_of_the_page():
-    page = scale.PAGE.read_text(encoding="utf-8")
-    assert scale.parts()["minutes"] in page
-
-
 def test_the_estimates_are_near_the_timed_trainings():
     """The ratio of estimate to time belongs to the machine and is nearly equal for all presets."""
     rows = json.loads((scale.DOCS / "results" / "minutes.json").read_text(encoding="utf-8"))["rows"]
