@@ -8,7 +8,7 @@ from endotsr.clips.poses.views import Views, compose, inverse
 from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import with_settings
-from endotsr.method.splatting.camera import Camera, CameraPose
+from endotsr.method.splatting.camera import CameraPose
 
 SIZE = SimulatorSettings(width=160, height=120, frames=14)
 SWING = 10.0  # mm
@@ -44,8 +44,3 @@ def path_error(poses, true):
     common = compose(inverse(true[0]), poses[0])
     moved = [compose(pose, inverse(common)) for pose in poses]
     return float(np.sqrt(np.square(centres(moved) - centres(true)).sum(1).mean()))
-
-
-def posed(camera: Camera, pose: CameraPose) -> Camera:
-    """The camera with this pose."""
-    return camera._replace(rotation=pose.rotation, translation=pose.translation)
