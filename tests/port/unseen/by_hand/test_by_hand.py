@@ -1,4 +1,4 @@
-"""The independent set of mistakes: it fits its port, covers every stage, and a handful is recognised as the record says.
+"""The independent mistakes: they fit their port, cover every stage, and a handful is recognised as the record says.
 
 All of them: python tests/port/unseen/by_hand/measure.py --record now
 """
