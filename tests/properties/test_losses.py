@@ -53,7 +53,7 @@ def test_valid_values_shrink_from_level_to_level_and_lie_on_tissue(data, shape, 
 
 
 @given(image_pairs(), st.data(), IMAGE_LOSSES)
-def test_nothing_under_the_mask_matters(pair, data, loss):
+def test_hard_L6_nothing_under_the_mask_matters(pair, data, loss):
     rendered, observed, mask = pair
     value, gradient = loss(rendered, observed, mask)
     dirt = [data.draw(poisons(rendered.dtype)) for _ in range(2)]
@@ -74,7 +74,7 @@ def test_colour_channels_do_not_mix(pair, loss, order):
 
 
 @given(image_pairs(), IMAGE_LOSSES)
-def test_equal_images_are_perfect_and_at_rest(pair, loss):
+def test_hard_L7_X1_equal_images_are_perfect_and_at_rest(pair, loss):
     _, observed, mask = pair
     value, gradient = loss(observed.copy(), observed, mask)
     assert value == (1.0 if loss is ssim else 0.0) and not gradient.any()

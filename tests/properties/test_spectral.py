@@ -63,7 +63,7 @@ def test_statistics_under_a_shift_of_time(stamps, count, shift):
 
 
 @given(STAMPS, st.data())
-def test_statistics_do_not_depend_on_order_or_repeats(stamps, data):
+def test_hard_W2_statistics_do_not_depend_on_order_or_repeats(stamps, data):
     omega = frequencies(4, 1.0, 16.0)
     again = [*data.draw(st.permutations(stamps)), data.draw(st.sampled_from(stamps))]
     for one, two in zip(atom_statistics(stamps, omega), atom_statistics(again, omega)):
@@ -122,7 +122,7 @@ def test_the_translation_residual_is_linear(seed, count, factor):
 
 
 @given(SEEDS, COUNTS, st.integers(0, 6), LENGTHS)
-def test_the_penalty_does_not_see_the_phase(seed, count, n, length):
+def test_hard_M2_the_penalty_does_not_see_the_phase(seed, count, n, length):
     """Every (sin, cos) pair of coefficients turned by an angle of its own."""
     c, rho = coefficients(seed, count, n, np.float64), matern_weights(frequencies(count, 1.0, 16.0), length)
     angle = np.random.default_rng(seed + 1).uniform(0, 2 * np.pi, (3, count, n))

@@ -14,10 +14,7 @@ from endotsr.method.equations.deformation import (
 )
 from endotsr.method.equations.deformation import GAUSSIANS_PER_PIECE as PIECE
 from endotsr.method.equations.deformation import GAUSSIANS_PER_STRETCH as STRETCH
-from endotsr.port.gradcheck import all_pairs
-from oracle.complex_step import derivative
 
-PAIRS = [pair for pair in all_pairs().values() if pair.equation == "B1"]
 UNIT = {"float32": 2.0**-24, "float64": 2.0**-53}
 
 
@@ -44,51 +41,6 @@ def test_values_equal_the_definition(rng, basis, dtype):
     assert out.dtype == dtype
     assert np.abs(truth).max() > 0.3
     assert np.abs(out - truth).max() <= 8 * weight.shape[1] * UNIT[dtype]
-
-
-@pytest.mark.parametrize("basis", BASES)
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_gradients_equal_complex_steps_of_the_definition(rng, basis, dtype):
-    """Gradients carry factors up to 1/S = 1e4; the bound is relative to the largest entry of each array."""
-    weight, centre, width = arrays(rng, bases=3, count=2, dtype=dtype)
-    d_offsets = rng.normal(size=(10, 2)).astype(dtype)
-    _, saved = deformation_forward(weight, centre, width, 0.5, basis)
-    grads = deformation_reverse(d_offsets, saved)
-    exact = {name: a.astype(np.float64) for name, a in zip(("weight", "centre", "width"), (weight, centre, width))}
-    exact["t"] = np.array(0.5)
-
-    def weighted(name, moved):
-        psi, _ = definition.deformation_forward(*(exact | {name: moved}).values(), basis)
-        return (d_offsets.astype(np.float64) * psi).sum()
-
-    for name in ("weight", "centre", "width"):
-        truth = derivative(lambda moved, name=name: weighted(name, moved), exact[name])
-        found = getattr(grads, f"d_fdm_{name}")
-        assert found.dtype == dtype
-        assert np.abs(found - truth).max() <= 64 * UNIT[dtype] * np.abs(truth).max(), name
-    truth = derivative(lambda moved: weighted("t", moved), exact["t"])
-    scale = np.abs(grads.d_fdm_centre).sum()
-    assert abs(grads.d_t - truth) <= 64 * UNIT[dtype] * scale
-
-
-@pytest.mark.parametrize("pair", PAIRS, ids=lambda p: p.name)
-def test_reverse_is_the_derivative_of_forward(rng, pair):
-    """Five-point difference along a random direction of every input, relative error 1e-7."""
-    inputs = pair.inputs(rng)
-    cotangent = {"offsets": rng.normal(size=(10, 5))}
-    grads = pair.reverse(inputs, cotangent)
-    for name, value in inputs.items():
-        direction = rng.normal(size=value.shape)
-
-        def along(h, name=name, value=value, direction=direction):
-            out = pair.forward({**inputs, name: value + h * direction})["offsets"]
-            return (out * cotangent["offsets"]).sum()
-
-        h = 1e-4
-        difference = (8 * (along(h) - along(-h)) - (along(2 * h) - along(-2 * h))) / (12 * h)
-        analytic = (grads[name] * direction).sum()
-        assert abs(analytic) > 1e-3, name
-        assert abs(difference - analytic) <= 1e-7 * abs(analytic), name
 
 
 def test_hard_F1_the_two_bases_are_told_apart():

@@ -56,23 +56,6 @@ def test_float32_is_the_rounded_float64():
     assert np.array_equal(phi, wide.astype(np.float32))
 
 
-def test_dictionary_reverse_against_differences():
-    rng = np.random.default_rng(0)
-    omega, t, h = frequencies(5, 1.0, 16.0), 0.4321, 2e-4
-    d_phi = rng.normal(size=10)
-    grads = dictionary_reverse(d_phi, dictionary_forward(t, omega)[1])
-
-    def value(step_t, step_omega):
-        return d_phi @ dictionary_forward(t + step_t, omega + step_omega)[0]
-
-    def slope(f):
-        return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
-
-    assert slope(lambda s: value(s, 0)) == pytest.approx(grads.d_t, rel=1e-8)
-    for one in np.eye(5):
-        assert slope(lambda s, one=one: value(0, s * one)) == pytest.approx(grads.d_omega @ one, rel=1e-8)
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_hard_W1_phase_is_folded_before_the_sine(dtype):
     omega = np.array([16.0], dtype)
@@ -141,13 +124,6 @@ def test_hard_W2_one_stamp_makes_every_atom_dead():
         assert np.array_equal(normalised_atoms(0.7, omega, statistics), np.zeros(16))
     assert report_atoms([0.3], omega)[:2] == (0, 0.0)
     assert report_atoms([0.1, 0.35], omega).rank == 1
-
-
-def test_hard_W2_repeated_stamps_count_once():
-    omega = frequencies(4, 1.0, 16.0)
-    once, twice = atom_statistics([0.1, 0.2, 0.7], omega), atom_statistics([0.7, 0.1, 0.2, 0.2, 0.1], omega)
-    for a, b in zip(once, twice):
-        assert np.array_equal(a, b)
 
 
 @pytest.mark.parametrize(("n", "rank"), [(16, 13), (32, 15), (33, 16), (63, 16), (156, 16)])

@@ -219,15 +219,6 @@ def test_hard_L6_nothing_under_the_instrument_matters(rule, dtype):
     assert again == value and np.array_equal(laplacian_loss_reverse(1.0, saved), gradient)
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("rule", RULES)
-def test_hard_L7_equal_images(rule, dtype):
-    rendered, _ = images((17, 31), dtype)
-    value, saved = laplacian_loss_forward(rendered, rendered.copy(), support_masks(np.ones((17, 31)), 3, rule), rule)
-    assert value == 0.0
-    assert np.array_equal(laplacian_loss_reverse(1.0, saved), np.zeros((3, 17, 31)))
-
-
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("shape", SIZES)
 def test_hard_L8_the_reverse_pass_is_the_adjoint(shape, rule):
@@ -279,20 +270,6 @@ def test_kernels_equal_their_python_bodies(monkeypatch, rule):
     again, saved = laplacian_loss_forward(rendered, observed, masks, rule)
     assert again == pytest.approx(value, rel=2 * U)
     np.testing.assert_allclose(laplacian_loss_reverse(1.0, saved), gradient, rtol=4 * U, atol=1e-18)
-
-
-def test_float32_gradient_is_the_float64_gradient():
-    from endotsr.port.gradcheck import all_pairs
-    from endotsr.port.stages.laplacian import observed_image, tissue_mask
-
-    for pair in (p for p in all_pairs().values() if p.equation == "5"):
-        rendered = pair.inputs(np.random.default_rng(2))["rendered"].astype(np.float32)
-        masks = support_masks(tissue_mask())
-        assert min(masks.counts) > 0
-        narrow = laplacian_loss_forward(rendered, observed_image().astype(np.float32), masks)[1]
-        wide = laplacian_loss_forward(rendered.astype(np.float64), observed_image(), masks)[1]
-        a, b = laplacian_loss_reverse(1.0, narrow).astype(np.float64), laplacian_loss_reverse(1.0, wide)
-        assert np.linalg.norm(a - b) <= 1e-4 * np.linalg.norm(b)
 
 
 def test_refused_input():
