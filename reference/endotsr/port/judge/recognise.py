@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.port.judge.compare import fingerprint, largest, scale_of
+from endotsr.port.judge.diagnose import made_of
 from endotsr.port.judge.format import Case, Output, Rule, Shown
 from endotsr.port.judge.store import Golden
 
@@ -57,7 +58,8 @@ class Evidence(msgspec.Struct, kw_only=True):
         if not explained:
             return 0.0
         refused = explained + len(self.differs)
-        recall, precision = explained / (refused + len(self.unexplained)), explained / (refused + len(self.passes))
+        against = len(related(self.passes, (*self.agrees, *self.fits)))
+        recall, precision = explained / (refused + len(self.unexplained)), explained / (refused + against)
         return recall * precision**0.25 * (1.0 if self.agrees else 0.6)
 
 
@@ -79,6 +81,16 @@ class Suspect(msgspec.Struct, kw_only=True):
     def whole(self) -> bool:
         """Whether every refused output is explained and no other is expected."""
         return self.named and self.score > CERTAIN
+
+
+def related(names: Iterable[str], agreeing: Iterable[str]) -> list[str]:
+    """Outputs of the operations that agree with a mistake, of their parts, and of what is composed of them.
+
+    Others say nothing: a port may make a mistake in one of two operations that share a rule.
+    """
+    families = {name.partition("/")[0] for name in agreeing}
+    below = families.union(*map(made_of, families))
+    return [n for n in names if (own := n.partition("/")[0]) in below or made_of(own) & families]
 
 
 def contradicted(evidence: Evidence) -> bool:

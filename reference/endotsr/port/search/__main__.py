@@ -11,7 +11,7 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.port.judge.store import read_golden
-from endotsr.port.search.find import explained, sentences
+from endotsr.port.search.find import apart, explained, sentences
 from endotsr.port.search.inside import looked
 
 MOST_MEMORY = 4 << 30  # bytes, if the system supports a limit
@@ -31,7 +31,8 @@ def main(words: list[str]) -> int:
     except InputError:
         return 1
     inside, asked = looked(found.stage, found.cases)
-    print(json.dumps({"causes": sentences(found), "inside": inside, "asked": asked}))
+    causes = sentences(found) or apart(found, float(seconds) / 2)
+    print(json.dumps({"causes": causes, "inside": inside, "asked": asked}))
     return 0
 
 

@@ -1,6 +1,7 @@
 """The cases of one operation with the port's answers, and comparisons of other answers with them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,13 @@ class Answered:
         self.right = {**forward, **self.reverse(stage, self.inputs, self.saved)}
         self.forward_names = [name for name in self.got if name in forward]
         self.gradient_names = [name for name in self.got if name not in forward]
+
+    def alone(self, name: str, wrong: Collection[str]) -> "Answered":
+        """The same case with one of its wrong outputs, and without the others."""
+        one = copy(self)
+        one.got = {key: array for key, array in self.got.items() if key == name or key not in wrong}
+        one.refused = self.refused & {name}
+        return one
 
     def forward(self, stage: Stage, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
         """Outputs without gradients, and the saved tuple of the reverse pass."""

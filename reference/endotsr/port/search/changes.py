@@ -19,7 +19,7 @@ from endotsr.port.search.cases import Answered
 from endotsr.port.search.numbers import START, said_number
 from endotsr.port.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
 from endotsr.port.search.requests import OtherReading, other_requests
-from endotsr.port.search.rewrites import rewrites, with_number
+from endotsr.port.search.rewrites import rewrites, rounded, with_number
 from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts
 from endotsr.port.search.trial import LATEST, TELLING, Live, Trial
 from endotsr.port.stages.definition import definition_stages
@@ -77,7 +77,7 @@ def _places(trial: Trial, places: Sequence[Statement]) -> None:
         lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
         for one in live:  # after a hit, the rest of its line is tried
             if not lines or one.spot.place.where(one.spot.node) in lines:
-                _try(trial, one, texts(one), rank)
+                _try(trial, one, texts(one, trial.lower), rank)
     for one in live if long and not trial.explains else ():
         if not trial.over:
             _solved(trial, one.spot, one.mode, one.values)
@@ -187,12 +187,13 @@ def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank
     return spoils
 
 
-def _texts(one: Live) -> Iterator[tuple[str, int]]:
-    """Other texts of a spot."""
-    return rewrites(one.spot.node, one.values, one.spot.truth)
+def _texts(one: Live, lower: str) -> Iterator[tuple[str, int]]:
+    """Other texts of a spot, first those in a lower precision."""
+    yield from rounded(one.spot.node, one.values, lower)
+    yield from rewrites(one.spot.node, one.values, one.spot.truth)
 
 
-def _names(one: Live) -> Iterator[tuple[str, int]]:
+def _names(one: Live, _lower: str) -> Iterator[tuple[str, int]]:
     """Names of the function in place of another name."""
     is_name = isinstance(one.spot.node, ast.Name | ast.Attribute)
     return ((name, 0) for name in (names_in(one.spot.place) if is_name else ()))

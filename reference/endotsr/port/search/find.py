@@ -4,6 +4,7 @@ import contextlib
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from endotsr.errors import InputError
@@ -19,6 +20,7 @@ START_UP = 60.0  # seconds of a process outside its search
 SLOWEST = 10.0  # elapsed seconds per second of computing on a busy machine
 LONG = 3.0  # factor on the time of a search among trajectories
 MOST_LINES = 3  # source lines listed if all explain the outputs equally
+MOST_APART = 6  # outputs that are explained one at a time
 
 
 def explained(golden: Golden, outputs: Path, precision: Precision, level: int, operation: str, seconds: float) -> Trial:
@@ -35,6 +37,31 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
     if stage is None or not answered or not answered[0].refused:
         raise InputError(f"{operation}: nothing to explain")
     return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
+
+
+def apart(trial: Trial, seconds: float) -> list[str]:
+    """Explanations of single outputs, if no change explains all: two independent mistakes mostly spoil different ones.
+
+    An output is compared together with all outputs that are right, and without the other wrong ones. Forward outputs
+    come first; each has an equal part of the time that is left.
+    """
+    names = dict.fromkeys(name for one in trial.cases for name in _forward_first(one))
+    if trial.hits or len(names) < 2 or any(one.length for one in trial.cases):
+        return []
+    found: dict[str, list[str]] = {}
+    end, tried = time.process_time() + seconds, list(names)[:MOST_APART]
+    for k, name in enumerate(tried):
+        cases = sorted((one.alone(name, names) for one in trial.cases), key=_order)
+        share = (end - time.process_time()) / (len(tried) - k)
+        lines = _equally(search(trial.stage, cases, trial.golden, share))
+        for line in lines[:1]:
+            found.setdefault(line, []).append(name)
+    return [f"{', '.join(outputs)} alone: as in the definition with {line}" for line, outputs in found.items()]
+
+
+def _forward_first(one: Answered) -> list[str]:
+    """Refused outputs in the order of the definition, gradients last."""
+    return [name for name in (*one.forward_names, *one.gradient_names) if name in one.refused]
 
 
 def _order(one: Answered) -> tuple[bool, int, int, int]:
@@ -63,6 +90,16 @@ def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECO
 
 def sentences(trial: Trial) -> list[str]:
     """The changes that explain most, one per source line; nothing if changes in many functions do."""
+    said = _equally(trial)
+    if not said:
+        return []
+    number = len(trial.cases)
+    whole = f"  ({WHOLE[trial.hits[0].whole]} of its {number} case{'s' * (number > 1)})"
+    return [f"your outputs are those of the definition with {said[0]}", *said[1:], whole]
+
+
+def _equally(trial: Trial) -> list[str]:
+    """A change that explains most, and lines with those that do so equally."""
     best: dict[str, Hit] = {}
     for hit in trial.hits:
         if hit.rank[:3] == trial.hits[0].rank[:3]:
@@ -75,6 +112,4 @@ def sentences(trial: Trial) -> list[str]:
     if len(best) > MOST_LINES:
         said[0] = f"for example {said[0]}"
         rest = [f"  or equally with another change in {', '.join(functions)}: {len(best)} lines"]
-    number = len(trial.cases)
-    whole = f"  ({WHOLE[trial.hits[0].whole]} of its {number} case{'s' * (number > 1)})"
-    return [f"your outputs are those of the definition with {said[0]}", *rest, whole]
+    return [said[0], *rest]

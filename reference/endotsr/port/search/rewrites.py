@@ -80,12 +80,23 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
 
 
 def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
-    """Operands moved into or out of a function of one argument: sqrt(a) + b, sqrt(a + b)."""
+    """Operands moved into or out of a product or a function of one argument: a (b + c), sqrt(a + b)."""
     match node:
+        case ast.BinOp(left=ast.BinOp(left=a, op=ast.Mult(), right=b), op=ast.Add() | ast.Sub(), right=c):
+            yield ast.BinOp(a, ast.Mult(), ast.BinOp(b, node.op, c))
+            yield ast.BinOp(ast.BinOp(a, node.op, c), ast.Mult(), b)
         case ast.BinOp(left=ast.Call(func=function, args=[inner], keywords=[])):
             yield ast.Call(function, [ast.BinOp(inner, node.op, node.right)], [])
         case ast.Call(func=function, args=[ast.BinOp() as inner], keywords=[]):
             yield ast.BinOp(ast.Call(function, [inner.left], []), inner.op, inner.right)
+
+
+def rounded(node: ast.expr | ast.stmt, values: Sequence[Any], lower: str) -> Iterator[tuple[str, int]]:
+    """A real expression computed in a lower precision from here on, or only rounded to it."""
+    if lower and isinstance(node, ast.expr) and any(np.asarray(value).dtype.kind == "f" for value in values):
+        text = ast.unparse(node)
+        yield f"np.{lower}({text})", 0
+        yield f"np.float64(np.{lower}({text}))", 0
 
 
 def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tuple[str, float]]:
@@ -105,7 +116,8 @@ def _wrapped(values: Sequence[Any]) -> Iterator[str]:
     if any(a.dtype.kind == "f" for a in arrays):
         yield from ("0 * ({})", "-({})", "2 * ({})", "({}) / 2", "({}) ** 2", "1 / ({})")
         yield from ["np.abs({})", "np.maximum({}, 0)"] * any((a < 0).any() for a in arrays)
-        yield from ["np.minimum({}, 1)"] * any((a > 1).any() for a in arrays)
+        yield from ["np.minimum({}, 1)", "np.clip({}, -1, 1)"] * any((np.abs(a) > 1).any() for a in arrays)
+        yield from ("1 / (1 + np.exp(-({})))", "np.tanh({})", "np.maximum({}, 1e-8)")
         yield from ["np.sqrt({})"] * all((a >= 0).all() for a in arrays)
     elif any(a.ndim == 0 and a.dtype.kind in "iu" for a in arrays):
         yield from ("({}) + 1", "({}) - 1", "0", "1")
@@ -119,6 +131,8 @@ def _wrapped(values: Sequence[Any]) -> Iterator[str]:
 def _other_calls(node: ast.Call) -> Iterator[str]:
     function, arguments = ast.unparse(node.func), [ast.unparse(a) for a in node.args]
     name = function.rpartition(".")[2]
+    if name in ("sum", "mean"):
+        yield from _fewer(node, function, arguments)
     if isinstance(node.func, ast.Attribute) and function != f"np.{name}":
         owner = ast.unparse(node.func.value)
         yield owner
@@ -138,6 +152,21 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
     for k in range(len(arguments) - 1):
         turned = [*arguments[:k], arguments[k + 1], arguments[k], *arguments[k + 2 :]]
         yield f"{function}({', '.join([*turned, *words])})"
+
+
+def _fewer(node: ast.Call, function: str, arguments: Sequence[str]) -> Iterator[str]:
+    """A sum or mean without its first or last element; a mean over one element less than there are."""
+    whole, own = ast.unparse(node), function in ("np.sum", "np.mean")
+    summed = arguments[0] if own else function.rpartition(".")[0]
+    axis = next((ast.unparse(word.value) for word in node.keywords if word.arg == "axis"), "")
+    axis = arguments[-1] if not axis and len(arguments) > own else axis
+    if whole.count(summed) == 1:
+        for end in (-1, 0):
+            yield whole.replace(
+                summed, f"np.delete({summed}, {end}, {axis})" if axis else f"({summed})[{end + 1}:{end or ''}]"
+            )
+    if function.endswith("mean"):
+        yield f"{whole} * np.size({summed}) / (np.size({summed}) - np.size({whole}))"
 
 
 def _other_sums(text: str) -> Iterator[str]:

@@ -65,6 +65,7 @@ class Trial:
         for one in answered:
             one.begin(stage)
         most = answered[0]
+        self.lower = lower_precision(most)
         real = [name for name in sorted(most.refused) if most.case.outputs[name].dtype == "real"]
         self.fitted = [name for name in real if name in most.forward_names] or real  # outputs for fitting a number
         # decisions are refused: other numbers may give the same decisions
@@ -175,6 +176,16 @@ class Trial:
         if len(place.phases) == 1:
             return list(place.phases)
         return ["both" if self.forward_refused else "reverse"]
+
+
+LOWER = {"float32": (1e-11, 1e-6), "float16": (1e-6, 1e-2)}
+
+
+def lower_precision(one: Answered) -> str:
+    """The precision whose rounding errors have the size of those of a case, "" for none."""
+    off = one.distance(one.right, [name for name in sorted(one.refused) if one.case.outputs[name].dtype == "real"])
+    largest = 0.0 if off is None or not off.size else float(np.abs(off).max())
+    return next((name for name, (low, high) in LOWER.items() if low < largest <= high), "")
 
 
 @contextlib.contextmanager
