@@ -29,6 +29,17 @@ def test_one_case_that_others_contradict_gives_no_name(evidence, named):
     assert suspect(evidence).named == named
 
 
+@pytest.mark.parametrize(
+    ("passing", "counts"),
+    [("composite/b/x", True), ("render/b/x", True), ("harmonics/b/x", False), ("masked_l1/equal/x", False)],
+)
+def test_a_pass_counts_against_a_mistake_in_the_same_operation_its_parts_and_what_it_is_part_of(passing, counts):
+    alone = Evidence(agrees=["composite/a/x"], unexplained=["composite/a/y"])
+    beside = Evidence(agrees=["composite/a/x"], unexplained=["composite/a/y"], passes=[passing])
+    assert (beside.score < alone.score) == counts
+    assert alone.score == 0.5
+
+
 def test_two_mistakes_in_two_outputs_are_told():
     one = Evidence(agrees=["d/a/x", "d/b/x"], unexplained=["d/a/y", "d/b/y"])
     two = Evidence(agrees=["d/a/y", "d/b/y"], unexplained=["d/a/x", "d/b/x"])

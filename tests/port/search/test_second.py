@@ -10,7 +10,7 @@ import pytest
 
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.store import golden_folder, read_golden
-from endotsr.port.search.find import explained, sentences
+from endotsr.port.search.find import apart, explained, sentences
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unseen" / "by_hand"))
 import hand_port
@@ -49,6 +49,21 @@ MISTAKES = {
         "(np.arange(model.bases) + 0.5) / (model.bases)` where `np.linspace(0, 1, model.bases)` is right",
     ),
 }  # fmt: skip
+MINUS = ('"corrected_translation": e @ d + i["offset"]', '"corrected_translation": e @ d - i["offset"]')
+TURNED = ('"corrected_rotation": e @ w', '"corrected_rotation": w @ e')
+REVERSE = ('"d_rotation": e.T @ g_w', '"d_rotation": e @ g_w')
+MORE_MISTAKES = {
+    "a sum without its last element": (
+        "deformation", '"d_t": -d_theta.sum()', '"d_t": -d_theta[:-1].sum()', "[0:-1]",
+    ),
+    "a product of a sum": (
+        "adam", "m = beta1 * m + (1 - beta1) * g", "m = beta1 * (m + (1 - beta1) * g)", "beta1 * (first + ",
+    ),
+    "a lower precision": (
+        "appearance", "beta / Y00 * np.tanh(x)", "beta / Y00 * np.tanh(x.astype(np.float32)).astype(float)",
+        "np.float32",
+    ),
+}  # fmt: skip
 SECONDS = 60.0  # the searches end by themselves before
 
 
@@ -57,9 +72,9 @@ def golden():
     return read_golden(golden_folder())
 
 
-def search_on(golden, folder, stage, old, new):
-    """The search on the answers of the port by hand with one edit."""
-    port = hand_port.operations([(old, new)])
+def search_on(golden, folder, stage, *edits):
+    """The search on the answers of the port by hand with some edits."""
+    port = hand_port.operations(edits)
     for case in (case for case in golden.cases if case.operation == stage):
         found = hand_port.answer(port, stage, golden.inputs(case), case.settings)
         for name in case.outputs:
@@ -70,10 +85,33 @@ def search_on(golden, folder, stage, old, new):
 @pytest.mark.parametrize("kind", MISTAKES)
 def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind):
     stage, old, new, said = MISTAKES[kind]
-    found = search_on(golden, tmp_path, stage, old, new)
+    found = search_on(golden, tmp_path, stage, (old, new))
     text = "\n".join(sentences(found))
     known = (said,) if isinstance(said, str) else said  # exact words; changes that do the same are found in any order
     assert any(one in text for one in known) and f"(every output of its {len(found.cases)} cases)" in text
+
+
+@pytest.mark.parametrize("kind", MORE_MISTAKES)
+def test_a_lower_precision_or_a_sum_without_an_end_is_found(golden, tmp_path, kind):
+    stage, old, new, said = MORE_MISTAKES[kind]
+    text = "\n".join(sentences(search_on(golden, tmp_path, stage, (old, new))))
+    assert said in text
+
+
+@pytest.mark.parametrize(
+    ("edits", "whole", "alone"),
+    [
+        ([MINUS, TURNED], False, {"corrected_translation", "corrected_rotation"}),
+        ([MINUS, REVERSE], True, {"d_rotation"}),  # a change gives the forward outputs, another one the gradient
+        ([MINUS], True, set()),
+    ],
+)
+def test_independent_mistakes_are_explained_one_output_at_a_time(golden, tmp_path, edits, whole, alone):
+    found = search_on(golden, tmp_path, "pose", *edits)
+    lines = apart(found, SECONDS)
+    assert bool(sentences(found)) == whole, found.hits
+    assert all(" alone: as in the definition with `" in line for line in lines)
+    assert {line.partition(" alone: ")[0] for line in lines} == alone
 
 
 def test_none_of_them_is_in_the_independent_set():
@@ -83,7 +121,7 @@ def test_none_of_them_is_in_the_independent_set():
 
 def test_a_change_cannot_write_into_what_the_next_one_starts_from(golden, tmp_path):
     stage, old, new, _ = MISTAKES["a factor at one index"]
-    one = search_on(golden, tmp_path, stage, old, new).cases[0]
+    one = search_on(golden, tmp_path, stage, (old, new)).cases[0]
     with pytest.raises(ValueError, match="read-only"):
         one.saved[0].quaternion[0] = 1
     right = one.reverse(_stage(stage), one.inputs, one.saved)

@@ -40,16 +40,22 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
 
 
 def apart(trial: Trial, seconds: float) -> list[str]:
-    """Explanations of single outputs, if no change explains all: two independent mistakes mostly spoil different ones.
+    """Explanations of single outputs: independent mistakes often spoil different ones.
 
-    An output is compared together with all outputs that are right, and without the other wrong ones. Forward outputs
-    come first; each has an equal part of the time that is left.
+    Tried are all refused outputs if no change explains them together, and the gradients if one explains the forward
+    outputs alone. An output is compared together with all outputs that are right, and without the other wrong ones.
+    Forward outputs come first; each has an equal part of the time that is left.
     """
     names = dict.fromkeys(name for one in trial.cases for name in _forward_first(one))
-    if trial.hits or len(names) < 2 or any(one.length for one in trial.cases):
+    left = list(names)
+    if sentences(trial) and trial.hits[0].whole == "forward":
+        left = [name for name in names if any(name in one.gradient_names for one in trial.cases)]
+    elif trial.hits:
+        left = []
+    if len(names) < 2 or any(one.length for one in trial.cases):
         return []
     found: dict[str, list[str]] = {}
-    end, tried = time.process_time() + seconds, list(names)[:MOST_APART]
+    end, tried = time.process_time() + seconds, left[:MOST_APART]
     for k, name in enumerate(tried):
         cases = sorted((one.alone(name, names) for one in trial.cases), key=_order)
         share = (end - time.process_time()) / (len(tried) - k)
