@@ -58,8 +58,8 @@ def apart(trial: Trial, seconds: float) -> list[str]:
     end, tried = time.process_time() + seconds, left[:MOST_APART]
     for k, name in enumerate(tried):
         cases = sorted((one.alone(name, names) for one in trial.cases), key=_order)
-        share = (end - time.process_time()) / (len(tried) - k)
-        lines = _equally(search(trial.stage, cases, trial.golden, share))
+        budget = (end - time.process_time()) / (len(tried) - k)
+        lines = _equally(search(trial.stage, cases, trial.golden, budget))
         for line in lines[:1]:
             found.setdefault(line, []).append(name)
     return [f"{', '.join(outputs)} alone: as in the definition with {line}" for line, outputs in found.items()]
