@@ -138,8 +138,8 @@ def test_the_checks_are_the_variants_in_the_order_of_the_specification():
     assert list(all_pairs()) == [variant.name for stage in STAGES.values() for variant in stage.variants]
     labels = [pair.equation for pair in all_pairs().values()]
     *parts, whole = dict.fromkeys(labels)
-    numbers = [(label[0] == "B", int(re.sub(r"\D", "", label)), label) for label in parts]
-    assert numbers == sorted(numbers) and whole == "6", "sort STAGE_MODULES and the stages of a module"
+    published = [label for label in parts if not re.fullmatch(r"B1[3-9]|B[2-9]\d", label)]  # the others are options
+    assert published == ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10))] and whole == "6"
 
 
 def test_the_check_of_the_objective_has_every_weight():

@@ -57,7 +57,7 @@ def refusing(golden, edits) -> list[str]:
     """Names of the cases that refuse the port by hand with these edits. Cases outside its stages are not asked."""
     port, found = hand_port.operations(edits), []
     for case in golden.cases:
-        if case.operation in hand_port.NOT_PORTED:
+        if case.operation not in hand_port.OPERATIONS:
             continue
         out = hand_port.answer(port, case.operation, golden.inputs(case), case.settings)
         answers = [{n: golden.array(case, o.answer(k)) for n, o in case.outputs.items()} for k in range(case.answers)]

@@ -17,7 +17,6 @@ OPERATIONS = (
     "covariance", "projection", "harmonics", "composite", "render", "calibration", "adam", "schedule", "density",
     "initialisation", "registration",
 )  # fmt: skip
-NOT_PORTED = ("objective", "determinism", "training")
 
 
 def sources(edits=()):
