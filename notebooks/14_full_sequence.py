@@ -141,10 +141,8 @@ print(
 # ```python
 # def weights_at(iteration, config):
 #     """Weights of the image terms at this iteration."""
-#     loss = config.loss
-#     ramp = schedules.laplacian_ramp(iteration, config)
-#     smoothness = loss.smoothness_weight if schedules.smoothness_active(iteration, config) else 0.0
-#     return LossWeights(loss.ssim_weight, loss.depth_weight, smoothness, ramp * loss.lambda_lap)
+#     weights = full_weights(config.loss, schedules.laplacian_ramp(iteration, config) * config.loss.lambda_lap)
+#     return weights if schedules.smoothness_active(iteration, config) else weights._replace(smoothness=0.0)
 # ```
 #
 # <!-- definition: endotsr.definition.train.iterate -->
