@@ -1,0 +1,24 @@
+"""docs/guides/ports.md: its table is that of the stored certificates, and each certificate is one."""
+
+import importlib
+import json
+
+import pytest
+
+from endotsr.errors import InputError
+from endotsr.port.judge.certificate import read_certificate
+
+made = importlib.import_module("pages.ports.certified")
+
+
+def test_the_page_has_the_table_of_the_stored_certificates():
+    found = [read_certificate(file) for file in sorted(made.FOLDER.glob("*.json"))]
+    assert found and made.table(found) in made.PAGE.read_text(encoding="utf-8")
+
+
+def test_a_certificate_with_another_claim_is_refused(tmp_path):
+    content = json.loads(next(iter(sorted(made.FOLDER.glob("*.json")))).read_text(encoding="utf-8"))
+    file = tmp_path / "c.json"
+    file.write_text(json.dumps({**content, "level": content["level"] - 1}), encoding="utf-8")
+    with pytest.raises(InputError, match="claim"):
+        read_certificate(file)
