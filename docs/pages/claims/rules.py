@@ -17,6 +17,11 @@ def few(pairs: int) -> str:
     return f"not decided: {pairs} of {LEAST_PAIRS} seeds"
 
 
+def seeds_of(count: int) -> str:
+    """A number of seeds in words."""
+    return "one seed" if count == 1 else f"{count} seeds"
+
+
 def increment_verdict(published: float, interval: Interval, pairs: int, last: float | None = None) -> str:
     """The verdict on a difference; see the module docstring.
 

@@ -12,7 +12,15 @@ from typing import Any, NamedTuple
 from endotsr.results.report.tables import markdown
 from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS, Contrast
 from pages.claims.estimates import Estimate, Interval, averaged, contrast, runs_of
-from pages.claims.rules import increment_verdict, largest_verdict, level_verdict, no_change_verdict
+from pages.claims.rules import (
+    LEAST_PAIRS,
+    few,
+    increment_verdict,
+    largest_verdict,
+    level_verdict,
+    no_change_verdict,
+    seeds_of,
+)
 from pages.store.intervals import interval
 from pages.store.published import MATCHED_LPIPS, MATCHED_PSNR, PRIOR, PUBLISHED
 
@@ -143,7 +151,7 @@ def _level_row(found: Record, clip: str, key: str, of: str, unit: float) -> list
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
     mean, limits = student(values)
     verdict = level_verdict(published, limits, metric.larger, unit)
-    return [*claim, metric.form.format(mean), f"{len(values)} seeds", between(limits, metric.form), verdict, "-", "-"]
+    return [*claim, metric.form.format(mean), seeds_of(len(values)), between(limits, metric.form), verdict, "-", "-"]
 
 
 def _base_row(found: Record, clip: str) -> list[str]:
@@ -158,7 +166,8 @@ def _base_row(found: Record, clip: str) -> list[str]:
     mean, limits = student(values)
     inside = level - most - 0.005 <= mean <= level - least + 0.005
     verdict = "the mean lies inside" if inside else "the mean lies outside"
-    return [*claim, f"{mean:.2f} dB", f"{len(values)} seeds", between(limits, "{:.2f} dB"), verdict, "-", "-"]
+    verdict = verdict if len(values) >= LEAST_PAIRS else few(len(values))
+    return [*claim, f"{mean:.2f} dB", seeds_of(len(values)), between(limits, "{:.2f} dB"), verdict, "-", "-"]
 
 
 def _increment_row(records: list[Record], of: Contrast, key: str, clip: str) -> list[str]:
@@ -203,6 +212,7 @@ def _median_row(found: Record, key: str) -> list[str]:
     inside = first - ROUNDED[key] <= estimate.median <= last + ROUNDED[key]
     better = estimate.median > last if metric.larger else estimate.median < first
     verdict = "inside the range" if inside else "better than the range" if better else "short of the range"
+    verdict = verdict if len(estimate.values) >= LEAST_PAIRS else few(len(estimate.values))
     return [*claim, metric.signed.format(estimate.median), _cells(estimate, metric)[1], "-", verdict, "-", "-"]
 
 
@@ -215,8 +225,11 @@ def _every_seed_row(found: Record) -> list[str]:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
     shown = ", ".join(f"{METRICS[key].label} {wins} of {seeds}" for key, (wins, seeds) in counts.items())
     seeds = max(seeds for _, seeds in counts.values())
-    verdict = "holds" if all(wins == of for wins, of in counts.values()) else "does not hold"
-    return [*claim, "-", shown, "-", f"{verdict} in {seeds} seeds", "-", "-"]
+    holds = all(wins == of for wins, of in counts.values())
+    verdict = (
+        few(seeds) if holds and seeds < LEAST_PAIRS else f"{'holds' if holds else 'does not hold'} in {seeds} seeds"
+    )
+    return [*claim, "-", shown, "-", verdict, "-", "-"]
 
 
 def _largest_row(records: list[Record], key: str) -> list[str]:
