@@ -61,11 +61,16 @@ def test_the_readme_compares_with_flow_as_recorded():
         assert flow < found["held_out"]["mean"]["lpips"], "LPIPS of flow is better for every gap"
 
 
-def test_on_cutting_interpolation_is_ahead_in_psnr_and_sharp_in_lpips():
+def test_on_cutting_interpolation_is_ahead_in_psnr():
     names = ("flow.cutting", "blend.cutting", "flow_tissue.cutting", "sharp.cutting")
     means = [figures.value(figures.FIGURES[name]) for name in names]
     assert means == sorted(means, reverse=True)
-    assert figures.value(figures.FIGURES["sharp.lpips.cutting"]) < figures.value(figures.FIGURES["flow.lpips.cutting"])
+    frames = [
+        {row["frame"]: row["psnr_tissue"] for row in json.loads(file.read_text())["held_out"]["per_frame"]}
+        for file in sorted(RESULTS.glob("cutting_sharp_seed?.json"))
+    ]
+    veiled = [frame for frame in frames[0] if max(abs(frames[0][frame] - one[frame]) for one in frames) > 5]
+    assert len(frames) == 2 and veiled == [73], "README speaks of a veil over one frame of one of two seeds"
 
 
 def test_the_readme_states_the_minutes_that_were_timed():
