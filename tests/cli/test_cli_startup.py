@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 
 import pytest
 from tiny import assert_refused
@@ -19,10 +18,8 @@ def test_overview_imports_nothing_heavy(words):
         f"import sys; from endotsr.cli.main import main; code = main({words!r}); "
         f"print([m for m in {HEAVY!r} if m in sys.modules], file=sys.stderr); sys.exit(code)"
     )
-    began = time.monotonic()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and done.stderr.strip() == "[]"
-    assert time.monotonic() - began < 5  # 0.03 s on an idle machine; this only catches a heavy import
 
 
 def test_overview_names_every_command(capsys):

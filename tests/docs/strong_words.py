@@ -1,8 +1,8 @@
 """Sentences with a strong word, each of which has a verdict: python tests/docs/strong_words.py
 
 *Because, therefore* and *so* state a cause; *only, never, always, cannot, best, every* and *right to* state something
-without exception. `strong_words.toml` says for each such sentence of README, the pages and the notebooks what makes it
-true. The command prints the sentences without a verdict, as lines for that file.
+without exception. `strong_words.toml` says for each such sentence of README, the pages, the notebooks and the
+docstrings of modules what makes it true. The command prints the sentences without a verdict, as lines for that file.
 
 A sentence is known by the words around the strong word, so that an edit elsewhere in it needs no new verdict. Not
 listed are *so that* (a purpose) and *every* before an ordinal or a number (a period).
@@ -18,7 +18,7 @@ from typing import NamedTuple
 from bare_figures import ROOT, WITHOUT, WRITTEN, blank, prose
 
 PAGES = ("README.md", "docs/*.md", "docs/guides/*.md", "docs/specification/*.md", "docs/results/*.md",
-         "notebooks/*.md", "notebooks/*.py")  # fmt: skip
+         "notebooks/*.md", "notebooks/*.py", "reference/endotsr/**/*.py")  # fmt: skip
 TABLE = Path(__file__).with_suffix(".toml")
 WORDS = r"because|therefore|so|only|never|always|cannot|best|every|right to"
 STRONG = re.compile(
@@ -39,7 +39,7 @@ class Strong(NamedTuple):
 
 
 def files() -> list[Path]:
-    """README, the pages and the notebooks."""
+    """README, the pages, the notebooks and the modules."""
     return sorted(file for pattern in PAGES for file in ROOT.glob(pattern) if file.name not in WRITTEN)
 
 

@@ -128,7 +128,7 @@ def test_the_wait_for_targets_is_counted_once_for_each_gap(sequence):
     began = clock()
     targets.observed(BridgedTime(*first, 0.5))
     whole, found = clock() - began, targets.making
-    assert found.gaps == 1 and 0.3 * whole < found.waited <= whole and found.beside == 0
+    assert found.gaps == 1 and 0 < found.waited <= whole and found.beside == 0
     targets.observed(BridgedTime(*first, 0.5))
     assert targets.making == found
 

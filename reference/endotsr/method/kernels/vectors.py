@@ -1,9 +1,8 @@
 """Small arrays in a kernel's registers, which plain NumPy arrays cannot express.
 
 Memory from `np.empty` may alias other arrays, so the compiler reloads and stores it at every step and guards each loop
-against overlap. A local array aliases nothing: sums over a loop stay in vector registers without a guard. This shortens
-the blend's reverse pass most in float64, where a loop over the eight lanes of a register is too short for guards and
-vectorises only without them. `kernels.groups` is built on local arrays.
+against overlap. A local array aliases nothing: sums over a loop stay in vector registers without a guard. The loop
+over the eight lanes of a float64 register is too short for guards. `kernels.groups` is built on local arrays.
 
 Each function below has two forms: a plain Python function, which defines it and runs when the JIT is off, and the
 instructions that replace it in compiled code. A local array must not leave the function that created it. It may be

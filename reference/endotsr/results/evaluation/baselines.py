@@ -10,10 +10,9 @@ two_neighbours     the training frames before and after, blended linearly in tim
 flow_interpolation dense optical flow (DIS, medium) in both directions between the same two frames, each warped to
                    the target time and blended with the same weights
 
-Excluded pixels: of these four, only the temporal mean uses the masks of the training frames, because a passing
-instrument would otherwise be smeared over the tissue. The other three use all training pixels, including the
-instrument, which a reconstruction may not read. The metric sets the excluded pixels of the *test* frame to zero.
-Zeroing the neighbours by their own masks would lower their PSNR, and so would ignoring the masks in the temporal mean.
+Excluded pixels: of these four, only the temporal mean uses the masks of the training frames; without them it would
+average a passing instrument into the tissue. The other three use all training pixels, including the instrument, which
+a reconstruction may not read. The metric sets the excluded pixels of the *test* frame to zero.
 """
 
 from collections.abc import Callable

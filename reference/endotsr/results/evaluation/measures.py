@@ -13,7 +13,7 @@ Flicker at a pixel is the second difference of its colour over three successive 
 
 If the noise is independent from frame to frame, d has the standard deviation of the noise. A linear change of the light
 cancels. A static pixel is tissue in every frame, with small optical flow between successive frames. The recorded
-frames flicker because of camera noise; a larger value means that the model itself flickers.
+frames flicker at least by the noise of the camera; a value above theirs means that the model itself flickers.
 """
 
 from collections.abc import Callable, Iterable

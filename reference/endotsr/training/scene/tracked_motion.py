@@ -7,8 +7,8 @@ For a point with positions X(t_i) at the training times, canonical position mu a
 with the atoms phi of equation (1) and the Matern weights rho of equation (4). The weight a_i is 1 if the point is
 tracked, and UNFOLLOWED if its position is interpolated from the surrounding points.
 
-The atoms are fixed functions of time. The FDM cannot represent such a motion: its centres and widths are learned, and
-with large weights one optimiser step of a centre moves a Gaussian by a pixel.
+The atoms are fixed functions of time. The FDM does not take this motion: its centres and widths are learned, and with
+large weights one optimiser step of a centre can move a Gaussian by a pixel.
 
 In: Gaussians and their tracks. Out: the Gaussians with new positions and motion coefficients.
 """
