@@ -125,7 +125,8 @@ def prepare_options(folder: Path) -> dict[str, list[str]]:
         "stereo": ["none"], "camera": list(CAMERA[1:]), "distortion": ["-0.2", "0.05", "0", "0"],
         "calibration": [str(folder / "K.txt")], "baseline": ["4"], "trajectory": [str(folder / "poses.txt")],
         "trajectory-direction": ["world_to_camera"], "trajectory-axes": ["opengl"], "trajectory-unit": ["cm"],
-        "masks": [str(folder / "mask")], "excluded-value": ["black"], "depth": [str(folder / "depth")],
+        "masks": [str(folder / "mask")], "excluded-value": ["black"], "pairing": ["order"],
+        "depth": [str(folder / "depth")],
         "depth-unit": ["um"], "depth-scale": ["0.02"], "trust-depth": [], "points": ["sparse"], "frames": ["0:5"],
         "drop": ["2"], "crop": ["8", "8", "32", "32"], "unite-masks": [str(folder / "more")], "rate": ["12"],
         "source-rate": ["50"], "orientation": ["stored"], "scale": ["0.5"], "gaps": ["drop"], "pictures": ["jpg"],
@@ -163,7 +164,8 @@ def test_no_pair_of_options_of_depth_is_silent(tmp_path):
     """On a stereo clip, and on files of another program for a clip from one camera."""
     made(tmp_path)
     values = {
-        "given": [str(tmp_path / "depth")], "kind": ["depth"], "align": ["frame"], "farthest-over-nearest": ["5"],
+        "given": [str(tmp_path / "depth")], "kind": ["depth"], "pairing": ["order"],
+        "align": ["frame"], "farthest-over-nearest": ["5"],
         "trust-depth": [], "flat": [], "unit-scale": ["0.01"], "nearest": ["30"], "farthest": ["100"], "block": ["9"],
         "no-smooth": [], "agreement": ["0.1"], "confidence": ["0.99"], "temporal": [],
     }  # fmt: skip

@@ -36,6 +36,8 @@ class DepthOptions:
     """files of another program, one per frame: npy, pfm, tiff or png"""
     kind: Literal["disparity", "depth", "relative"] = "disparity"
     """content of these files: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
+    pairing: Literal["auto", "number", "source", "order"] = "auto"
+    """how these files belong to frames: by number, by the number in the source of the clip, or in order"""
     align: Literal["auto", "frame", "sequence"] = "auto"
     """with --kind relative: fit scale and shift per frame, or once (auto: per frame if the clip has depth)"""
     farthest_over_nearest: float = 3.0
@@ -69,6 +71,8 @@ def run(words: list[str]) -> int:
         f"depth of {len(coverage)} frames: {sum(coverage) / len(coverage):.1%} of the pixels on average,"
         f" {coverage[lowest]:.1%} in frame {lowest}; median {report.median:.4g} {unit}, steps of {step:g}"
     )
+    if report.note:
+        print(f"  {report.note}")
     if report.file.depth.method.startswith(("relative", "assumed")):
         print(f"  {report.file.depth.method}")
     if "farthest-over-nearest" in given_names(DepthOptions, words) and not report.file.depth.assumed:
@@ -100,9 +104,9 @@ def _made(options: DepthOptions) -> "DepthReport":
         made = flat_depth(describe_prepared(folder))
     elif given is not None and options.kind == "relative":
         farthest, trusted = options.farthest_over_nearest, options.trust_depth
-        made = from_relative(folder, given, options.align, farthest, trusted, options.replace)
+        made = from_relative(folder, given, options.align, farthest, trusted, options.replace, options.pairing)
     elif given is not None and options.kind != "relative":
-        made = from_files(folder, given, options.kind, options.unit_scale)
+        made = from_files(folder, given, options.kind, options.unit_scale, options.pairing)
     else:
         made = from_pairs(folder, options.stereo)
     return write_depth(folder, made, options.replace, _show_count)

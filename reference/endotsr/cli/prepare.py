@@ -54,6 +54,8 @@ class PrepareOptions:
     """masks of another program, one per frame, or one file for all frames"""
     excluded_value: Literal["white", "black", "nonzero"] = "white"
     """excluded value of these masks; white = above half of the largest value, nonzero = the numbers of objects"""
+    pairing: Literal["auto", "number", "source", "order"] = "auto"
+    """how masks and depth belong to frames: by number, by the number in the source of a prepared clip, or in order"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
     """depth of every frame: png, tiff, npy or pfm"""
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
@@ -168,7 +170,7 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
 
     same = (
         "layout", "stereo", "right", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
-        "excluded_value", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation", "model",
+        "excluded_value", "pairing", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation", "model",
     )  # fmt: skip
     return SourceOptions(
         **{name: getattr(options, name) for name in same},

@@ -8,7 +8,7 @@ reads of the statements on a source stands in its own module (`takes`).
 from endotsr.cli.parts.relations import Excludes, Needs, Relation
 
 OF_PAIRS = ("nearest", "farthest", "block", "smooth", "no-smooth", "agreement", "confidence", "temporal")
-OF_FILES = ("kind", "unit-scale", "align", "farthest-over-nearest", "trust-depth")
+OF_FILES = ("kind", "pairing", "unit-scale", "align", "farthest-over-nearest", "trust-depth")
 OF_PAGE = ("keys", "title", "no-held-out", "sequence")
 NOT_OF_PAGE = ("content", "times", "frames", "count", "opacity", "voxel", "without")
 ONE_RUN = "the settings of a run are fixed"
@@ -25,6 +25,7 @@ PREPARE = (
     ),
     Excludes(("trajectory-axes",), ("layout=tum",), "the poses of this layout have the axes of OpenCV"),
     Needs(("excluded-value",), ("masks", "unite-masks"), "it describes the masks of these files"),
+    Needs(("pairing",), ("masks", "unite-masks", "depth"), "it pairs these files with the frames"),
     Needs(("depth-unit", "depth-scale", "trust-depth"), ("depth",), "it describes the depth of these files"),
     Needs(("points",), ("layout=colmap", "layout=points"), "only a reconstruction has points"),
     Needs(("right",), ("layout=video", "layout=pictures"), "the other layouts have their own right pictures, or none"),

@@ -43,6 +43,7 @@ class Masks:
     stated_in: str = ""  # the file that states this value; "": a setting or an option does
     proposed: bool = False  # a program made the masks, and no person has checked them
     origin: str = ""  # where the excluded pixels come from, in words; "": not stated
+    paired: str = ""  # how files of another program belong to the frames, where this deserves a note
 
     def __call__(self, i: int) -> NDArray[np.bool_] | None:
         return self.read(i)
@@ -61,6 +62,7 @@ class Depth:
     assumed: Assumed = ""
     stated: Path | None = None  # files that a user stated
     trusted: bool = False  # the user confirms that they contain lengths
+    paired: str = ""  # as in `Masks`
 
     def __call__(self, i: int) -> NDArray[np.float32] | None:
         return self.read(i)
@@ -74,6 +76,7 @@ class Clip:
     where: Path
     names: list[str]
     pictures: Callable[[list[int]], Iterator[PicturePair]]  # of ascending frame numbers
+    source_names: list[str] | None = None  # of the frames of a prepared clip in its recording
     images: list[Path] = field(default_factory=list)  # one file per frame; empty: frames of a video
     right: list[Path] = field(default_factory=list)  # right pictures of a stereo pair, likewise
     masks: Masks | None = None

@@ -176,7 +176,8 @@ def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Cli
         raise InputError(f"{clip.where}: the intrinsics are unknown; allowed: --camera or --calibration")
     frames = [clip.where / f"{name}.png" for name in clip.names]
     more = [
-        stated_masks(replace(options, masks=folder), frames, intrinsics.width, intrinsics.height) for folder in folders
+        stated_masks(replace(options, masks=folder), frames, intrinsics.width, intrinsics.height, clip.source_names)
+        for folder in folders
     ]
     every = [mask for mask in (clip.masks, *more) if mask is not None]
 
@@ -192,5 +193,5 @@ def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Cli
             proposed=any(one.proposed for one in every),
             origin="; ".join([*(one.origin for one in every if one.origin), f"united with {names}"]),
         ),
-        notes=[*clip.notes, f"masks: united with {names}"],
+        notes=[*clip.notes, f"masks: united with {names}", *(one.paired for one in every if one.paired)],
     )

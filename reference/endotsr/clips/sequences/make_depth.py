@@ -16,8 +16,9 @@ from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
-from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts.common import describe_prepared
+from endotsr.clips.sequences.pairing import Pairing, every_frame
 from endotsr.clips.sequences.relative_depth import Align, MadeDepth, relative_depth
 from endotsr.clips.sequences.sequence_file import (
     DEPTH,
@@ -43,6 +44,7 @@ class DepthReport(NamedTuple):
     file: SequenceFile
     coverage: list[float]  # per frame, fraction of its pixels
     median: float  # of the frame medians
+    note: str = ""  # on the files
 
 
 def stereo_frames(clip: Clip, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
@@ -94,17 +96,18 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
     return MadeDepth(stereo_frames(describe_prepared(folder), settings), method, "")
 
 
-def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDepth:
+def from_files(folder: Path, source: Path, kind: Kind, scale: float, pairing: Pairing = "auto") -> MadeDepth:
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
-    clip, files = describe_prepared(folder), list_pictures(source, DEPTH_ENDINGS)
-    check_pairing(clip.images, files)
+    clip = describe_prepared(folder)
+    files, note = every_frame(clip, list_pictures(source, DEPTH_ENDINGS), pairing)
     intrinsics, baseline = clip.intrinsics, clip.baseline
     assert intrinsics is not None
     frames = (
         _without_mark(depth_of_values(read_plane(file), kind, scale, intrinsics, baseline, file), kind, file)
         for file in files
+        if file is not None
     )
-    return MadeDepth(frames, f"{kind} from {source.name}", "")
+    return MadeDepth(frames, f"{kind} from {source.name}", "", note)
 
 
 def depth_of_values(
@@ -140,14 +143,24 @@ def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray
     return depth
 
 
-def from_relative(folder: Path, source: Path, align: Align, farthest: float, trusted: bool, replace: bool) -> MadeDepth:
+def from_relative(
+    folder: Path,
+    source: Path,
+    align: Align,
+    farthest: float,
+    trusted: bool,
+    replace: bool,
+    pairing: Pairing = "auto",
+) -> MadeDepth:
     """Depth from the relative inverse depth of a network; see `relative_depth`. Raises InputError."""
     clip = describe_prepared(folder)
     if clip.depth and not replace:
         raise InputError(
             f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
-    return relative_depth(clip, source, align, farthest, trusted)
+    files, note = every_frame(clip, list_pictures(source, DEPTH_ENDINGS), pairing)
+    made = relative_depth(clip, source, [file for file in files if file], align, farthest, trusted)
+    return made._replace(note=note)
 
 
 def write_depth(
@@ -179,4 +192,4 @@ def write_depth(
     entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
     found = msgspec.structs.replace(file, depth=entry, unit=unit if made.assumed else file.unit)
     replace_text(folder / FILE_NAME, sequence_text(found))
-    return DepthReport(found, coverage, float(np.median(medians)))
+    return DepthReport(found, coverage, float(np.median(medians)), made.note)

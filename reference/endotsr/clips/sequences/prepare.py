@@ -78,7 +78,7 @@ def prepare(
 
     Raises:  InputError, leaving nothing behind.
     """
-    notes = list(clip.notes)
+    notes = [*clip.notes, *(part.paired for part in (clip.masks, clip.depth) if part is not None and part.paired)]
     frames = without(chosen_frames(settings.frames, clip), settings.drop, clip)
     chosen = thinned(clip, frames, settings.rate, notes)
     chosen, poses = _poses_and_masks(clip, chosen, settings.gaps, notes)
@@ -260,10 +260,19 @@ def _file_of(
         unit=unit,
         frame_rate=rate,
         times=times,
+        source_names=_source_names(clip, chosen),
         masks=MaskEntry(proposed=clip.masks.proposed, origin=clip.masks.origin) if clip.masks is not None else None,
         depth=entry if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )
+
+
+def _source_names(clip: Clip, chosen: list[int]) -> list[str] | None:
+    """The names of the frames in the recording; None if they are those of the written files, or not unique."""
+    names = [(clip.source_names or clip.names)[i] for i in chosen]
+    if len(set(names)) < len(names):  # pictures in folders of their own
+        return None
+    return None if names == [f"{k:06d}" for k in range(len(chosen))] else names
 
 
 def camera_entry(intrinsics: Intrinsics, baseline: float | None) -> CameraEntry:

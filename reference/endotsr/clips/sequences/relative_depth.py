@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.depth import light_correlation, light_finding
 from endotsr.clips.sequences.clip import Assumed, Clip
-from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane
-from endotsr.clips.sequences.files import check_pairing, list_pictures, shortened
+from endotsr.clips.sequences.depth_files import read_plane
+from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -57,6 +57,7 @@ class MadeDepth(NamedTuple):
     frames: Iterator[NDArray[np.float32]]  # (H, W) each, 0 = none
     method: str  # for sequence.toml
     assumed: Assumed
+    note: str = ""  # how the files belong to the frames, where this deserves a line
 
 
 def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
@@ -85,9 +86,12 @@ def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
     return StraightLine(float(scale), float(shift))
 
 
-def relative_depth(clip: Clip, source: Path, align: Align, farthest: float, trusted: bool) -> MadeDepth:
-    """Depth of every frame from the files of r.
+def relative_depth(
+    clip: Clip, source: Path, files: list[Path], align: Align, farthest: float, trusted: bool
+) -> MadeDepth:
+    """Depth of every frame from the files of r in the folder `source`.
 
+    files      one per frame
     align      one line per frame or for the sequence; auto: per frame if the clip has depth, else for the sequence
     farthest   ratio of the farthest to the nearest depth; used only if the clip has no depth
     trusted    skip the comparison with the light
@@ -95,8 +99,6 @@ def relative_depth(clip: Clip, source: Path, align: Align, farthest: float, trus
     Raises:  InputError for values that decrease towards the camera, and, without existing depth, for moving poses or a
              stereo pair, which fix a scale that r lacks.
     """
-    files = list_pictures(source, DEPTH_ENDINGS)
-    check_pairing(clip.images, files)
     intrinsics = clip.intrinsics
     assert intrinsics is not None
 

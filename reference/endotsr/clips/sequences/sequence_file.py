@@ -6,6 +6,7 @@
     unit = "mm"                        # of poses and baseline; um, mm, cm, m or arbitrary
     frame_rate = 25.0                  # frames per second, on average; 0 = unknown
     times = [0.0, 0.04, 0.12, ...]     # seconds of the frames, ascending; absent: evenly spaced
+    source_names = ["000120", ...]     # of the frames in the source, in a video their numbers; absent: the same names
 
     [camera]                           # pixels; the centre of the first pixel is at (0.5, 0.5)
     width = 640 ... height, fx, fy, cx, cy
@@ -47,6 +48,7 @@ from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrin
 from endotsr.clips.sequences.clip import Assumed
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
+from endotsr.untrusted.names import file_name
 from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
 from endotsr.untrusted.toml import read_toml, toml_text
 
@@ -117,6 +119,7 @@ class SequenceFile(Section, frozen=True, kw_only=True):
     unit: Unit = "mm"
     frame_rate: NonNegative = 0.0
     times: list[float] | None = None
+    source_names: list[str] | None = None
     masks: MaskEntry | None = None
     depth: DepthEntry | None = None
     poses: PoseEntry | None = None
@@ -168,6 +171,7 @@ def read_sequence_file(folder: Path) -> SequenceFile:
             )
     found.camera.intrinsics(path)
     _check_times(found, path)
+    _check_source_names(found, path)
     return found
 
 
@@ -181,6 +185,19 @@ def _check_times(found: SequenceFile, path: Path) -> None:
     if not np.isfinite(found.times).all() or (steps <= 0).any():
         wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
         raise InputError(f"{path}: times: frame {wrong}: {found.times[wrong]:g}; allowed: finite, ascending seconds")
+
+
+def _check_source_names(found: SequenceFile, path: Path) -> None:
+    """Raises InputError unless there is one safe name per frame, each once."""
+    names = found.source_names
+    if names is None:
+        return
+    if len(names) != found.frames:
+        raise InputError(f"{path}: source_names: {len(names)} names for {found.frames} frames; allowed: one per frame")
+    for name in names:
+        file_name(name, f"{path}: source_names")
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: source_names: two frames have one name; allowed: each name once")
 
 
 def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> None:

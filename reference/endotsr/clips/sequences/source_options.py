@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from endotsr.clips.sequences.pairing import Pairing
 from endotsr.config import SequenceConfig
 
 
@@ -24,6 +25,7 @@ class SourceOptions:
     trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None  # None: the unit of the layout
     masks: Path | None = None
     excluded_value: Literal["white", "black", "nonzero"] = "white"
+    pairing: Pairing = "auto"  # of the files of `masks` and `depth` with the frames
     depth: Path | None = None
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     depth_scale: float = 1.0

@@ -17,6 +17,7 @@ from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePai
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
 from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
+from endotsr.clips.sequences.pairing import paired
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.trajectory import poses_of_frames, read_trajectory
@@ -152,8 +153,12 @@ def depth_of(files: list[Path | None], scale: float) -> Depth:
     return Depth(depth, scale=scale)
 
 
-def stated_masks(options: SourceOptions, frames: list[Path] | int, width: int, height: int) -> Masks | None:
+def stated_masks(
+    options: SourceOptions, frames: list[Path] | int, width: int, height: int, source_names: list[str] | None = None
+) -> Masks | None:
     """The masks of `--masks`, paired with frame files or with the frame numbers of a video; None if not stated.
+
+    source_names   as in `pairing.paired`
 
     Masks next to the mark of `endotsr masks` are an unchecked proposal.
     """
@@ -161,19 +166,24 @@ def stated_masks(options: SourceOptions, frames: list[Path] | int, width: int, h
         return None
     files = files_of(options.masks, PICTURE_ENDINGS)
     mark = options.masks.parent / PROPOSAL
-    found = masks_of(matching_files(frames, files), options.excluded_value, width, height, mark.is_file())
+    both = paired(frames, files, options.pairing, source_names)
+    found = masks_of(both.files, options.excluded_value, width, height, mark.is_file())
+    found = replace(found, paired=both.note)
     if not found.proposed:
         return found
     return replace(found, origin=text(read_json(mark, LARGEST_MARK).get("origin", ""), f"{mark}: origin"))
 
 
-def stated_depth(options: SourceOptions, frames: list[Path] | int) -> Depth | None:
+def stated_depth(
+    options: SourceOptions, frames: list[Path] | int, source_names: list[str] | None = None
+) -> Depth | None:
     """The depth of `--depth`, as `stated_masks`."""
     if options.depth is None:
         return None
     scale = options.depth_scale * scene_factor(options.depth_unit)
-    depth = depth_of(matching_files(frames, files_of(options.depth, DEPTH_ENDINGS)), scale)
-    return replace(depth, unit=options.depth_unit, stated=options.depth, trusted=options.trust_depth)
+    both = paired(frames, files_of(options.depth, DEPTH_ENDINGS), options.pairing, source_names)
+    depth = depth_of(both.files, scale)
+    return replace(depth, unit=options.depth_unit, stated=options.depth, trusted=options.trust_depth, paired=both.note)
 
 
 def with_stated(clip: Clip, options: SourceOptions) -> Clip:
@@ -184,8 +194,8 @@ def with_stated(clip: Clip, options: SourceOptions) -> Clip:
     if clip.intrinsics is None or (options.masks is None and options.depth is None):
         return clip
     frames = clip.images or [clip.where / f"{name}.png" for name in clip.names]
-    masks = stated_masks(options, frames, clip.intrinsics.width, clip.intrinsics.height)
-    depth = stated_depth(options, frames)
+    masks = stated_masks(options, frames, clip.intrinsics.width, clip.intrinsics.height, clip.source_names)
+    depth = stated_depth(options, frames, clip.source_names)
     if depth is not None and (options.depth_unit == ARBITRARY) != clip.arbitrary:
         raise InputError(f"{clip.where}: --depth-unit {options.depth_unit} with the unit {clip.unit}")
     return replace(clip, masks=masks or clip.masks, depth=depth or clip.depth)
@@ -207,14 +217,18 @@ def stated_camera(options: SourceOptions, width: int, height: int, where: object
 
 
 def stated_poses(
-    options: SourceOptions, count: int, rate: float | None, times: FloatArray | None = None
+    options: SourceOptions,
+    count: int,
+    rate: float | None,
+    times: FloatArray | None = None,
+    numbers: list[int] | None = None,
 ) -> tuple[list[CameraPose | None] | None, list[str]]:
     """The poses of `--trajectory`, and a note; (None, []) without it. See `poses_of_frames`. Raises InputError."""
     if options.trajectory is None:
         return None, []
     unit = options.trajectory_unit or "m"
     trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes or "opencv")
-    poses, how = poses_of_frames(trajectory, count, rate, times)
+    poses, how = poses_of_frames(trajectory, count, rate, times, numbers)
     return poses, [f"{options.trajectory.name}: {how}; positions in {unit}"]
 
 

@@ -138,14 +138,20 @@ def _stated_order(line: str) -> str:
 
 
 def poses_of_frames(
-    trajectory: Trajectory, count: int, rate: float | None, times: FloatArray | None = None
+    trajectory: Trajectory,
+    count: int,
+    rate: float | None,
+    times: FloatArray | None = None,
+    numbers: list[int] | None = None,
 ) -> tuple[list[CameraPose | None], str]:
     """One pose per frame, None without one, and a sentence on the assignment of stamps to frames.
 
-    times   seconds of the frames from the first one; None: evenly spaced at `rate`
+    times     seconds of the frames from the first one; None: evenly spaced at `rate`
+    numbers   in the names of the frames
 
-    Integer stamps below the number of frames are frame numbers. If there are as many poses as frames, they match in
-    order. Other stamps are seconds from the first one, and poses between stamps are interpolated.
+    Integer stamps that are all numbers of frames belong to these, and so do those of a file that has all of them, where
+    the rate is unknown. Integer stamps below the number of frames are frame numbers. If there are as many poses as
+    frames, they match in order. Other stamps are seconds from the first one, and poses between stamps are interpolated.
 
     Raises:  InputError if the stamps are times and the frame rate is unknown.
     """
@@ -154,6 +160,8 @@ def poses_of_frames(
         raise InputError(
             f"{trajectory.path}: {len(stamps)} poses without stamps for {count} frames; allowed: one pose per frame"
         )
+    if (named := _by_numbers(trajectory, numbers, rate)) is not None:
+        return named, "stamps are the numbers in the names of the frames"
     if trajectory.counts_frames and stamps[-1] < count:
         found: list[CameraPose | None] = [None] * count
         for stamp, pose in zip(stamps, trajectory.poses):
@@ -168,6 +176,18 @@ def poses_of_frames(
         )
     wanted = stamps[0] + (np.arange(count) / rate if times is None else times)
     return poses_at(trajectory, wanted, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
+
+
+def _by_numbers(
+    trajectory: Trajectory, numbers: list[int] | None, rate: float | None
+) -> list[CameraPose | None] | None:
+    """The poses whose stamps are the numbers of frames; None unless all stamps are, or, without a rate, all frames."""
+    if numbers is None or not trajectory.counts_frames or not trajectory.stamped or numbers == [*range(len(numbers))]:
+        return None
+    by_stamp = {int(stamp): pose for stamp, pose in zip(trajectory.stamps, trajectory.poses)}
+    if not (set(by_stamp) <= set(numbers) or (rate is None and set(numbers) <= set(by_stamp))):
+        return None
+    return [by_stamp.get(number) for number in numbers]
 
 
 def poses_at(trajectory: Trajectory, times: FloatArray, longest: float) -> list[CameraPose | None]:

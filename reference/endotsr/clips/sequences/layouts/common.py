@@ -44,6 +44,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         layout="common",
         where=path,
         names=[file.stem for file in folder.images],
+        source_names=found.source_names,
         pictures=folder.pictures,
         images=folder.images,
         right=folder.right,

@@ -76,6 +76,12 @@ def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
     return found["l"], found["r"]
 
 
+def _numbers(files: list[Path]) -> list[int] | None:
+    """The single number in the name of every picture; None without."""
+    found = frame_numbers(files)
+    return None if found is None or len(found[0]) != 1 else [number for (number,) in found]
+
+
 def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     """The pictures as a clip. Raises InputError."""
     left, right = find_pictures(path)
@@ -89,7 +95,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
     width, height = halves(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
-    poses, notes = stated_poses(options, len(left), options.rate)
+    poses, notes = stated_poses(options, len(left), options.rate, numbers=_numbers(left))
     return Clip(
         layout="pictures",
         where=path,

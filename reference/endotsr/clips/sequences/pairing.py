@@ -1,0 +1,142 @@
+"""Pairing of the files of another program with the frames of a clip.
+
+Three ways: by the number in the names of the frames, by the number of each frame in the recording from which `prepare`
+took it, or in order. Where two ways are possible and differ, the files are refused until an option selects one.
+
+In: frames and files. Out: one file per frame or None, with a sentence where the way is not the first one.
+"""
+
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.files import check_pairing, frame_numbers, shortened
+from endotsr.errors import InputError
+
+Pairing = Literal["auto", "number", "source", "order"]
+WAYS = {
+    "number": "the number in the name of each frame",
+    "source": "the number of each frame in the recording from which the clip was prepared",
+    "order": "the first file belongs to the first frame",
+}
+
+
+class Paired(NamedTuple):
+    """Files of frames."""
+
+    files: list[Path | None]  # one per frame; None: the frame has none
+    note: str = ""  # what deserves a line: the way, and files of no frame
+
+
+def paired(
+    frames: list[Path] | int, files: list[Path], pairing: Pairing = "auto", source_names: list[str] | None = None
+) -> Paired:
+    """The file of each frame. A single file, such as a field of view, belongs to all frames.
+
+    frames         files, or the count of a video, whose frames have the numbers 0 .. count - 1
+    pairing        the way; auto: the one that gives every frame a file, or that uses every file
+    source_names   of the frames in the recording from which they were prepared; None: the frames are the recording
+
+    Edges:   without numbers, files are paired with frame files by name.
+    Raises:  InputError if nothing matches, if two ways match and differ, or if frames and files are left over.
+    """
+    count = frames if isinstance(frames, int) else len(frames)
+    if len(files) == 1:
+        return Paired([files[0]] * count)
+    if pairing == "order":
+        return _in_order(count, files)
+    found = {"number": _by_number(frames, files)}
+    if source_names is not None:
+        found["source"] = _by_number([Path(f"{name}.png") for name in source_names], files)
+    elif pairing == "source":
+        where = files[0].parent
+        raise InputError(
+            f"{where}: --pairing source, but the frames are not those of a prepared clip; allowed: number or order"
+        )
+    way = _chosen(found, frames, files) if pairing == "auto" else pairing
+    chosen = found[way]
+    if chosen is None:
+        _refuse_names(frames, files)
+    assert chosen is not None
+    notes = [f"{files[0].parent.name}: paired by {WAYS[way]}"] if way == "source" else []
+    if unused := [file.name for file in files if file not in set(chosen)]:
+        notes.append(f"{files[0].parent.name}: belonging to no frame, not used: {shortened(unused)}")
+    return Paired(chosen, "; ".join(notes))
+
+
+def every_frame(clip: Clip, files: list[Path], pairing: Pairing = "auto") -> Paired:
+    """`paired` for the frames of a clip. Raises InputError also for a frame without a file."""
+    found = paired(clip.images, files, pairing, clip.source_names)
+    lacking = [name for name, file in zip(clip.names, found.files) if file is None]
+    if lacking:
+        raise InputError(
+            f"{files[0].parent}: has no file for frame {shortened(lacking)}; {len(files)} files for {clip.count}"
+            " frames; allowed: one file per frame"
+        )
+    return found
+
+
+def _in_order(count: int, files: list[Path]) -> Paired:
+    where = files[0].parent
+    if len(files) != count:
+        raise InputError(f"{where}: --pairing order: {len(files)} files for {count} frames; allowed: one per frame")
+    return Paired(list(files), f"{where.name}: --pairing order pairs {files[0].name} with the first frame")
+
+
+def _by_number(frames: list[Path] | int, files: list[Path]) -> list[Path | None] | None:
+    """The file with the number of each frame; None if the names have no comparable numbers, or no number matches."""
+    numbers = frame_numbers(files)
+    wanted = [(i,) for i in range(frames)] if isinstance(frames, int) else frame_numbers(frames)
+    if wanted is None and numbers is None and not isinstance(frames, int):
+        check_pairing(frames, files)
+        return list(files)
+    if wanted is None or numbers is None or len(wanted[0]) != len(numbers[0]):
+        return None
+    by_number = dict(zip(numbers, files))
+    found = [by_number.get(number) for number in wanted]
+    return found if any(found) else None
+
+
+def _chosen(
+    ways: dict[str, list[Path | None] | None], frames: list[Path] | int, files: list[Path]
+) -> Literal["number", "source"]:
+    """The way of `auto`. Raises InputError where none or several are possible."""
+    possible = {way: found for way, found in ways.items() if found is not None}
+    if not possible:
+        _refuse_names(frames, files)
+    fits = {
+        "every frame has a file": [way for way, found in possible.items() if all(found)],
+        "every file has a frame": [way for way, found in possible.items() if set(files) <= set(found)],
+    }
+    for meaning, fitting in fits.items():
+        if len(fitting) == 2 and possible["number"] != possible["source"]:
+            said = " or ".join(f"--pairing {way} ({WAYS[way]})" for way in fitting)
+            raise InputError(f"{files[0].parent}: {meaning} in two ways that differ; allowed: {said}")
+        if fitting:
+            return "number" if "number" in fitting else "source"
+    count = frames if isinstance(frames, int) else len(frames)
+    lines = [
+        f"by {WAYS[way]}, {found.count(None)} of {count} frames have no file and {len(set(files) - set(found))} of"
+        f" {len(files)} files no frame"
+        for way, found in possible.items()
+    ]
+    others = [*possible, *(["order"] if len(files) == count else [])]
+    raise InputError(
+        f"{files[0].parent}: {'; '.join(lines)} ({files[0].name} to {files[-1].name}); allowed: "
+        + " or ".join(f"--pairing {way}" + (f" ({WAYS[way]})" if way == "order" else "") for way in others)
+    )
+
+
+def _refuse_names(frames: list[Path] | int, files: list[Path]) -> None:
+    """Raises InputError for names that cannot be paired by number."""
+    where, numbers = files[0].parent, frame_numbers(files)
+    count = frames if isinstance(frames, int) else len(frames)
+    order = f"; allowed: --pairing order ({WAYS['order']})" if len(files) == count else ""
+    if isinstance(frames, int):
+        if numbers is None or len(numbers[0]) != 1:
+            raise InputError(f"{where}: names without one frame number, such as {files[0].name}{order}")
+        raise InputError(f"{where}: no file has a number from 0 to {frames - 1}, such as {files[0].name}{order}")
+    wanted = frame_numbers(frames)
+    if wanted is None or numbers is None or len(wanted[0]) != len(numbers[0]):
+        check_pairing(frames, files)
+    raise InputError(f"{where}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}{order}")
