@@ -21,8 +21,8 @@
 # tissue moves there. A single picture cannot distinguish these causes. The paper therefore uses separate components:
 #
 # - **A**, appearance: a bounded change of colour over time ({doc}`02_colour_residual`).
-# - **S**, spectral motion: a translation over time with a smoothness prior ({doc}`04_motion_and_prior`).
-# - **L**, Laplacian detail: a loss on fine structure that ignores instruments ({doc}`09_laplacian_pyramid`).
+# - **S**, spectral motion: a translation over time with a smoothness prior ({doc}`05_motion_and_prior`).
+# - **L**, Laplacian detail: a loss on fine structure that ignores instruments ({doc}`10_laplacian_pyramid`).
 #
 # This chapter trains two clips with one cause each. The first has changing light and no motion; the second has motion
 # and constant light. Each is trained without A, S and L, with each alone, and with all three. The ground truth is
@@ -49,17 +49,17 @@ from endotsr.results.evaluation.trajectories import trajectory_error
 
 # %% tags=["hide-input"]
 BOXES = {  # text, chapters, colour, column, row
-    "rest": ("Gaussians\nat rest", "13", "0.92", 0, 0),
-    "deformation": ("deformation", "3", "0.92", 1, 0),
-    "S": ("S: translation", "1, 4", "#cfe8cf", 2, 0),
+    "rest": ("Gaussians\nat rest", "3", "0.92", 0, 0),
+    "deformation": ("deformation", "4", "0.92", 1, 0),
+    "S": ("S: translation", "1, 5", "#cfe8cf", 2, 0),
     "A": ("A: colour", "1, 2", "#cfe0f5", 3, 0),
-    "renderer": ("projection,\ncompositing", "5 to 8", "0.92", 4, 0),
+    "renderer": ("projection,\ncompositing", "6 to 9", "0.92", 4, 0),
     "render": ("render at $t$", "", "1.0", 5, 0),
     "frame": ("frame, depth\nand mask", "", "1.0", 5, 2.1),
-    "losses": ("photometric, depth,\nsmoothness losses", "10", "0.92", 4, 1.2),
-    "L": ("L: Laplacian loss", "9, 11", "#f8dcc4", 4, 2.1),
-    "prior": ("Matérn penalty", "4", "#cfe8cf", 2, 0.75),
-    "Adam": ("Adam,\ndensity control", "12", "0.92", 0, 1.35),
+    "losses": ("photometric, depth,\nsmoothness losses", "11", "0.92", 4, 1.2),
+    "L": ("L: Laplacian loss", "10, 12", "#f8dcc4", 4, 2.1),
+    "prior": ("Matérn penalty", "5", "#cfe8cf", 2, 0.75),
+    "Adam": ("Adam,\ndensity control", "13", "0.92", 0, 1.35),
 }
 FORWARD = (
     "rest deformation, deformation S, S A, A renderer, renderer render, render losses, render L"
@@ -361,7 +361,7 @@ assert held[1] > 0 > held[4] and held[6] > held[4], "not monotonic in the rate"
 #
 # 1. In the clip with light alone the true motion is zero. Which two numbers of the table show that A explains the light
 #    without false motion? Which number would show that a model paints?
-# 2. Come back after chapter 10. Write the objective {eq}`eq-6` of one view with its gradients, and let the golden cases
+# 2. Come back after chapter 11. Write the objective {eq}`eq-6` of one view with its gradients, and let the golden cases
 #    judge it: `--only objective` ({doc}`index`). The case `components_off` has neither A, S nor L.
 # 3. The cell below answers this one. Render the model of the motion clip that was trained with A, but without A in the
 #    picture (`run.render(..., without=("appearance",))`). Is the result on held-out frames better than the render with

@@ -100,12 +100,12 @@ print(
 #
 # | Term | Chapter | Weight in `paper` |
 # |---|---|---|
-# | $\mathcal L_1$, masked L1 | {doc}`10_base_losses` | $1-w=0.9$ |
-# | $\mathcal S$, masked SSIM | {doc}`10_base_losses` | $w=0.1$ |
-# | $\mathcal L_D$, depth | {doc}`10_base_losses` | $w_D=1$ |
-# | $\mathcal L_{\mathrm{smooth}}$, smoothness | {doc}`10_base_losses` | $w_S=10^{-4}$, from $i_s=1001$ |
-# | $\mathcal L_{\mathrm{msp}}$, Matérn penalty | {doc}`04_motion_and_prior` | $\lambda_{\mathrm{msp}}=1$, after $K_s=3000$ |
-# | $\mathcal L_{\mathrm{lap}}$, Laplacian loss | {doc}`09_laplacian_pyramid` | $\lambda_{\mathrm{lap}}=0.83$ at full weight |
+# | $\mathcal L_1$, masked L1 | {doc}`11_base_losses` | $1-w=0.9$ |
+# | $\mathcal S$, masked SSIM | {doc}`11_base_losses` | $w=0.1$ |
+# | $\mathcal L_D$, depth | {doc}`11_base_losses` | $w_D=1$ |
+# | $\mathcal L_{\mathrm{smooth}}$, smoothness | {doc}`11_base_losses` | $w_S=10^{-4}$, from $i_s=1001$ |
+# | $\mathcal L_{\mathrm{msp}}$, Matérn penalty | {doc}`05_motion_and_prior` | $\lambda_{\mathrm{msp}}=1$, after $K_s=3000$ |
+# | $\mathcal L_{\mathrm{lap}}$, Laplacian loss | {doc}`10_laplacian_pyramid` | $\lambda_{\mathrm{lap}}=0.83$ at full weight |
 #
 # The Laplacian weight is a ramp from iteration $a$ to $b$, 1000 and 2500 of the $T=6000$ iterations of `paper`:
 #
@@ -115,10 +115,10 @@ print(
 #
 # ## One iteration
 #
-# Before the first iteration the Gaussians are placed ({doc}`13_simulated_scene`), and all moments of Adam and the
+# Before the first iteration the Gaussians are placed ({doc}`03_simulated_scene`), and all moments of Adam and the
 # statistics of density control are 0. Iteration $i$ has these steps, in this order:
 #
-# 1. **Rates and degree.** Compute the learning rates of iteration $i$, (12.5). The active degree of the harmonics is
+# 1. **Rates and degree.** Compute the learning rates of iteration $i$, (13.5). The active degree of the harmonics is
 #    $\lfloor i/500\rfloor$, and 3 at most.
 # 2. **Residuals.** At $i=K_s+1$, add the arrays $A$ and $C$, filled with 0, with moments 0 and step count 0.
 # 3. **Draw.** Draw one training frame, each with equal probability and independently of the draws before. Held-out
@@ -129,10 +129,10 @@ print(
 # 5. **Losses.** Compare image and depth with the frame and form the objective above.
 # 6. **Reverse.** Run the reverse pass of each stage in the opposite order. The result is the gradient with respect to every
 #    stored array, and the screen gradients $g_u,g_v$ on the way.
-# 7. **Statistic.** While $i<4000$, add the norm of the screen gradient of every visible Gaussian to its statistic, (12.6).
-# 8. **Adam.** Take one step of every array that has a gradient, (12.1) and (12.2), with the rates of step 1.
+# 7. **Statistic.** While $i<4000$, add the norm of the screen gradient of every visible Gaussian to its statistic, (13.6).
+# 8. **Adam.** Take one step of every array that has a gradient, (13.1) and (13.2), with the rates of step 1.
 # 9. **Density control.** If $i$ is a multiple of 100 and $500<i<4000$, prune, clone and split with the parameters after
-#    the step, and set all statistics to 0 ({doc}`12_optimiser_and_density`).
+#    the step, and set all statistics to 0 ({doc}`13_optimiser_and_density`).
 #
 # The numbers are those of `paper`. All draws, of frames and of the children of splits, come from one generator with
 # the seed of the run. The definition is as long as the list:

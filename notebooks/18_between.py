@@ -386,7 +386,7 @@ for name, run in runs.items():
 # ## The reverse pass
 #
 # There is none. A target is made from training frames and flow, which do not depend on any parameter of the model, so
-# it is held fixed like a frame. The losses of {doc}`10_base_losses` differentiate the render at the intermediate time.
+# it is held fixed like a frame. The losses of {doc}`11_base_losses` differentiate the render at the intermediate time.
 # Time enters the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are valid at any time. The
 # pair to check is the loss that uses the target.
 

@@ -367,7 +367,7 @@ assert expected[0] > 0.99 and expected[-1] < 0.2
 # ## Why not the deformation
 #
 # The deformation {eq}`eq-b1` could also represent the motion, but it starts at 0. Its centres and widths are learned,
-# and the effect of one step of a centre is proportional to the weight of its basis, by (3.5), so it has no bound. The
+# and the effect of one step of a centre is proportional to the weight of its basis, by (4.5), so it has no bound. The
 # atoms are fixed functions of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes by at most
 # $\eta\sum_k|\phi_k(t)|\le\sqrt2\,F\eta=11.3\,\eta$, because $|\sin|+|\cos|\le\sqrt2$ for each of the $F$ pairs.
 

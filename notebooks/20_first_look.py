@@ -48,7 +48,7 @@ rng = np.random.default_rng(20)
 # ## Growth to a budget, step by step
 #
 # The published rule clones or splits every Gaussian whose mean screen gradient exceeds a threshold ({eq}`eq-b11`,
-# derived in {doc}`12_optimiser_and_density`). The number of new Gaussians therefore depends on everything that scales a
+# derived in {doc}`13_optimiser_and_density`). The number of new Gaussians therefore depends on everything that scales a
 # gradient: the weights of the losses, the size of the frames, the exposure. With a budget you choose how many; the
 # gradients choose which.
 #

@@ -139,7 +139,7 @@ for u, v in ((3.3, 2.7), (4.0, 3.0), (5.9, 3.5)):
 # **(22.3) The point.** $u=f_xX/Z+c_x$ gives $\partial u/\partial(X,Z)=(f_x/Z,\,-f_xX/Z^2)$, and $v$ likewise. So
 # $\mathbf g=\partial r/\partial(X,Y,Z)=\bigl(f_xI_u/Z,\;f_yI_v/Z,\;-(f_xXI_u+f_yYI_v)/Z^2\bigr)$.
 #
-# **(22.4) Pose and points.** $(X,Y,Z)^\top=W\mathbf x+\mathbf d$ is (6.10) and (6.11) without a covariance:
+# **(22.4) Pose and points.** $(X,Y,Z)^\top=W\mathbf x+\mathbf d$ is (7.10) and (7.11) without a covariance:
 # $g_W=\sum_m g_{r_m}\mathbf g_m\mathbf x_m^\top$, $g_{\mathbf d}=\sum_m g_{r_m}\mathbf g_m$,
 # $g_{\mathbf x_m}=g_{r_m}W^\top\mathbf g_m$, and $g_{q_m}=-g_{r_m}$.
 #

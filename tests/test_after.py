@@ -12,7 +12,7 @@ def test_a_kernel_reaches_its_room_its_gradients_and_its_twin():
 
 def test_a_record_reaches_the_pages_that_read_it():
     assert after.makers(["docs/results/levers.json"]) == ["python docs/make.py full_size.levers"]
-    assert "python docs/make.py book.chapters" in after.makers(["notebooks/03_deformation.py"])
+    assert "python docs/make.py book.chapters" in after.makers(["notebooks/04_deformation.py"])
     assert after.makers(["README.md"]) == []
     assert after.makers(["golden/makers/depth.toml"]) == ["python golden/make.py write depth"]
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
-TRANSCRIBED = ("13_simulated_scene", "14_full_sequence", "15_hard_cases", "16_tradeoff", "17_effects")
+TRANSCRIBED = ("03_simulated_scene", "14_full_sequence", "15_hard_cases", "16_tradeoff", "17_effects")
 """Notebooks of what no equation of the definition says; all others show the definition."""
 WITHOUT_DERIVATIVE = {"00_why", "16_tradeoff", "17_effects"}  # measure what the others derive
 COLUMNS = 96  # of code on a page of the book
@@ -123,7 +123,7 @@ def test_the_definition_in_a_chapter_is_that_of_the_package(file):
 
 
 def test_a_changed_definition_in_a_chapter_is_noticed():
-    text = next(file for file in NOTEBOOKS if file.stem == "03_deformation").read_text(encoding="utf-8")
+    text = next(file for file in NOTEBOOKS if file.stem == "04_deformation").read_text(encoding="utf-8")
     changed = text.replace("#     delta = t - centre\n", "#     delta = t + centre\n")
     assert changed != text == definitions.written(changed)
 

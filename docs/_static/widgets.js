@@ -42,7 +42,7 @@
   const css = ([r, g, b]) => `rgb(${[r, g, b].map((v) => Math.round(255 * Math.min(1, Math.max(0, v)))).join(",")})`;
   const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
 
-  // ---- chapter 8: drag the opacities; (8.1), (8.3) ----
+  // ---- chapter 9: drag the opacities; (9.1), (9.3) ----
   const compositing = (box) => {
     const colours = [[0.85, 0.3, 0.25], [0.3, 0.65, 0.3], [0.25, 0.4, 0.85]], background = [0.1, 0.1, 0.1];
     const target = [0.5, 0.5, 0.5], alpha = [0.3, 0.6, 0.5], width = 560, height = 250, bar = 110, floor = 180;
@@ -98,7 +98,7 @@
     draw();
   };
 
-  // ---- chapter 4: correlation length and penalty against a trajectory; equation (4) ----
+  // ---- chapter 5: correlation length and penalty against a trajectory; equation (4) ----
   const solve = (A, b) => {
     const n = b.length, M = A.map((row, k) => [...row, b[k]]);
     for (let k = 0; k < n; k++) {
@@ -154,7 +154,7 @@
     draw();
   };
 
-  // ---- chapter 9: paint an instrument and watch the valid values of three bands; equation (5) ----
+  // ---- chapter 10: paint an instrument and watch the valid values of three bands; equation (5) ----
   const reflect = (k, n) => {
     if (n === 1) return 0;
     const r = ((k % (2 * (n - 1))) + 2 * (n - 1)) % (2 * (n - 1));

@@ -36,7 +36,7 @@ def component(monkeypatch):
 
 
 def test_the_guide_has_a_block_for_each_step():
-    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, JUDGED, "notebooks/10_base_losses.py"]
+    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, JUDGED, "notebooks/11_base_losses.py"]
     root = GUIDE.parents[2]
     assert all((root / path).is_file() for path, _ in BLOCKS[2:]), "the guide names files that exist"
 

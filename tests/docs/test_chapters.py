@@ -33,10 +33,10 @@ def test_an_element_that_is_taken_out_is_missing(name, element):
 
 
 def test_a_chapter_that_begins_with_an_equation_has_no_motive():
-    head, _, tail = TEXTS["05_covariance"].partition("\n# # ")
+    head, _, tail = TEXTS["06_covariance"].partition("\n# # ")
     title, _, rest = tail.partition("\n#\n# ")
     chapter = chapters.chapter_of(f"{head}\n# # {title}\n#\n# ## The equation\n# {rest}")
-    assert chapters.missing("05_covariance", chapter) == ["motive"]
+    assert chapters.missing("06_covariance", chapter) == ["motive"]
 
 
 def test_every_chapter_was_timed_and_the_book_takes_ten_minutes_at_most():

@@ -27,7 +27,7 @@ def gradients_of_two_layers(alpha: float, colour: float, background: float) -> t
 
 
 def test_two_equal_layers_have_equal_gradients():
-    """Chapter 8: half the difference of colour and background, for both."""
+    """Chapter 9: half the difference of colour and background, for both."""
     for colour, background in ((0.8, 0.1), (0.3, 0.3), (0.2, 0.9)):
         front, back = gradients_of_two_layers(0.5, colour, background)
         np.testing.assert_allclose([front, back], (colour - background) / 2, atol=1e-9)
@@ -47,13 +47,13 @@ def test_only_the_sine_of_sixteen_cycles_can_be_dead():
 
 
 def test_the_reach_of_a_quartic_basis():
-    """Chapter 3."""
+    """Chapter 4."""
     np.testing.assert_allclose(bell(0.0, 0.01, 0.0229, "quartic")[2], 1e-3, rtol=0.05)
     assert 0.0229 < 2 / 63, "three frames at most"
 
 
 def test_the_weights_of_twice_the_correlation_length():
-    """Chapter 4."""
+    """Chapter 5."""
     omega = frequencies(8, 1.0, 16.0)
     ends = [matern_weights(omega, length)[[0, -1]] for length in (0.2, 0.4)]
     np.testing.assert_allclose(ends, [[3.0e-5, 7.22], [2.5e-6, 7.25]], rtol=0.02)

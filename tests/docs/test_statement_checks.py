@@ -134,7 +134,7 @@ def test_the_masks_of_the_published_metrics_are_the_nearer_ones():
 
 
 def test_the_base_calibrates_closer_to_the_published_weight_than_a_blurred_frame():
-    """Chapter 11, whose blurred frames give 1.3 and more at the weight of SSIM of `paper`; its cell asserts that."""
+    """Chapter 12, whose blurred frames give 1.3 and more at the weight of SSIM of `paper`; its cell asserts that."""
     cells = read_json(base_checkpoint.RECORD, "python docs/make.py claims.base_checkpoint")["cells"]
     found = [cell["lambda_lap"] for cell in cells if cell["ssim_weight"] == PAPER.loss.ssim_weight]
     assert len(found) == 4

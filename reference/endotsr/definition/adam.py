@@ -12,10 +12,10 @@ def adam_state(parameters):
 
 def adam_step(parameter, gradient, first, second, step, learning_rate, beta1, beta2, epsilon):
     """Equation (B10): parameter, m and v after step k = 1, 2, ...; a rate may have the shape of the parameter."""
-    m = beta1 * first + (1 - beta1) * gradient  # (12.1)
+    m = beta1 * first + (1 - beta1) * gradient  # (13.1)
     v = beta2 * second + (1 - beta2) * gradient**2
     m = np.where(np.abs(m) < SMALLEST, 0, m)
-    change = m / (1 - beta1**step) / (np.sqrt(v / (1 - beta2**step)) + epsilon)  # (12.2)
+    change = m / (1 - beta1**step) / (np.sqrt(v / (1 - beta2**step)) + epsilon)  # (13.2)
     return parameter - learning_rate * change, m, v
 
 

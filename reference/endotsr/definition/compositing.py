@@ -111,13 +111,13 @@ def composite_reverse(d_colour, d_depth, d_opacity, saved):
     for i, dx, dy, value, alpha, front, taken in reversed(layers):
         own = np.einsum("c,chw->hw", colour[:, i], d_colour) + projected.depth[i] * d_depth + d_opacity
         passes = taken & (value <= settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
-        power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (8.3), (8.6)
+        power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (9.3), (9.6)
         (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
-        px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (8.7)
+        px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (9.7)
         out.d_mean2d[:, i] = (power * px).sum(), (power * py).sum()
         out.d_covariance2d[:, i] = np.array([power * px**2 / 2, power * px * py, power * py**2 / 2]).sum((1, 2))
         out.d_opacity_logit[i] = power.sum() * opacity_of(-logit[i])
         weight = np.where(taken, alpha * front, 0)
-        out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()  # (8.5)
-        rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)  # (8.1)
+        out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()  # (9.5)
+        rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)  # (9.1)
     return out._replace(d_background=(d_colour * t).sum((1, 2)))

@@ -27,15 +27,15 @@ def rotation_of(q):
     w, v = q[0], q[1:]
     outer = np.einsum("in,jn->ijn", v, v)
     cross = np.einsum("ijk,kn->ijn", CROSS, v)
-    return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (5.4)
+    return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (6.4)
 
 
 def rotation_reverse(q, g):
     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N)."""
     w, v = q[0], q[1:]
     trace = np.einsum("iin->n", g)
-    spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (5.5)
-    along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (5.6)
+    spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (6.5)
+    along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (6.6)
     g_w = 2 * w * trace + 2 * (spin * v).sum(axis=0)
     g_v = -2 * v * trace + 2 * along + 2 * w * spin
     return np.concatenate([[g_w], g_v])
@@ -52,8 +52,8 @@ def covariance_reverse(d_shape, saved):
     """Reverse of (B2): the component along q is removed; a clipped log-scale has gradient 0."""
     q, inverse_norm = unit(saved.quaternion)
     g = rotation_reverse(q, d_shape.rotation)
-    d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (5.8)
-    free = np.abs(saved.log_scale) <= 40  # (5.3)
+    d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (6.8)
+    free = np.abs(saved.log_scale) <= 40  # (6.3)
     scale = np.exp(np.clip(saved.log_scale, -40, 40))
     return CovarianceGrads(d_quaternion, np.where(free, d_shape.scale * scale, 0))
 

@@ -31,13 +31,13 @@ def deformation_reverse(d_offsets, saved):
     """Reverse of (B1): from d_offsets (10, N). The kernel computes one exponential for value and derivatives."""
     w, centre, width, t, basis = saved
     delta, sigma, e = bell(centre, width, t, basis)
-    d_e = w * d_offsets[:, None]  # (3.1)
-    d_exponent = np.where(e == 0, 0, -d_e * e)  # (3.2)
+    d_e = w * d_offsets[:, None]  # (4.1)
+    d_exponent = np.where(e == 0, 0, -d_e * e)  # (4.2)
     if basis == "quartic":
-        by_delta = 4 * delta**3 / sigma**2  # (3.3)
-        by_width = -4 * delta**4 * width / sigma**3  # (3.4)
+        by_delta = 4 * delta**3 / sigma**2  # (4.3)
+        by_width = -4 * delta**4 * width / sigma**3  # (4.4)
     else:
-        by_delta = delta / sigma  # (3.3)
-        by_width = -(delta**2) * width / sigma**2  # (3.4)
-    d_centre = -d_exponent * by_delta  # (3.5)
-    return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())  # (3.6)
+        by_delta = delta / sigma  # (4.3)
+        by_width = -(delta**2) * width / sigma**2  # (4.4)
+    d_centre = -d_exponent * by_delta  # (4.5)
+    return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())  # (4.6)

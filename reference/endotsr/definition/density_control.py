@@ -20,7 +20,7 @@ def empty_statistics(count):
 
 def gather_statistics(statistics, d_mean, visible, width, height):
     """Equation (B11): add one view to the statistics; d_mean (2, N) per px, visible (N,)."""
-    norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)  # (12.6)
+    norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)  # (13.6)
     return DensityStatistics(statistics.gradient_sum + np.where(visible, norm, 0), statistics.visits + visible)
 
 

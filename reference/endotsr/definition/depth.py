@@ -32,5 +32,5 @@ def normalised_depth_reverse(d_loss, saved):
     if largest == 0:
         return np.zeros_like(depth)
     holders = depth == largest
-    d_largest = -(sign * np.where(sign == 0, 0, depth)).sum() / largest**2  # (10.9)
-    return d_loss / count * (sign / largest + holders * d_largest / holders.sum())  # (10.8)
+    d_largest = -(sign * np.where(sign == 0, 0, depth)).sum() / largest**2  # (11.9)
+    return d_loss / count * (sign / largest + holders * d_largest / holders.sum())  # (11.8)

@@ -17,5 +17,5 @@ def exposure_forward(colour, log_gain, bias):
 def exposure_reverse(d_exposed, saved):
     """Reverse of (B13)."""
     colour, gain = saved.colour, np.exp(saved.log_gain)
-    d_log_gain = gain * (d_exposed * colour).sum(axis=(1, 2))  # (10.12)
+    d_log_gain = gain * (d_exposed * colour).sum(axis=(1, 2))  # (11.12)
     return ExposureGrads(gain[:, None, None] * d_exposed, d_log_gain, d_exposed.sum(axis=(1, 2)))

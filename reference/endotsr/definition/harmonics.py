@@ -47,7 +47,7 @@ def basis_slopes(direction, terms):
         for c, *powers in polynomial:
             for axis in np.flatnonzero(powers):
                 x, y, z = (d ** (p - (axis == i)) for i, (d, p) in enumerate(zip(direction, powers)))
-                out[row, axis] += factor * c * powers[axis] * x * y * z  # (7.4)
+                out[row, axis] += factor * c * powers[axis] * x * y * z  # (8.4)
     return out
 
 
@@ -72,10 +72,10 @@ def harmonics_reverse(d_colour, saved):
     """Reverse of (B4): through the coefficients and through the viewing direction."""
     harmonics, residual, position, centre, degree, clamped = saved
     terms = (degree + 1) ** 2
-    g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (7.1)
+    g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (8.1)
     n, inverse = directions(position, centre)
     d_harmonics = np.zeros_like(harmonics)
-    d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (7.2)
-    d_n = np.einsum("cn,kcn,kan->an", g, harmonics[:terms], basis_slopes(n, terms))  # (7.3)
-    d_v = (d_n - (n * d_n).sum(axis=0) * n) * inverse  # (7.5)
-    return HarmonicsGrads(d_harmonics, None if residual is None else Y00 * g, d_v, -d_v.sum(axis=1))  # (7.6)
+    d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (8.2)
+    d_n = np.einsum("cn,kcn,kan->an", g, harmonics[:terms], basis_slopes(n, terms))  # (8.3)
+    d_v = (d_n - (n * d_n).sum(axis=0) * n) * inverse  # (8.5)
+    return HarmonicsGrads(d_harmonics, None if residual is None else Y00 * g, d_v, -d_v.sum(axis=1))  # (8.6)

@@ -64,15 +64,15 @@ def laplacian_loss_forward(rendered, observed, masks, upsampling="co_sited"):
     for p, q, valid in zip(one, other, masks.bands):
         weight = valid / max(len(p) * valid.sum(), 1) / len(masks.bands)
         loss += (weight * np.abs(p - q)).sum()
-        slopes.append(weight * np.sign(p - q))  # (9.1)
+        slopes.append(weight * np.sign(p - q))  # (10.1)
     return loss, LaplacianSaved(tuple(slopes), masks)
 
 
 def laplacian_loss_reverse(d_loss, saved):
     """Reverse of (5): d_rendered (3, H, W); g_{G_{j-1}} = g_{P_j} + D^T (g_{G_j} - U^T g_{P_j}), coarse to fine."""
     d_coarse = 0.0
-    for slope in reversed(saved.slopes):  # (9.5)
+    for slope in reversed(saved.slopes):  # (10.5)
         d_rows, u_rows, d_columns, u_columns = matrices(slope.shape[1:], saved.masks.upsampling)
-        d_coarse = d_coarse - u_rows.T @ slope @ u_columns  # (9.2), (9.3)
-        d_coarse = slope + d_rows.T @ d_coarse @ d_columns  # (9.3), (9.4)
-    return d_loss * np.where(saved.masks.image, d_coarse, 0)  # (9.6)
+        d_coarse = d_coarse - u_rows.T @ slope @ u_columns  # (10.2), (10.3)
+        d_coarse = slope + d_rows.T @ d_coarse @ d_columns  # (10.3), (10.4)
+    return d_loss * np.where(saved.masks.image, d_coarse, 0)  # (10.6)

@@ -44,7 +44,7 @@ def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
     _, g_t = covariance_reverse_parts(np.where(visible, d_covariance2d, 0), saved, point)
     g_j = np.einsum("ikn,jk->ijn", g_t, w)
     focal = np.array([[camera.fx], [camera.fy]])
-    g_slope = -focal / point[2] * np.array([g_j[0, 2], g_j[1, 2]])  # (6.6)
+    g_slope = -focal / point[2] * np.array([g_j[0, 2], g_j[1, 2]])  # (7.6)
     again = -(np.where(free, 0, g_slope * slope) / point[2]).sum(axis=0)
     g_point = np.stack([0 * again, 0 * again, again])
     d_rotation = out.d_camera.d_rotation + g_point @ np.where(visible, position, 0).T

@@ -17,4 +17,4 @@ def masked_l1_forward(rendered, observed, mask):
 
 def masked_l1_reverse(d_loss, saved):
     """Reverse of (B6): d_rendered (C, H, W); sign(0) = 0."""
-    return d_loss * np.sign(saved.difference) / max(saved.count, 1)  # (10.1)
+    return d_loss * np.sign(saved.difference) / max(saved.count, 1)  # (11.1)

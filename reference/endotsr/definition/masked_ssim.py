@@ -38,13 +38,13 @@ def masked_ssim_forward(rendered, target):
     b1 = mu_x**2 + mu_y**2 + C1
     b2 = blurred(x**2) - mu_x**2 + blurred(y**2) - mu_y**2 + C2
     s = a1 * a2 / (b1 * b2)
-    by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)  # (10.4)
+    by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)  # (11.4)
     mean = np.where(target.mask, s, 0).sum() / target.count if target.count else 1.0
-    return mean, SsimSaved(x, s, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)  # (10.5), (10.6)
+    return mean, SsimSaved(x, s, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)  # (11.5), (11.6)
 
 
 def masked_ssim_reverse(d_ssim, saved):
     """Reverse of (B7): d_rendered (C, H, W). The window is symmetric, so it is its own adjoint."""
     x, _, slopes, (y, mask, count) = saved
     p, p_xx, p_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
-    return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)  # (10.7)
+    return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)  # (11.7)

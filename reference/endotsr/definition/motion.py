@@ -16,4 +16,4 @@ def motion_forward(motion_coefficients, phi):
 def motion_reverse(d_translation, saved):
     """Reverse of (3)."""
     c, phi = saved
-    return MotionGrads(d_translation[:, None] * phi[:, None], np.einsum("dn,dkn->k", d_translation, c))  # (4.5), (4.6)
+    return MotionGrads(d_translation[:, None] * phi[:, None], np.einsum("dn,dkn->k", d_translation, c))  # (5.5), (5.6)

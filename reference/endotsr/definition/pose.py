@@ -30,7 +30,7 @@ def pose_reverse(d_rotation, d_translation, saved):
     """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]^T."""
     rotation, translation, vector = saved
     k = (CROSS @ vector).T
-    g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (6.12)
-    both = exponential(np.block([[k, g], [np.zeros((3, 3)), k]]))  # (6.14)
+    g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (7.12)
+    both = exponential(np.block([[k, g], [np.zeros((3, 3)), k]]))  # (7.14)
     e, d_cross = both[:3, :3].T, both[:3, 3:]
     return PoseGrads(e.T @ d_rotation, e.T @ d_translation, np.einsum("ij,ijk->k", d_cross, CROSS), d_translation)

@@ -56,20 +56,20 @@ def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
     point = np.where(visible, w @ position + camera.translation[:, None], 1)
     j, slope, free = jacobian(point, camera, settings)
     g_sigma, g_t = covariance_reverse_parts(d_covariance2d, saved, point)
-    g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (5.1)
-    d_scale = (shape.rotation * g_m).sum(axis=0)  # (5.2), (6.3)
+    g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (6.1)
+    d_scale = (shape.rotation * g_m).sum(axis=0)  # (6.2), (7.3)
     g_j = np.einsum("ikn,jk->ijn", g_t, w)
     g_point = point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera)
-    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (6.4), (6.11)
-    return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (6.10)
+    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (7.4), (7.11)
+    return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (7.10)
 
 
 def covariance_reverse_parts(d_covariance2d, saved, point):
     """dL/dSigma (3, 3, N) and dL/dT (2, 3, N), T = J W, from the gradient (3, N) of a, b, c."""
     t = np.einsum("ijn,jk->ikn", jacobian(point, saved.camera, saved.settings)[0], saved.camera.rotation)
     g_a, g_b, g_c = d_covariance2d
-    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])  # (6.1)
-    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)  # (6.2)
+    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])  # (7.1)
+    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)  # (7.2)
     g_t = 2 * np.einsum("ijn,jkn,kln->iln", g2, t, covariance_matrix(saved.shape))
     return g_sigma, g_t
 
@@ -79,9 +79,9 @@ def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera):
     z = point[2]
     focal = np.array([[camera.fx], [camera.fy]])
     by_slope = np.array([g_j[0, 2], g_j[1, 2]])
-    g_slope = -focal / z * by_slope  # J_02 = -f (x'/z) / z; (6.6)
-    g_clipped = np.where(free, g_slope, 0)  # ruling: exact derivative of the clamp; (6.7)
-    g_xy = (focal * d_mean2d + g_clipped) / z  # (6.8)
-    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * by_slope)  # (6.9)
+    g_slope = -focal / z * by_slope  # J_02 = -f (x'/z) / z; (7.6)
+    g_clipped = np.where(free, g_slope, 0)  # ruling: exact derivative of the clamp; (7.7)
+    g_xy = (focal * d_mean2d + g_clipped) / z  # (7.8)
+    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * by_slope)  # (7.9)
     g_z = d_depth + (by_scale - g_xy * point[:2] / z).sum(axis=0)
     return np.concatenate([g_xy, [g_z]])

@@ -3,7 +3,7 @@
 
 def decay(step, steps, final):
     """final^tau, tau = clip(step / steps, 0, 1); without steps, tau = [step > 0]."""
-    return final ** (min(max(step / steps, 0), 1) if steps > 0 else step > 0)  # (12.5)
+    return final ** (min(max(step / steps, 0), 1) if steps > 0 else step > 0)  # (13.5)
 
 
 def residuals_active(iteration, config):

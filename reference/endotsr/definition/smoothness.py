@@ -12,7 +12,7 @@ def steps_reverse(d_steps, axis):
     """Adjoint of the differences of neighbours along an axis."""
     border = [(0, 0)] * d_steps.ndim
     border[axis] = (1, 1)
-    return -np.diff(np.pad(d_steps, border), axis=axis)  # (10.10)
+    return -np.diff(np.pad(d_steps, border), axis=axis)  # (11.10)
 
 
 def squared_steps(depth, smooth):
@@ -37,7 +37,7 @@ def total_variation(image, mask):
         step = np.diff(outside, axis=axis)
         total = total + np.abs(step).sum()
         gradient = gradient + steps_reverse(np.sign(step), axis)
-    return total / image.size, np.where(mask, 0, gradient) / image.size  # (10.11)
+    return total / image.size, np.where(mask, 0, gradient) / image.size  # (11.11)
 
 
 def smoothness_forward(rendered_depth, rendered, mask, edges, total_variation_factor):

@@ -93,8 +93,8 @@ def test_a_part_that_is_left_out_is_found(golden, tmp_path, monkeypatch):
 
     monkeypatch.setattr(covariance, "covariance_reverse", whole)
     said = causes(golden, tmp_path, "covariance")
-    assert "with `g` where `g - (g * q).sum(axis=0) * q` is right: equation (B2), step (5.8), " in said
-    assert line_of(covariance, "# (5.8)") in said
+    assert "with `g` where `g - (g * q).sum(axis=0) * q` is right: equation (B2), step (6.8), " in said
+    assert line_of(covariance, "# (6.8)") in said
 
 
 def test_a_comparison_without_its_end_is_found(golden, tmp_path, monkeypatch):
@@ -227,7 +227,7 @@ def test_noise_is_not_explained_and_time_is_kept(golden, tmp_path, monkeypatch):
 def test_the_definition_is_as_before(golden, tmp_path, monkeypatch):
     monkeypatch.setattr(masked_l1, "masked_l1_reverse", lambda d, saved: -RIGHT[4][2](d, saved))
     before = {name: value for name, value in vars(masked_l1).items() if name != "masked_l1_reverse"}
-    assert line_of(masked_l1, "# (10.1)") in causes(golden, tmp_path, "masked_l1")
+    assert line_of(masked_l1, "# (11.1)") in causes(golden, tmp_path, "masked_l1")
     assert {name: value for name, value in vars(masked_l1).items() if name != "masked_l1_reverse"} == before
     monkeypatch.undo()
     assert causes(golden, tmp_path, "masked_l1") == ""

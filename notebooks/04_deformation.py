@@ -11,14 +11,14 @@
 # ---
 
 # %% [markdown]
-# # 3. The flexible deformation model (FDM)
+# # 4. The flexible deformation model (FDM)
 #
 # Tissue deforms while it is filmed, so a Gaussian must move, turn and change its size over time. The base model of
 # Endo-TSR does this by ten functions of time, each a sum of $B$ time bases. Every basis has three learned numbers: a
 # weight, a centre and a width.
 #
 # Ten is the number of values that place and shape a Gaussian: the three coordinates of its centre $\mu$, the four of a
-# quaternion $q$ for its orientation, and the three logarithms $s$ of its semi-axes ({doc}`05_covariance` explains the
+# quaternion $q$ for its orientation, and the three logarithms $s$ of its semi-axes ({doc}`06_covariance` explains the
 # last two). A time basis is a bell: it acts near its centre and vanishes far from it. The sinusoids of
 # {doc}`01_dictionary` act at all times. A pull by an instrument happens once, and a few bells describe it without a
 # change at other times.
@@ -61,7 +61,7 @@ B, N = 17, 4
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-# $\Delta\mu$ is the translation of component S, if it is active ({doc}`04_motion_and_prior`).
+# $\Delta\mu$ is the translation of component S, if it is active ({doc}`05_motion_and_prior`).
 #
 # `gaussian` is the textbook form of a bell. `quartic` is the form that the released code of Deform3DGS computes
 # ({doc}`/references`): it squares $\Delta^2/\Sigma$ where a Gaussian would halve it. The code gives no reason. The
@@ -132,7 +132,7 @@ np.testing.assert_allclose(found, [0.91, 1.18, 1.8, 3.2], rtol=0.02)
 # At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
 # with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the published width of
 # 0.01 there are times at which no basis exceeds 0.001, and frames at these times hardly change the weights at first.
-# Training can widen the bases later, as step (3.5) below shows. The preset `sharp` starts at the width 0.05 and has no
+# Training can widen the bases later, as step (4.5) below shows. The preset `sharp` starts at the width 0.05 and has no
 # such gaps.
 
 # %% tags=["hide-input"]
@@ -179,26 +179,26 @@ plt.show()
 # $g_x$ is the gradient of the loss with respect to $x$ and has the shape of $x$. The stages after this one give
 # $g_\psi$ for each channel and Gaussian. We need the gradients with respect to weight, centre, width and time.
 #
-# **(3.1) The sum.** $\psi=\sum_jw_je_j$ is linear in the weights and in the values of the bases. So $g_w=e\,g_\psi$ and
+# **(4.1) The sum.** $\psi=\sum_jw_je_j$ is linear in the weights and in the values of the bases. So $g_w=e\,g_\psi$ and
 # $g_e=w\,g_\psi$.
 #
-# **(3.2) The exponential.** Let $E$ be the exponent, $e=\exp(-E)$. Then $\mathrm de=-e\,\mathrm dE$, and
+# **(4.2) The exponential.** Let $E$ be the exponent, $e=\exp(-E)$. Then $\mathrm de=-e\,\mathrm dE$, and
 # $g_E=-e\,g_e$.
 #
-# **(3.3) The exponent as a function of $\Delta$.** For `quartic`, $E=u^2$ with $u=\Delta^2/\Sigma$. With $\Sigma$ held
+# **(4.3) The exponent as a function of $\Delta$.** For `quartic`, $E=u^2$ with $u=\Delta^2/\Sigma$. With $\Sigma$ held
 # fixed, $\mathrm dE=2u\,\mathrm du=2u\cdot2\Delta/\Sigma\,\mathrm d\Delta$, so $\partial E/\partial\Delta=4\Delta^3/\Sigma^2$. For
 # `gaussian`, $E=\Delta^2/(2\Sigma)$ and $\partial E/\partial\Delta=\Delta/\Sigma$.
 #
-# **(3.4) The exponent as a function of $\sigma$.** $\Sigma=\sigma^2+10^{-4}$ gives $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. With
+# **(4.4) The exponent as a function of $\sigma$.** $\Sigma=\sigma^2+10^{-4}$ gives $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. With
 # $\Delta$ held fixed, $\mathrm du=-u/\Sigma\,\mathrm d\Sigma$. For `quartic`,
 # $\partial E/\partial\sigma=2u\cdot(-u/\Sigma)\cdot2\sigma=-4\Delta^4\sigma/\Sigma^3$. For `gaussian`,
 # $\partial E/\partial\sigma=-\Delta^2\sigma/\Sigma^2$.
 #
-# **(3.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. This sign cancels the sign of (3.2), so
+# **(4.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. This sign cancels the sign of (4.2), so
 # $g_\theta=-g_E\,\partial E/\partial\Delta$ has the sign of $w\,g_\psi$ for a basis with its centre before $t$, and the
-# opposite sign for one with its centre after $t$. The signs of (3.2) and (3.4) cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
+# opposite sign for one with its centre after $t$. The signs of (4.2) and (4.4) cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
 #
-# **(3.6) Time.** $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases
+# **(4.6) Time.** $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases
 # and Gaussians.
 #
 # $$
@@ -218,16 +218,16 @@ plt.show()
 #     """Reverse of (B1): from d_offsets (10, N). The kernel computes one exponential for value and derivatives."""
 #     w, centre, width, t, basis = saved
 #     delta, sigma, e = bell(centre, width, t, basis)
-#     d_e = w * d_offsets[:, None]  # (3.1)
-#     d_exponent = np.where(e == 0, 0, -d_e * e)  # (3.2)
+#     d_e = w * d_offsets[:, None]  # (4.1)
+#     d_exponent = np.where(e == 0, 0, -d_e * e)  # (4.2)
 #     if basis == "quartic":
-#         by_delta = 4 * delta**3 / sigma**2  # (3.3)
-#         by_width = -4 * delta**4 * width / sigma**3  # (3.4)
+#         by_delta = 4 * delta**3 / sigma**2  # (4.3)
+#         by_width = -4 * delta**4 * width / sigma**3  # (4.4)
 #     else:
-#         by_delta = delta / sigma  # (3.3)
-#         by_width = -(delta**2) * width / sigma**2  # (3.4)
-#     d_centre = -d_exponent * by_delta  # (3.5)
-#     return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())  # (3.6)
+#         by_delta = delta / sigma  # (4.3)
+#         by_width = -(delta**2) * width / sigma**2  # (4.4)
+#     d_centre = -d_exponent * by_delta  # (4.5)
+#     return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())  # (4.6)
 # ```
 
 # %%
@@ -240,7 +240,7 @@ for basis in ("quartic", "gaussian"):
         np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
     reached = np.abs(grads.d_fdm_centre) > 0  # a basis that is not 0 to the last digit
     sign = np.sign(w * (0.4 - theta) * g_psi[:, None, :])
-    assert np.array_equal(np.sign(grads.d_fdm_centre)[reached], sign[reached]), "(3.5)"
+    assert np.array_equal(np.sign(grads.d_fdm_centre)[reached], sign[reached]), "(4.5)"
 
 # %% [markdown]
 # Two things follow. While all weights are 0, the gradients with respect to centre and width are exactly 0, so only the
@@ -270,9 +270,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. Which frames change a basis whose width is 0.01? Use (3.1) to find the distance at which the gradient of its weight
+# 1. Which frames change a basis whose width is 0.01? Use (4.1) to find the distance at which the gradient of its weight
 #    has fallen to a thousandth of its maximum.
-# 2. Write `deformation_reverse` from (3.1) to (3.6) and let the golden cases judge it, as {doc}`index` describes:
+# 2. Write `deformation_reverse` from (4.1) to (4.6) and let the golden cases judge it, as {doc}`index` describes:
 #    `--only deformation`.
 # 3. The cell below answers this one. At which distance from the centre of a quartic basis is
 #    $|g_\theta|$ largest? Work in $v=\Delta/\sqrt\Sigma$. At which distance is it largest for a `gaussian` basis of equal

@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 11. Calibration of the Laplacian weight
+# # 12. Calibration of the Laplacian weight
 #
 # Two losses act on the same image, and one number must say how strongly the second one pulls. The paper derives
 # $\lambda_{\mathrm{lap}}$ from gradients: at full weight and in the median over the views, the gradient of the Laplacian
@@ -47,19 +47,19 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # blurred frame stands in for the base render. The results of true base renders differ from those below; the last tables
 # of {doc}`/specification/rulings` have them for two clips.
 #
-# **(11.1) Two gradients.** The objective contains
+# **(12.1) Two gradients.** The objective contains
 # $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the
 # sum of the photometric gradient and of $\lambda_{\mathrm{lap}}$ times the Laplacian gradient. Their sizes decide which
 # term changes the Gaussians more.
 #
-# **(11.2) One size per view** is the root mean square over channels and pixels, $g_{\mathrm{rgb}}(v)$ or
+# **(12.2) One size per view** is the root mean square over channels and pixels, $g_{\mathrm{rgb}}(v)$ or
 # $g_{\mathrm{lap}}(v)$. Excluded pixels count in both, with the gradient 0. A weight multiplies the size: the weighted
 # Laplacian gradient has $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)$.
 #
-# **(11.3) One view** has the required ratio if $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)=r\,g_{\mathrm{rgb}}(v)$, so
+# **(12.3) One view** has the required ratio if $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)=r\,g_{\mathrm{rgb}}(v)$, so
 # $\lambda_{\mathrm{lap}}=r\,\big/\,\bigl(g_{\mathrm{lap}}(v)/g_{\mathrm{rgb}}(v)\bigr)$.
 #
-# **(11.4) All views** share one weight. The median of $g_{\mathrm{lap}}/g_{\mathrm{rgb}}$ replaces the ratio of one view,
+# **(12.4) All views** share one weight. The median of $g_{\mathrm{lap}}/g_{\mathrm{rgb}}$ replaces the ratio of one view,
 # so a few unusual views do not change the weight. For an even number of views the median is the mean of the two middle
 # ratios, and its inverse is not the median of the inverse ratios.
 #
@@ -74,18 +74,18 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # $\mathcal L_{\mathrm{rgb}}$ is the whole photometric term $(1-w)\mathcal L_1+w(1-\mathcal S)$.
 # $\mathcal L_{\mathrm{lap}}$ has weight 1.
 #
-# **(11.5) The size of the L1 gradient is known.** By (10.1) each of the $3n$ tissue values has $\pm1/(3n)$, and the
+# **(12.5) The size of the L1 gradient is known.** By (11.1) each of the $3n$ tissue values has $\pm1/(3n)$, and the
 # others have 0. The root mean square over $3HW$ values is $1/(3\sqrt{nHW})$ for every render that differs from its frame
 # at every tissue value. Only the SSIM term makes $g_{\mathrm{rgb}}$ depend on the size of the error.
 #
-# **(11.6) Views without a ratio.** A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and
+# **(12.6) Views without a ratio.** A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and
 # named.
 #
 # <!-- definition: endotsr.definition.calibration.rms -->
 # ```python
 # def rms(gradient):
 #     """Equation (7): root mean square of a gradient image over all pixels, masked ones included."""
-#     return np.sqrt((gradient**2).mean())  # (11.2)
+#     return np.sqrt((gradient**2).mean())  # (12.2)
 # ```
 #
 # <!-- definition: endotsr.definition.calibration.calibration_views -->
@@ -102,10 +102,10 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 #
 #     Raises: ValueError if no view remains or the median is 0.
 #     """
-#     ratios = np.array([fine / rgb for _, rgb, fine in views if rgb > 0 and np.isfinite(fine / rgb)])  # (11.6)
+#     ratios = np.array([fine / rgb for _, rgb, fine in views if rgb > 0 and np.isfinite(fine / rgb)])  # (12.6)
 #     if ratios.size == 0 or np.median(ratios) == 0:
 #         raise ValueError("calibration: no view has a ratio, or their median is 0")
-#     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (11.3), (11.4)
+#     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (12.3), (12.4)
 # ```
 
 # %%
@@ -139,7 +139,7 @@ for count in (16, 15):  # an even and an odd number of views
     np.testing.assert_allclose(calibrate(sizes[:count], r).lambda_lap, text, rtol=1e-13)
 
 # %% [markdown]
-# After calibration the Laplacian loss has the required gradient in the median view. The cell also checks (11.5):
+# After calibration the Laplacian loss has the required gradient in the median view. The cell also checks (12.5):
 
 # %%
 l1_alone, _ = gradients(chosen[0], 1.5, 0.0)
@@ -201,7 +201,7 @@ plt.show()
 # ## The reverse pass
 #
 # There is no reverse pass, because $\lambda_{\mathrm{lap}}$ is held fixed in training. The calibration itself measures
-# reverse passes, those of {doc}`09_laplacian_pyramid` and {doc}`10_base_losses`. The next cell checks them:
+# reverse passes, those of {doc}`10_laplacian_pyramid` and {doc}`11_base_losses`. The next cell checks them:
 
 # %%
 with one_thread():
@@ -213,7 +213,7 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## When calibration fails
 #
-# If (11.6) leaves no view, or if the median is 0, an error with the table of all views is raised. The weight is never
+# If (12.6) leaves no view, or if the median is 0, an error with the table of all views is raised. The weight is never
 # infinite.
 
 # %%

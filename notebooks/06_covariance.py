@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 5. Quaternions, scales and the covariance
+# # 6. Quaternions, scales and the covariance
 #
 # A few flat or long Gaussians cover a wall or a vessel better than many round ones. The shape of a Gaussian is given by
 # three semi-axes and a rotation. A gradient step may lead to any real number, so both are stored in a form that allows
@@ -77,7 +77,7 @@ N = 6
 #     w, v = q[0], q[1:]
 #     outer = np.einsum("in,jn->ijn", v, v)
 #     cross = np.einsum("ijk,kn->ijn", CROSS, v)
-#     return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (5.4)
+#     return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (6.4)
 # ```
 #
 # <!-- definition: endotsr.definition.covariance.covariance_forward -->
@@ -138,38 +138,38 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 # A loss gives $g_\Sigma$, with all nine entries taken as independent. We need gradients with respect to the log-scales
 # and to the raw quaternion.
 #
-# **(5.1) The product.** $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
+# **(6.1) The product.** $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
 # $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$. Each entry of $M$ occurs twice, once in a row and once in a
 # column. The gradient adds both: $g_M=(g_\Sigma+g_\Sigma^\top)M$.
 #
-# **(5.2) Its two factors.** $M_{jk}=R_{jk}S_k$. With $S$ held fixed, $g_{R_{jk}}=g_{M_{jk}}S_k$. With $R$ held fixed,
+# **(6.2) Its two factors.** $M_{jk}=R_{jk}S_k$. With $S$ held fixed, $g_{R_{jk}}=g_{M_{jk}}S_k$. With $R$ held fixed,
 # a semi-axis scales one whole column, so $g_{S_k}=\sum_jR_{jk}\,g_{M_{jk}}$.
 #
-# **(5.3) The logarithm.** $S_k=e^{s_k}$ gives $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$.
+# **(6.3) The logarithm.** $S_k=e^{s_k}$ gives $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$.
 #
 # $$
 # g_M=(g_\Sigma+g_\Sigma^\top)M,\qquad g_{S_k}=\sum_j R_{jk}\,g_{M_{jk}},\qquad g_{s_k}=S_k\,g_{S_k},\qquad g_{R_{jk}}=g_{M_{jk}}S_k .
 # $$
 #
-# **(5.4) The rotation.** With $q=(w,\mathbf v)$,
+# **(6.4) The rotation.** With $q=(w,\mathbf v)$,
 # $R=(w^2-\mathbf v\cdot\mathbf v)\,I+2\,\mathbf v\mathbf v^\top+2w\,[\mathbf v]_\times$. Each term is quadratic in $q$,
 # so its differential has two parts:
 # $\mathrm dR=2(w\,\mathrm dw-\mathbf v\cdot\mathrm d\mathbf v)\,I+2(\mathrm d\mathbf v\,\mathbf v^\top+\mathbf v\,\mathrm d\mathbf v^\top)+2\,\mathrm dw\,[\mathbf v]_\times+2w\,[\mathrm d\mathbf v]_\times$.
 #
-# **(5.5) Three contractions.** With $G=g_R$ and $\langle G,\mathrm dR\rangle=\sum_{jk}G_{jk}\,\mathrm dR_{jk}$, each term
+# **(6.5) Three contractions.** With $G=g_R$ and $\langle G,\mathrm dR\rangle=\sum_{jk}G_{jk}\,\mathrm dR_{jk}$, each term
 # becomes a number or a vector. $\langle G,I\rangle$ is the trace $\tau=\sum_jG_{jj}$. The symmetric part is
 # $\langle G,\mathrm d\mathbf v\,\mathbf v^\top+\mathbf v\,\mathrm d\mathbf v^\top\rangle=\mathrm d\mathbf v\cdot(G+G^\top)\mathbf v$.
 # The antisymmetric part is $\langle G,[\mathbf a]_\times\rangle=\mathbf a\cdot\mathbf s$ with the *spin*
 # $\mathbf s=(G_{21}-G_{12},\ G_{02}-G_{20},\ G_{10}-G_{01})$.
 #
-# **(5.6) The unit quaternion.** Collecting $\mathrm dw$ and $\mathrm d\mathbf v$ gives $g_w=2w\tau+2\,\mathbf s\cdot\mathbf v$ and
+# **(6.6) The unit quaternion.** Collecting $\mathrm dw$ and $\mathrm d\mathbf v$ gives $g_w=2w\tau+2\,\mathbf s\cdot\mathbf v$ and
 # $g_{\mathbf v}=-2\tau\,\mathbf v+2(G+G^\top)\mathbf v+2w\,\mathbf s$.
 #
-# **(5.7) Two forms.** The display below differentiates the printed matrix, whose diagonal has $1$ instead of $\|q\|^2$.
+# **(6.7) Two forms.** The display below differentiates the printed matrix, whose diagonal has $1$ instead of $\|q\|^2$.
 # It lacks the gradient of $(\|q\|^2-1)\,\tau$, which is $2\tau q$. That vector points along $q$, and the next line
 # removes it. Both forms therefore give the same $g_{\tilde q}$.
 #
-# **(5.8) The length.** $q=\tilde q/\|\tilde q\|$ gives
+# **(6.8) The length.** $q=\tilde q/\|\tilde q\|$ gives
 # $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the rotation, so
 # that part of $g_q$ is removed. A longer $\tilde q$ rotates less for the same step, so the rest is divided by its length.
 #
@@ -189,8 +189,8 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 #     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N)."""
 #     w, v = q[0], q[1:]
 #     trace = np.einsum("iin->n", g)
-#     spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (5.5)
-#     along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (5.6)
+#     spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (6.5)
+#     along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (6.6)
 #     g_w = 2 * w * trace + 2 * (spin * v).sum(axis=0)
 #     g_v = -2 * v * trace + 2 * along + 2 * w * spin
 #     return np.concatenate([[g_w], g_v])
@@ -202,8 +202,8 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 #     """Reverse of (B2): the component along q is removed; a clipped log-scale has gradient 0."""
 #     q, inverse_norm = unit(saved.quaternion)
 #     g = rotation_reverse(q, d_shape.rotation)
-#     d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (5.8)
-#     free = np.abs(saved.log_scale) <= 40  # (5.3)
+#     d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (6.8)
+#     free = np.abs(saved.log_scale) <= 40  # (6.3)
 #     scale = np.exp(np.clip(saved.log_scale, -40, 40))
 #     return CovarianceGrads(d_quaternion, np.where(free, d_shape.scale * scale, 0))
 # ```
@@ -211,7 +211,7 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 
 # %%
 def from_sigma(g_Sigma, R, S):
-    """(5.1) and (5.2): g_R and g_S of one Gaussian."""
+    """(6.1) and (6.2): g_R and g_S of one Gaussian."""
     g_M = (g_Sigma + g_Sigma.T) @ (R * S)
     return g_M * S, (R * g_M).sum(axis=0)
 
@@ -228,7 +228,7 @@ for found, expected in zip(
 ):
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
-# The printed form, line by line, differs from (5.6) along q alone: by 2 tau q, as (5.7) says.
+# The printed form, line by line, differs from (6.6) along q alone: by 2 tau q, as (6.7) says.
 G, unit = g_R, definition.unit(q)[0]
 w, x, y, z = unit
 g_w = 2 * (x * (G[2, 1] - G[1, 2]) + y * (G[0, 2] - G[2, 0]) + z * (G[1, 0] - G[0, 1]))
@@ -335,8 +335,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (5.2) and (5.6).
-# 2. Write `covariance_reverse` from (5.3), (5.6) and (5.8) and let the golden cases judge it: `--only covariance`
+# 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (6.2) and (6.6).
+# 2. Write `covariance_reverse` from (6.3), (6.6) and (6.8) and let the golden cases judge it: `--only covariance`
 #    ({doc}`index`). Which case fails if the division by the length is omitted?
 # 3. The cell below answers this one. Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ instead of
 #    $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many parameter sets describe one

@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 7. Colour that depends on the direction: spherical harmonics
+# # 8. Colour that depends on the direction: spherical harmonics
 #
 # The colour of a wet surface depends on the viewing direction. Each Gaussian has up to 16 coefficients of the real
 # spherical harmonics per channel. They are evaluated in the direction from the camera to the deformed centre. The
@@ -161,24 +161,24 @@ plt.show()
 # A loss gives $g_{rgb}$. We need gradients with respect to the coefficients, the residual, the centre of each Gaussian
 # and the optical centre of the camera.
 #
-# **(7.1) The clamp.** $\max(0,\cdot)$ passes the gradient where the value before it is not negative:
+# **(8.1) The clamp.** $\max(0,\cdot)$ passes the gradient where the value before it is not negative:
 # $g^{\mathrm{pre}}=g_{rgb}$ there, and 0 elsewhere. At exactly 0 it passes.
 #
-# **(7.2) The coefficients.** The colour is linear in $h$, with the factor $Y_k(\mathbf n)$. So
+# **(8.2) The coefficients.** The colour is linear in $h$, with the factor $Y_k(\mathbf n)$. So
 # $g_{h_k}=Y_k\,g^{\mathrm{pre}}$. The residual has the factor $Y_0$ of the coefficient to which it is added.
 #
-# **(7.3) The direction.** The three channels share $\mathbf n$. Each coefficient contributes the slope of its polynomial:
+# **(8.3) The direction.** The three channels share $\mathbf n$. Each coefficient contributes the slope of its polynomial:
 # $g_{\mathbf n}=\sum_k\bigl(\sum_cg^{\mathrm{pre}}_ch_{kc}\bigr)\,\partial Y_k/\partial(x,y,z)$. $Y_0$ is constant and
 # has no slope.
 #
-# **(7.4) The slope of a monomial.** $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$, with $x,y,z$ taken as independent.
-# The gradient then has a part along $\mathbf n$, which (7.5) removes.
+# **(8.4) The slope of a monomial.** $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$, with $x,y,z$ taken as independent.
+# The gradient then has a part along $\mathbf n$, which (8.5) removes.
 #
-# **(7.5) The normalisation.** $\mathbf n=\mathbf v/\|\mathbf v\|$ gives
+# **(8.5) The normalisation.** $\mathbf n=\mathbf v/\|\mathbf v\|$ gives
 # $\mathrm d\mathbf n=(I-\mathbf n\mathbf n^\top)\,\mathrm d\mathbf v/\|\mathbf v\|$. Only the part of $g_{\mathbf n}$ that is
-# perpendicular to $\mathbf n$ remains, divided by the distance. This is the rule (5.8) of the quaternion.
+# perpendicular to $\mathbf n$ remains, divided by the distance. This is the rule (6.8) of the quaternion.
 #
-# **(7.6) The two ends.** $\mathbf v=\mu-\mathbf o$: the centre of the Gaussian receives $+g_{\mathbf v}$. The optical
+# **(8.6) The two ends.** $\mathbf v=\mu-\mathbf o$: the centre of the Gaussian receives $+g_{\mathbf v}$. The optical
 # centre is shared by all Gaussians and receives $-\sum_ig_{\mathbf v_i}$.
 #
 # $$
@@ -199,7 +199,7 @@ plt.show()
 #         for c, *powers in polynomial:
 #             for axis in np.flatnonzero(powers):
 #                 x, y, z = (d ** (p - (axis == i)) for i, (d, p) in enumerate(zip(direction, powers)))
-#                 out[row, axis] += factor * c * powers[axis] * x * y * z  # (7.4)
+#                 out[row, axis] += factor * c * powers[axis] * x * y * z  # (8.4)
 #     return out
 # ```
 #
@@ -209,13 +209,13 @@ plt.show()
 #     """Reverse of (B4): through the coefficients and through the viewing direction."""
 #     harmonics, residual, position, centre, degree, clamped = saved
 #     terms = (degree + 1) ** 2
-#     g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (7.1)
+#     g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (8.1)
 #     n, inverse = directions(position, centre)
 #     d_harmonics = np.zeros_like(harmonics)
-#     d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (7.2)
-#     d_n = np.einsum("cn,kcn,kan->an", g, harmonics[:terms], basis_slopes(n, terms))  # (7.3)
-#     d_v = (d_n - (n * d_n).sum(axis=0) * n) * inverse  # (7.5)
-#     return HarmonicsGrads(d_harmonics, None if residual is None else Y00 * g, d_v, -d_v.sum(axis=1))  # (7.6)
+#     d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (8.2)
+#     d_n = np.einsum("cn,kcn,kan->an", g, harmonics[:terms], basis_slopes(n, terms))  # (8.3)
+#     d_v = (d_n - (n * d_n).sum(axis=0) * n) * inverse  # (8.5)
+#     return HarmonicsGrads(d_harmonics, None if residual is None else Y00 * g, d_v, -d_v.sum(axis=1))  # (8.6)
 # ```
 
 # %%
@@ -226,7 +226,7 @@ for found, expected in zip(grads, text):
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 # Euler: a homogeneous polynomial of degree l has the slope l Y along n.
-# (7.5) removes that part.
+# (8.5) removes that part.
 n, _ = definition.directions(mu, centre)
 along = np.einsum("kan,an->kn", definition.basis_slopes(n, 16), n)
 powers = np.array([sum(p[0][1:]) for _, p in definition.POLYNOMIALS])
@@ -251,8 +251,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. All coefficients of a Gaussian above degree 0 are 0. Which gradients vanish? Which of (7.2) and (7.3) decides it?
-# 2. Write `harmonics_reverse` from (7.1) to (7.6) and let the golden cases judge it: `--only harmonics` ({doc}`index`).
+# 1. All coefficients of a Gaussian above degree 0 are 0. Which gradients vanish? Which of (8.2) and (8.3) decides it?
+# 2. Write `harmonics_reverse` from (8.1) to (8.6) and let the golden cases judge it: `--only harmonics` ({doc}`index`).
 #    One case has a Gaussian at the camera itself.
 # 3. The cell below answers this one. Mirror the scene: negate $x$ of all positions and of the camera. Which
 #    coefficients must change their sign so that every Gaussian keeps its colour? Find the answer in the list of

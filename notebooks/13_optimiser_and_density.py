@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 12. The optimiser and density control
+# # 13. The optimiser and density control
 #
 # The gradients of positions, colours and coefficients differ by orders of magnitude, and the number of Gaussians that a
 # scene needs is not known in advance. Adam turns gradients of any size into steps of a known size. Every hundred
@@ -68,18 +68,18 @@ rng = np.random.default_rng(12)
 #
 # The constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
 #
-# **(12.1) Two averages.** Written out from $m=0$, the recursion is
+# **(13.1) Two averages.** Written out from $m=0$, the recursion is
 # $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$: an average of the gradients in which old ones fade. $v_k$ is the same
 # average of $g_j^2$; with $\beta_2$ they fade more slowly, by the factor $0.1/0.001$.
 #
-# **(12.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with 0.
+# **(13.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with 0.
 # The division by $1-\beta_1^k$ makes it a weighted mean, and so does the division by $1-\beta_2^k$ for $v$.
 #
-# **(12.3) The first step depends on the sign only.** For $k=1$ both corrections are exact: the means are $g$ and $g^2$.
+# **(13.3) The first step depends on the sign only.** For $k=1$ both corrections are exact: the means are $g$ and $g^2$.
 # The step is $\eta\,g/(|g|+\epsilon)$, which is $\eta\operatorname{sign}(g)$ for a gradient of 1 as for one of
 # $10^{-10}$.
 #
-# **(12.4) A common factor cancels.** If all gradients of an array are multiplied by $c>0$, both $m$ and $\sqrt v$ have
+# **(13.4) A common factor cancels.** If all gradients of an array are multiplied by $c>0$, both $m$ and $\sqrt v$ have
 # the factor $c$. The steps stay the same as long as $\epsilon$ is negligible, so a factor on the whole objective
 # changes no step of Adam. It does change the statistic of density control below.
 #
@@ -87,10 +87,10 @@ rng = np.random.default_rng(12)
 # ```python
 # def adam_step(parameter, gradient, first, second, step, learning_rate, beta1, beta2, epsilon):
 #     """Equation (B10): parameter, m and v after step k = 1, 2, ...; a rate may have the shape of the parameter."""
-#     m = beta1 * first + (1 - beta1) * gradient  # (12.1)
+#     m = beta1 * first + (1 - beta1) * gradient  # (13.1)
 #     v = beta2 * second + (1 - beta2) * gradient**2
 #     m = np.where(np.abs(m) < SMALLEST, 0, m)
-#     change = m / (1 - beta1**step) / (np.sqrt(v / (1 - beta2**step)) + epsilon)  # (12.2)
+#     change = m / (1 - beta1**step) / (np.sqrt(v / (1 - beta2**step)) + epsilon)  # (13.2)
 #     return parameter - learning_rate * change, m, v
 # ```
 
@@ -116,8 +116,8 @@ for k in (1, 2, 3):
 np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
-# Step (12.3) has a consequence for the whole package. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a
-# full step. Every sum therefore has a fixed order. The cell checks (12.3) and (12.4).
+# Step (13.3) has a consequence for the whole package. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a
+# full step. Every sum therefore has a fixed order. The cell checks (13.3) and (13.4).
 
 # %%
 for size in (1.0, 1e-10):
@@ -137,9 +137,9 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # %% [markdown]
 # ## The rates
 #
-# By (12.3) the rate is the size of a step. Training needs large steps at first and small ones at the end.
+# By (13.3) the rate is the size of a step. Training needs large steps at first and small ones at the end.
 #
-# **(12.5) Exponential decay.** The rates of position, deformation and residuals fall to $\varphi=0.01$ of their start.
+# **(13.5) Exponential decay.** The rates of position, deformation and residuals fall to $\varphi=0.01$ of their start.
 # Every iteration multiplies them by the same factor, $\varphi^{1/T}$. The decay of the residuals starts at $K_s$:
 #
 # $$
@@ -151,7 +151,7 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # ```python
 # def decay(step, steps, final):
 #     """final^tau, tau = clip(step / steps, 0, 1); without steps, tau = [step > 0]."""
-#     return final ** (min(max(step / steps, 0), 1) if steps > 0 else step > 0)  # (12.5)
+#     return final ** (min(max(step / steps, 0), 1) if steps > 0 else step > 0)  # (13.5)
 # ```
 #
 # <!-- definition: endotsr.definition.schedules.learning_rates -->
@@ -221,7 +221,7 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # A large gradient with respect to the screen centre of a Gaussian is taken as a sign that one Gaussian covers a region
 # that needs two. That is the heuristic of 3DGS. The statistic is the mean norm of this gradient over the views in which the Gaussian is visible.
 #
-# **(12.6) The unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
+# **(13.6) The unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
 # $\mathrm du=\frac W2\,\mathrm dx$ and $\mathrm dv=\frac H2\,\mathrm dy$. By the chain rule $g_x=\frac W2g_u$ and
 # $g_y=\frac H2g_v$:
 #
@@ -237,7 +237,7 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # ```python
 # def gather_statistics(statistics, d_mean, visible, width, height):
 #     """Equation (B11): add one view to the statistics; d_mean (2, N) per px, visible (N,)."""
-#     norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)  # (12.6)
+#     norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)  # (13.6)
 #     return DensityStatistics(statistics.gradient_sum + np.where(visible, norm, 0), statistics.visits + visible)
 # ```
 #
@@ -439,7 +439,7 @@ assert np.diff(growth).max() < 1.02 * np.diff(growth)[np.diff(growth) > 0].min()
 #
 # Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are results of the reverse
 # pass of compositing, before the reverse pass of the projection. The pair to check is therefore the pair of
-# {doc}`08_compositing`, block `mean2d`.
+# {doc}`09_compositing`, block `mean2d`.
 
 # %%
 with one_thread():

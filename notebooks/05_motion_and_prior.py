@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 4. The translation residual and its Matérn prior (component S)
+# # 5. The translation residual and its Matérn prior (component S)
 #
 # Breathing and heartbeat move tissue periodically. Component S therefore adds a Fourier series to the path of each
 # Gaussian. Its sixteen free coefficients per axis can also produce implausible motion between the frames, so a
@@ -55,7 +55,7 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # \mu_i(t) = \mu_i + \psi_{0:3,i}(t) + \Delta\mu_i(t).
 # $$
 #
-# $\psi$ is the offset of the deformation model of {doc}`03_deformation`. The atoms are **raw**, not normalised: for
+# $\psi$ is the offset of the deformation model of {doc}`04_deformation`. The atoms are **raw**, not normalised: for
 # raw pairs the penalty below is invariant to the phase of a sine and cosine pair. The sine and the cosine of a normalised
 # pair have different scales, and for them it is not.
 #
@@ -95,17 +95,17 @@ assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 # %% [markdown]
 # The penalty follows from this density in four steps.
 #
-# **(4.1) The prior.** Each coefficient is an independent normal number with mean 0. Its variance is proportional to the
+# **(5.1) The prior.** Each coefficient is an independent normal number with mean 0. Its variance is proportional to the
 # spectral density of its frequency, $S(\omega_f)$.
 #
-# **(4.2) Its negative logarithm** is, up to constants, a sum of squares, each divided by its variance. The weight of a
+# **(5.2) Its negative logarithm** is, up to constants, a sum of squares, each divided by its variance. The weight of a
 # square is therefore proportional to $1/S(\omega_f)\propto\tilde\rho_f=\bigl(5/\ell^2+(2\pi\omega_f)^2\bigr)^3$.
 #
-# **(4.3) The scale of the weights** belongs to the setting $\lambda_{\mathrm{msp}}$. Dividing by the mean of
+# **(5.3) The scale of the weights** belongs to the setting $\lambda_{\mathrm{msp}}$. Dividing by the mean of
 # $\tilde\rho$ gives weights of mean 1 for every $\ell$, so $\ell$ distributes the penalty over the frequencies and
 # $\lambda_{\mathrm{msp}}$ sets its size.
 #
-# **(4.4) The mean.** The sum runs over 3 directions, $2F$ atoms and $N$ Gaussians. Division by $6NF$ makes the penalty
+# **(5.4) The mean.** The sum runs over 3 directions, $2F$ atoms and $N$ Gaussians. Division by $6NF$ makes the penalty
 # independent of the number of Gaussians, which density control changes.
 #
 # $$
@@ -123,8 +123,8 @@ assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 #
 #     The kernel first divides by the largest frequency, which avoids overflow. Below a length of 1e-40, rho rounds to 1.
 #     """
-#     rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3  # (4.2)
-#     return rho / rho.mean()  # (4.3)
+#     rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3  # (5.2)
+#     return rho / rho.mean()  # (5.3)
 # ```
 #
 # <!-- definition: endotsr.definition.matern.matern_penalty_forward -->
@@ -133,7 +133,7 @@ assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 #     """Equation (4), lower line: scene units squared; both atoms of a frequency share its weight."""
 #     n = motion_coefficients.shape[2]
 #     squares = np.einsum("dkn,dkn->k", motion_coefficients, motion_coefficients)
-#     return np.tile(rho, 2) @ squares / (6 * max(n, 1) * rho.size), MaternSaved(motion_coefficients, rho)  # (4.4)
+#     return np.tile(rho, 2) @ squares / (6 * max(n, 1) * rho.size), MaternSaved(motion_coefficients, rho)  # (5.4)
 # ```
 
 # %%
@@ -276,9 +276,9 @@ plt.show()
 # A loss gives $g_{\Delta\mu}$ for each direction and Gaussian. We need gradients with respect to the coefficients $C$
 # and to the atoms $\phi$. The translation is bilinear, like the argument of the colour residual in (2.5) and (2.6).
 #
-# **(4.5) One coefficient** is multiplied by one atom, so $g_{C_{dki}}=g_{\Delta\mu_{di}}\,\phi_k$.
+# **(5.5) One coefficient** is multiplied by one atom, so $g_{C_{dki}}=g_{\Delta\mu_{di}}\,\phi_k$.
 #
-# **(4.6) One atom** is multiplied by the coefficients of all Gaussians and directions, so its gradient is a sum over
+# **(5.6) One atom** is multiplied by the coefficients of all Gaussians and directions, so its gradient is a sum over
 # both.
 #
 # $$
@@ -286,7 +286,7 @@ plt.show()
 # g_{\phi_k} = \sum_{i=1}^{N}\sum_{d=1}^{3} g_{\Delta\mu_{di}}\,C_{dki} .
 # $$
 #
-# **(4.7) The penalty.** $\mathrm dC^2=2C\,\mathrm dC$, and $2/(6NF)=1/(3NF)$. $\rho$ depends on the settings only and
+# **(5.7) The penalty.** $\mathrm dC^2=2C\,\mathrm dC$, and $2/(6NF)=1/(3NF)$. $\rho$ depends on the settings only and
 # is held fixed.
 #
 # $$
@@ -299,7 +299,7 @@ plt.show()
 # def motion_reverse(d_translation, saved):
 #     """Reverse of (3)."""
 #     c, phi = saved
-#     return MotionGrads(d_translation[:, None] * phi[:, None], np.einsum("dn,dkn->k", d_translation, c))  # (4.5), (4.6)
+#     return MotionGrads(d_translation[:, None] * phi[:, None], np.einsum("dn,dkn->k", d_translation, c))  # (5.5), (5.6)
 # ```
 #
 # <!-- definition: endotsr.definition.matern.matern_penalty_reverse -->
@@ -307,7 +307,7 @@ plt.show()
 # def matern_penalty_reverse(d_penalty, saved):
 #     """Reverse of (4): d_motion_coefficients (3, 2F, N); rho is held fixed."""
 #     c, rho = saved
-#     return d_penalty * np.tile(rho, 2)[:, None] * c / (3 * max(c.shape[2], 1) * rho.size)  # (4.7)
+#     return d_penalty * np.tile(rho, 2)[:, None] * c / (3 * max(c.shape[2], 1) * rho.size)  # (5.7)
 # ```
 
 # %%

@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 9. The mask-propagating Laplacian pyramid (component L)
+# # 10. The mask-propagating Laplacian pyramid (component L)
 #
 # In a mean over pixels, a blurred vessel counts no more than a wall that is slightly too dark. Component L therefore
 # compares fine detail separately, in the bands of a pyramid. The difficulty is the instrument: a filter that reads one
@@ -181,7 +181,7 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 #     for p, q, valid in zip(one, other, masks.bands):
 #         weight = valid / max(len(p) * valid.sum(), 1) / len(masks.bands)
 #         loss += (weight * np.abs(p - q)).sum()
-#         slopes.append(weight * np.sign(p - q))  # (9.1)
+#         slopes.append(weight * np.sign(p - q))  # (10.1)
 #     return loss, LaplacianSaved(tuple(slopes), masks)
 # ```
 
@@ -249,21 +249,21 @@ plt.show()
 #
 # A loss gives $g_{\mathcal L}$. We need the gradient with respect to the render $\hat I$.
 #
-# **(9.1) The absolute value.** $\mathrm d|x|=\operatorname{sign}(x)\,\mathrm dx$. Let $\sigma_j$ be the sign of the
+# **(10.1) The absolute value.** $\mathrm d|x|=\operatorname{sign}(x)\,\mathrm dx$. Let $\sigma_j$ be the sign of the
 # difference of the bands. Three levels, three channels and $n_j$ values give each valid value the weight $1/(9n_j)$.
 #
-# **(9.2) A linear map.** The rest is linear. $y=Mx$ gives $g_x=M^\top g_y$, so the reverse pass applies the transposes of
+# **(10.2) A linear map.** The rest is linear. $y=Mx$ gives $g_x=M^\top g_y$, so the reverse pass applies the transposes of
 # $\mathsf D$ and $\mathsf U$.
 #
-# **(9.3) One band.** $P_j=G_{j-1}-\mathsf UG_j$. So $g_{P_j}$ is added to the gradient of $G_{j-1}$, and
+# **(10.3) One band.** $P_j=G_{j-1}-\mathsf UG_j$. So $g_{P_j}$ is added to the gradient of $G_{j-1}$, and
 # $-\mathsf U^\top g_{P_j}$ to the gradient of $G_j$.
 #
-# **(9.4) The next level.** $G_{j+1}=\mathsf DG_j$ adds $\mathsf D^\top g_{G_{j+1}}$ to the gradient of $G_j$.
+# **(10.4) The next level.** $G_{j+1}=\mathsf DG_j$ adds $\mathsf D^\top g_{G_{j+1}}$ to the gradient of $G_j$.
 #
-# **(9.5) From coarse to fine.** $G_3$ occurs in $P_3$ only, so the reverse pass begins there. $G_2$ and $G_1$ collect the
-# three parts of (9.3) and (9.4). $G_0=\hat I$ is the fine image of $P_1$ and the source of $G_1$.
+# **(10.5) From coarse to fine.** $G_3$ occurs in $P_3$ only, so the reverse pass begins there. $G_2$ and $G_1$ collect the
+# three parts of (10.3) and (10.4). $G_0=\hat I$ is the fine image of $P_1$ and the source of $G_1$.
 #
-# **(9.6) Excluded pixels** are set to 0 before the pyramid is built. They are constants, so their gradient is 0.
+# **(10.6) Excluded pixels** are set to 0 before the pyramid is built. They are constants, so their gradient is 0.
 #
 # $$
 # \begin{aligned}
@@ -279,11 +279,11 @@ plt.show()
 # def laplacian_loss_reverse(d_loss, saved):
 #     """Reverse of (5): d_rendered (3, H, W); g_{G_{j-1}} = g_{P_j} + D^T (g_{G_j} - U^T g_{P_j}), coarse to fine."""
 #     d_coarse = 0.0
-#     for slope in reversed(saved.slopes):  # (9.5)
+#     for slope in reversed(saved.slopes):  # (10.5)
 #         d_rows, u_rows, d_columns, u_columns = matrices(slope.shape[1:], saved.masks.upsampling)
-#         d_coarse = d_coarse - u_rows.T @ slope @ u_columns  # (9.2), (9.3)
-#         d_coarse = slope + d_rows.T @ d_coarse @ d_columns  # (9.3), (9.4)
-#     return d_loss * np.where(saved.masks.image, d_coarse, 0)  # (9.6)
+#         d_coarse = d_coarse - u_rows.T @ slope @ u_columns  # (10.2), (10.3)
+#         d_coarse = slope + d_rows.T @ d_coarse @ d_columns  # (10.3), (10.4)
+#     return d_loss * np.where(saved.masks.image, d_coarse, 0)  # (10.6)
 # ```
 
 # %%

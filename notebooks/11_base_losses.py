@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 10. The base losses: L1, SSIM, depth and smoothness
+# # 11. The base losses: L1, SSIM, depth and smoothness
 #
 # A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
 # compare it with. The base model has a loss for each: the colour of each pixel (L1), the structure of the colours
@@ -130,9 +130,9 @@ H, W = M.shape
 #     b1 = mu_x**2 + mu_y**2 + C1
 #     b2 = blurred(x**2) - mu_x**2 + blurred(y**2) - mu_y**2 + C2
 #     s = a1 * a2 / (b1 * b2)
-#     by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)  # (10.4)
+#     by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)  # (11.4)
 #     mean = np.where(target.mask, s, 0).sum() / target.count if target.count else 1.0
-#     return mean, SsimSaved(x, s, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)  # (10.5), (10.6)
+#     return mean, SsimSaved(x, s, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)  # (11.5), (11.6)
 # ```
 
 
@@ -221,7 +221,7 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 #         step = np.diff(outside, axis=axis)
 #         total = total + np.abs(step).sum()
 #         gradient = gradient + steps_reverse(np.sign(step), axis)
-#     return total / image.size, np.where(mask, 0, gradient) / image.size  # (10.11)
+#     return total / image.size, np.where(mask, 0, gradient) / image.size  # (11.11)
 # ```
 #
 # <!-- definition: endotsr.definition.smoothness.smoothness_forward -->
@@ -322,30 +322,30 @@ plt.show()
 # %% [markdown]
 # ## The reverse passes, line by line
 #
-# **(10.1) L1.** The derivative of $|x|$ is $\operatorname{sign}(x)$, with $\operatorname{sign}(0)=0$. The mean has the
+# **(11.1) L1.** The derivative of $|x|$ is $\operatorname{sign}(x)$, with $\operatorname{sign}(0)=0$. The mean has the
 # factor $1/(3n)$. Excluded pixels are not in the sum.
 #
 # $$
 # g_{\hat I_{cp}}=\begin{cases}\dfrac{g_{\mathcal L_1}}{3n}\operatorname{sign}(\hat I_{cp}-I_{cp}) & M_p\\ 0 & \text{otherwise,}\end{cases}\qquad \operatorname{sign}(0)=0 .
 # $$
 #
-# **(10.2) SSIM: what depends on $x$.** $y$ is held fixed. $x$ enters through three windowed images: $\mu_x=k*x$,
+# **(11.2) SSIM: what depends on $x$.** $y$ is held fixed. $x$ enters through three windowed images: $\mu_x=k*x$,
 # $X=k*x^2$ and $Z=k*(xy)$. In these, $a_1=2\mu_x\mu_y+C_1$, $a_2=2(Z-\mu_x\mu_y)+C_2$, $b_1=\mu_x^2+\mu_y^2+C_1$ and
 # $b_2=X-\mu_x^2+\sigma_y^2+C_2$.
 #
-# **(10.3) The logarithmic differential** of $s=a_1a_2/(b_1b_2)$ is
+# **(11.3) The logarithmic differential** of $s=a_1a_2/(b_1b_2)$ is
 # $\mathrm ds=\dfrac{a_2\,\mathrm da_1+a_1\,\mathrm da_2}{b_1b_2}-s\Bigl(\dfrac{\mathrm db_1}{b_1}+\dfrac{\mathrm db_2}{b_2}\Bigr)$.
 #
-# **(10.4) The partial with respect to $\mu_x$.** $\mathrm da_1=2\mu_y\,\mathrm d\mu_x$,
+# **(11.4) The partial with respect to $\mu_x$.** $\mathrm da_1=2\mu_y\,\mathrm d\mu_x$,
 # $\mathrm da_2=-2\mu_y\,\mathrm d\mu_x$, $\mathrm db_1=2\mu_x\,\mathrm d\mu_x$ and $\mathrm db_2=-2\mu_x\,\mathrm d\mu_x$. So
 # $\partial s/\partial\mu_x=2\mu_y(a_2-a_1)/(b_1b_2)-2\mu_xs\,(1/b_1-1/b_2)$.
 #
-# **(10.5) The partial with respect to $X$.** Only $b_2$ contains it, with factor 1: $\partial s/\partial X=-s/b_2$.
+# **(11.5) The partial with respect to $X$.** Only $b_2$ contains it, with factor 1: $\partial s/\partial X=-s/b_2$.
 #
-# **(10.6) The partial with respect to $Z$.** Only $a_2$ contains it, with factor 2:
+# **(11.6) The partial with respect to $Z$.** Only $a_2$ contains it, with factor 2:
 # $\partial s/\partial Z=2a_1/(b_1b_2)$.
 #
-# **(10.7) Back through the window.** With $\nu=g_{\mathcal S}/(3n)$ on tissue and 0 elsewhere, the three partials become
+# **(11.7) Back through the window.** With $\nu=g_{\mathcal S}/(3n)$ on tissue and 0 elsewhere, the three partials become
 # the images $p,p_{xx},p_{xy}$. The window is symmetric and 0 outside the image, so the adjoint of $k*$ is $k*$ itself.
 # Then $\mathrm d(x^2)=2x\,\mathrm dx$ and $\mathrm d(xy)=y\,\mathrm dx$ give the last line.
 #
@@ -357,10 +357,10 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(10.8) Depth: each pixel.** With $m$ held fixed, $\partial|\hat D_p/m-D_p/m_D|/\partial\hat D_p=\sigma_p/m$, where
+# **(11.8) Depth: each pixel.** With $m$ held fixed, $\partial|\hat D_p/m-D_p/m_D|/\partial\hat D_p=\sigma_p/m$, where
 # $\sigma_p$ is the sign of the residual on valid pixels and 0 elsewhere.
 #
-# **(10.9) Depth: the maximum.** With the pixels held fixed, $\partial/\partial m$ of the same terms is
+# **(11.9) Depth: the maximum.** With the pixels held fixed, $\partial/\partial m$ of the same terms is
 # $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. The pixels $\mathcal P^\star$ of the maximum share it equally. The maximum $m_D$ of
 # the prior is held fixed.
 #
@@ -368,11 +368,11 @@ plt.show()
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
 # $$
 #
-# **(10.10) Smoothness: a pair.** $(\hat D_p-\hat D_{p'})^2$ has the gradient $2(\hat D_p-\hat D_{p'})$ at $p$ and its
+# **(11.10) Smoothness: a pair.** $(\hat D_p-\hat D_{p'})^2$ has the gradient $2(\hat D_p-\hat D_{p'})$ at $p$ and its
 # negative at $p'$. $|\bar x_p-\bar x_{p'}|$ has $\pm\operatorname{sign}(\bar x_p-\bar x_{p'})$. The adjoint of the difference of
 # neighbours along an axis is minus the difference of the padded gradients along this axis.
 #
-# **(10.11) Smoothness: a pixel.** A pixel has at most four neighbours; its gradient is the sum over their pairs. The
+# **(11.11) Smoothness: a pixel.** A pixel has at most four neighbours; its gradient is the sum over their pairs. The
 # weights $\nu_p\nu_{p'}$ and the edges $E$ are held fixed. On tissue $\bar D=0$ for every $\hat D$, so the total
 # variation has no gradient there.
 #
@@ -388,7 +388,7 @@ plt.show()
 # ```python
 # def masked_l1_reverse(d_loss, saved):
 #     """Reverse of (B6): d_rendered (C, H, W); sign(0) = 0."""
-#     return d_loss * np.sign(saved.difference) / max(saved.count, 1)  # (10.1)
+#     return d_loss * np.sign(saved.difference) / max(saved.count, 1)  # (11.1)
 # ```
 #
 # <!-- definition: endotsr.definition.masked_ssim.masked_ssim_reverse -->
@@ -397,7 +397,7 @@ plt.show()
 #     """Reverse of (B7): d_rendered (C, H, W). The window is symmetric, so it is its own adjoint."""
 #     x, _, slopes, (y, mask, count) = saved
 #     p, p_xx, p_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
-#     return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)  # (10.7)
+#     return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)  # (11.7)
 # ```
 #
 # <!-- definition: endotsr.definition.depth.normalised_depth_reverse -->
@@ -408,8 +408,8 @@ plt.show()
 #     if largest == 0:
 #         return np.zeros_like(depth)
 #     holders = depth == largest
-#     d_largest = -(sign * np.where(sign == 0, 0, depth)).sum() / largest**2  # (10.9)
-#     return d_loss / count * (sign / largest + holders * d_largest / holders.sum())  # (10.8)
+#     d_largest = -(sign * np.where(sign == 0, 0, depth)).sum() / largest**2  # (11.9)
+#     return d_loss / count * (sign / largest + holders * d_largest / holders.sum())  # (11.8)
 # ```
 #
 # <!-- definition: endotsr.definition.smoothness.steps_reverse -->
@@ -418,7 +418,7 @@ plt.show()
 #     """Adjoint of the differences of neighbours along an axis."""
 #     border = [(0, 0)] * d_steps.ndim
 #     border[axis] = (1, 1)
-#     return -np.diff(np.pad(d_steps, border), axis=axis)  # (10.10)
+#     return -np.diff(np.pad(d_steps, border), axis=axis)  # (11.10)
 # ```
 #
 # <!-- definition: endotsr.definition.smoothness.smoothness_reverse -->
@@ -461,7 +461,7 @@ for found, text in zip(
 # \tilde I_{cp}=e^{\gamma_{kc}}\,\hat I_{cp}+b_{kc}.
 # $$
 #
-# **(10.12) Exposure.** All pixels of a channel share two numbers, so their gradients are sums over the pixels:
+# **(11.12) Exposure.** All pixels of a channel share two numbers, so their gradients are sums over the pixels:
 # $g_{b_c}=\sum_pg_{\tilde I_{cp}}$ and $g_{\gamma_c}=e^{\gamma_c}\sum_pg_{\tilde I_{cp}}\hat I_{cp}$. The colour has
 # $g_{\hat I_{cp}}=e^{\gamma_c}g_{\tilde I_{cp}}$.
 #
@@ -478,7 +478,7 @@ for found, text in zip(
 # def exposure_reverse(d_exposed, saved):
 #     """Reverse of (B13)."""
 #     colour, gain = saved.colour, np.exp(saved.log_gain)
-#     d_log_gain = gain * (d_exposed * colour).sum(axis=(1, 2))  # (10.12)
+#     d_log_gain = gain * (d_exposed * colour).sum(axis=(1, 2))  # (11.12)
 #     return ExposureGrads(gain[:, None, None] * d_exposed, d_log_gain, d_exposed.sum(axis=(1, 2)))
 # ```
 
@@ -505,9 +505,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. Render and frame are equal. Which of the three partials (10.4) to (10.6) is 0 there, and why is their sum in (10.7)
+# 1. Render and frame are equal. Which of the three partials (11.4) to (11.6) is 0 there, and why is their sum in (11.7)
 #    0 as well?
-# 2. Write the pair of (B7) from (10.2) to (10.7) and let the golden cases judge it: `--only masked_ssim`
+# 2. Write the pair of (B7) from (11.2) to (11.7) and let the golden cases judge it: `--only masked_ssim`
 #    ({doc}`index`). The case `not_finite_under_mask` refuses a mask that multiplies.
 # 3. The cell below answers this one. The depth loss does not change when the rendered depth is multiplied by a
 #    constant. What follows for the sum $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that

@@ -11,15 +11,15 @@
 # ---
 
 # %% [markdown]
-# # 6. Perspective projection of a Gaussian
+# # 7. Perspective projection of a Gaussian
 #
 # An affine map sends a Gaussian to a Gaussian, and perspective is not affine. The centre is therefore projected
 # exactly, and the covariance by the first-order expansion of the projection at the centre (EWA splatting,
 # {doc}`/references`). The result is an ellipse on the screen.
 #
 # The input of this stage is a Gaussian with the centre $\mu$, the rotation $R$ and the semi-axes $S$ of
-# {doc}`05_covariance`, and a camera. The output is the centre $(u,v)$ of the ellipse in pixels, its covariance with
-# the entries $a,b,c$, and the depth $z$. {doc}`08_compositing` turns them into colours of pixels.
+# {doc}`06_covariance`, and a camera. The output is the centre $(u,v)$ of the ellipse in pixels, its covariance with
+# the entries $a,b,c$, and the depth $z$. {doc}`09_compositing` turns them into colours of pixels.
 #
 # The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`. The optional correction of the camera pose,
 # {eq}`eq-b16` of {doc}`/specification/b16_pose`, comes before it.
@@ -246,18 +246,18 @@ plt.show()
 # $g_z^{\mathrm{img}}$, the gradient with respect to $z$ that comes from the depth image. We differentiate from the
 # last line of the equation upward.
 #
-# **(6.1) The three numbers as a matrix.** A matrix of gradients $G_2$ must give the same change of the loss as the three
+# **(7.1) The three numbers as a matrix.** A matrix of gradients $G_2$ must give the same change of the loss as the three
 # numbers, $g_a\,\mathrm da+g_b\,\mathrm db+g_c\,\mathrm dc=\langle G_2,\mathrm d\Sigma_2\rangle$. $b$ stands in two entries
 # of the symmetric matrix $\Sigma_2$, so each of the two takes half of its gradient:
 # $G_2=\begin{bmatrix}g_a&g_b/2\\g_b/2&g_c\end{bmatrix}$.
 #
-# **(6.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (5.1), and
+# **(7.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (6.1), and
 # because $G_2$ is symmetric, $g_M=2\,G_2M$. The low-pass is a constant and drops out.
 #
-# **(6.3) Its factors.** $M_{rk}=T_{rk}S_k$ gives $g_{S_k}=\sum_rT_{rk}\,g_{M_{rk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
-# (5.2). The definition goes through $\Sigma$ and reaches the same $g_S$ and $g_R$.
+# **(7.3) Its factors.** $M_{rk}=T_{rk}S_k$ gives $g_{S_k}=\sum_rT_{rk}\,g_{M_{rk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
+# (6.2). The definition goes through $\Sigma$ and reaches the same $g_S$ and $g_R$.
 #
-# **(6.4) The three matrices.** $T=JWR$ gives $\mathrm dT=\mathrm dJ\,WR+J\,\mathrm dW\,R+JW\,\mathrm dR$. A factor to the
+# **(7.4) The three matrices.** $T=JWR$ gives $\mathrm dT=\mathrm dJ\,WR+J\,\mathrm dW\,R+JW\,\mathrm dR$. A factor to the
 # left of the differential moves to the left of $g_T$, transposed; a factor to the right moves to the right:
 # $g_J=g_T(WR)^\top$, $g_R=(JW)^\top g_T$, and $g_W$ receives $J^\top g_TR^\top$.
 #
@@ -268,17 +268,17 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(6.5) The footprint.** $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer of {doc}`08_compositing`
+# **(7.5) The footprint.** $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer of {doc}`09_compositing`
 # does not use $a,b,c$ but three other numbers, the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$, and returns their
 # gradients $g_A,g_m,g_r$. From them one can go directly to $S$ and $T$, without $g_a,g_b,g_c$ as numbers. This takes
-# four steps. (A first reading can skip them: (6.2) and (6.3) give the same gradients in float64.)
+# four steps. (A first reading can skip them: (7.2) and (7.3) give the same gradients in float64.)
 #
 # *The entries.* With the rows $\mathbf t_0,\mathbf t_1$ of $T$: $a=\sum_kS_k^2t_{0k}^2+\varepsilon$,
 # $b=\sum_kS_k^2t_{0k}t_{1k}$ and $c=\sum_kS_k^2t_{1k}^2+\varepsilon$. So $\partial(a,b,c)/\partial
 # S_k=2S_k\,(t_{0k}^2,\ t_{0k}t_{1k},\ t_{1k}^2)$, $\partial(a,b)/\partial t_{0k}=S_k^2\,(2t_{0k},\ t_{1k})$ and
 # $\partial(b,c)/\partial t_{1k}=S_k^2\,(t_{0k},\ 2t_{1k})$.
 #
-# *The semi-axes.* The chain rule from $(A,m,r)$ to $(a,b,c)$, step (8.8) of {doc}`08_compositing`, is $g_a=-A^2g_A$,
+# *The semi-axes.* The chain rule from $(A,m,r)$ to $(a,b,c)$, step (9.8) of {doc}`09_compositing`, is $g_a=-A^2g_A$,
 # $g_b=2A^2m\,g_A+r\,g_m$ and $g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r$. Insert it into
 # $g_{S_k}=2S_k\,(g_at_{0k}^2+g_bt_{0k}t_{1k}+g_ct_{1k}^2)$ and collect. The terms with $g_A$ are
 # $-A^2(t_{0k}^2-2m\,t_{0k}t_{1k}+m^2t_{1k}^2)=-A^2e_k^2$ with $e_k=t_{0k}-m\,t_{1k}$. Those with $g_m$ are
@@ -306,19 +306,19 @@ plt.show()
 #
 # The centre comes next. It enters through $(u,v)$ and through $J$.
 #
-# **(6.6) The last column of $J$.** $J_{02}=-f_xx'/z^2$, so $g_{x'}=-f_x/z^2\,g_{J_{02}}$, and in the same way for $y'$.
+# **(7.6) The last column of $J$.** $J_{02}=-f_xx'/z^2$, so $g_{x'}=-f_x/z^2\,g_{J_{02}}$, and in the same way for $y'$.
 #
-# **(6.7) The clamp.** $x'=z\,\mathrm{clip}(x/z)$. Where the clip is not active, $x'=x$ and $g_{x'}$ goes to $x$. Where
+# **(7.7) The clamp.** $x'=z\,\mathrm{clip}(x/z)$. Where the clip is not active, $x'=x$ and $g_{x'}$ goes to $x$. Where
 # it is active, $x'=\pm zL_x$ does not depend on $x$ but does depend on $z$: $\partial x'/\partial z=\pm L_x=x'/z$.
 #
-# **(6.8) Screen position.** $u=f_xx/z+c_x$ gives $\mathrm du=\frac{f_x}z\mathrm dx-\frac{f_xx}{z^2}\mathrm dz$, and in the
+# **(7.8) Screen position.** $u=f_xx/z+c_x$ gives $\mathrm du=\frac{f_x}z\mathrm dx-\frac{f_xx}{z^2}\mathrm dz$, and in the
 # same way for $v$.
 #
-# **(6.9) The depth in $J$.** With $x'$ held fixed, $\partial J_{00}/\partial z=-f_x/z^2$ and
+# **(7.9) The depth in $J$.** With $x'$ held fixed, $\partial J_{00}/\partial z=-f_x/z^2$ and
 # $\partial J_{02}/\partial z=2f_xx'/z^3$. The definition keeps the slope $x'/z$ fixed instead: $J_{02}=-f_x(x'/z)/z$ then
-# has a single $1/z$, and the rest is the term of (6.7).
+# has a single $1/z$, and the rest is the term of (7.7).
 #
-# **(6.10) Into the world.** $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
+# **(7.10) Into the world.** $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
 #
 #
 # $$
@@ -331,10 +331,10 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(6.11) The pose.** $(x,y,z)^\top=W\mu+\mathbf d$ also gives the gradient with respect to $\mathbf d$, and the
-# second part of the one with respect to $W$; the first part is that of (6.4). Both are sums over all Gaussians.
+# **(7.11) The pose.** $(x,y,z)^\top=W\mu+\mathbf d$ also gives the gradient with respect to $\mathbf d$, and the
+# second part of the one with respect to $W$; the first part is that of (7.4). Both are sums over all Gaussians.
 # $\mathbf o=-W^\top\mathbf d$ is the centre of the camera. Its gradient $g_{\mathbf o}$ comes from the viewing
-# directions of {doc}`07_harmonics` and is added there.
+# directions of {doc}`08_harmonics` and is added there.
 #
 # $$
 # \begin{aligned}
@@ -353,12 +353,12 @@ plt.show()
 #     point = np.where(visible, w @ position + camera.translation[:, None], 1)
 #     j, slope, free = jacobian(point, camera, settings)
 #     g_sigma, g_t = covariance_reverse_parts(d_covariance2d, saved, point)
-#     g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (5.1)
-#     d_scale = (shape.rotation * g_m).sum(axis=0)  # (5.2), (6.3)
+#     g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (6.1)
+#     d_scale = (shape.rotation * g_m).sum(axis=0)  # (6.2), (7.3)
 #     g_j = np.einsum("ikn,jk->ijn", g_t, w)
 #     g_point = point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera)
-#     d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (6.4), (6.11)
-#     return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (6.10)
+#     d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (7.4), (7.11)
+#     return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (7.10)
 # ```
 #
 # <!-- definition: endotsr.definition.projection.point_reverse -->
@@ -368,10 +368,10 @@ plt.show()
 #     z = point[2]
 #     focal = np.array([[camera.fx], [camera.fy]])
 #     by_slope = np.array([g_j[0, 2], g_j[1, 2]])
-#     g_slope = -focal / z * by_slope  # J_02 = -f (x'/z) / z; (6.6)
-#     g_clipped = np.where(free, g_slope, 0)  # ruling: exact derivative of the clamp; (6.7)
-#     g_xy = (focal * d_mean2d + g_clipped) / z  # (6.8)
-#     by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * by_slope)  # (6.9)
+#     g_slope = -focal / z * by_slope  # J_02 = -f (x'/z) / z; (7.6)
+#     g_clipped = np.where(free, g_slope, 0)  # ruling: exact derivative of the clamp; (7.7)
+#     g_xy = (focal * d_mean2d + g_clipped) / z  # (7.8)
+#     by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * by_slope)  # (7.9)
 #     g_z = d_depth + (by_scale - g_xy * point[:2] / z).sum(axis=0)
 #     return np.concatenate([g_xy, [g_z]])
 # ```
@@ -388,7 +388,7 @@ for settings, text_settings in presets:
 g_d, g_W = text.d_camera.d_translation, text.d_camera.d_rotation
 
 # %% [markdown]
-# The definition does not contain the direct form (6.5); only the compiled function needs it, in float32. It gives the
+# The definition does not contain the direct form (7.5); only the compiled function needs it, in float32. It gives the
 # same gradients as the form through $(a,b,c)$:
 
 
@@ -461,20 +461,20 @@ for name in ("position", "rotation", "scale"):
 # p=\boldsymbol\omega\times\mathbf p$, and $E$ is its exponential, a rotation. The view is rendered with $W'$ and
 # $\mathbf d'$, and the projection above returns the gradients with respect to them.
 #
-# **(6.12) The two products.** $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
+# **(7.12) The two products.** $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
 # $g_{\mathbf d}=E^\top g_{\mathbf d'}$, $g_{\boldsymbol\tau}=g_{\mathbf d'}$ and
 # $G=g_E=g_{W'}W^\top+g_{\mathbf d'}\mathbf d^\top$.
 #
-# **(6.13) The closed form.** Let $K=[\boldsymbol\omega]_\times$, so $E=I+\alpha K+\beta K^2$. Every entry of $E$
+# **(7.13) The closed form.** Let $K=[\boldsymbol\omega]_\times$, so $E=I+\alpha K+\beta K^2$. Every entry of $E$
 # depends on $\omega_i$ in two ways. The first is $K$ itself, with $\partial K/\partial\omega_i=[\mathbf e_i]_\times$.
 # The second is $r$ in the two factors: $\partial r/\partial\omega_i=\omega_i/r$, and their derivatives with respect to
 # $\omega_i$ are $\omega_i\alpha'$ and $\omega_i\beta'$ with $\alpha'=(\cos r-\alpha)/r^2$ and
 # $\beta'=(\alpha-2\beta)/r^2$. The compiled function sums these parts:
 # $g_{\omega_i}=\langle\alpha G+\beta(GK^\top+K^\top G),[\mathbf e_i]_\times\rangle+\omega_i\langle G,\alpha'K+\beta'K^2\rangle$.
 #
-# **(6.14) The definition** needs no derivative of a series. The exponential of the block matrix
+# **(7.14) The definition** needs no derivative of a series. The exponential of the block matrix
 # $\begin{bmatrix}K^\top&G\\0&K^\top\end{bmatrix}$ has $E^\top$ in its diagonal blocks and $g_K$ in the upper right one.
-# The spin of (5.5) turns $g_K$ into $g_{\boldsymbol\omega}$.
+# The spin of (6.5) turns $g_K$ into $g_{\boldsymbol\omega}$.
 #
 # <!-- definition: endotsr.definition.pose.exponential -->
 # ```python
@@ -502,8 +502,8 @@ for name in ("position", "rotation", "scale"):
 #     """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]^T."""
 #     rotation, translation, vector = saved
 #     k = (CROSS @ vector).T
-#     g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (6.12)
-#     both = exponential(np.block([[k, g], [np.zeros((3, 3)), k]]))  # (6.14)
+#     g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (7.12)
+#     both = exponential(np.block([[k, g], [np.zeros((3, 3)), k]]))  # (7.14)
 #     e, d_cross = both[:3, :3].T, both[:3, 3:]
 #     return PoseGrads(e.T @ d_rotation, e.T @ d_translation, np.einsum("ij,ijk->k", d_cross, CROSS), d_translation)
 # ```
@@ -524,7 +524,7 @@ for array, text in zip(
 ):
     np.testing.assert_allclose(array, text, rtol=1e-11)
 
-# (6.13), written out
+# (7.13), written out
 K, r = pose_definition.CROSS @ omega, np.linalg.norm(omega)
 alpha, beta = np.sin(r) / r, (1 - np.cos(r)) / r**2
 G = g_W @ W.T + np.outer(g_d, d)
@@ -551,8 +551,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. A Gaussian is on the optical axis. Which entries of $J$ are 0, and which gradients does $g_z$ then lack in (6.9)?
-# 2. Write `pose_reverse` from (6.12) and (6.13) and let the golden cases judge it: `--only pose` ({doc}`index`).
+# 1. A Gaussian is on the optical axis. Which entries of $J$ are 0, and which gradients does $g_z$ then lack in (7.9)?
+# 2. Write `pose_reverse` from (7.12) and (7.13) and let the golden cases judge it: `--only pose` ({doc}`index`).
 # 3. The cell below answers this one. Make everything twice as large: positions, semi-axes, the
 #    translation of the camera, the near plane. What happens to $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the
 #    gradient with respect to the position?

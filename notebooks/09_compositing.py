@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # 8. Compositing, and its reverse pass line by line
+# # 9. Compositing, and its reverse pass line by line
 #
 # At a pixel the Gaussians are ordered by depth. From front to back, each absorbs a fraction of the light that remains.
 # This is the central stage of the renderer. Its reverse pass is derived here line by line.
@@ -259,23 +259,23 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # A loss gives $g_{\hat I},g_{\hat D},g_{\hat O}$ at each pixel. We need gradients with respect to every $\alpha_k$,
 # colour and depth.
 #
-# **(8.1) The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
+# **(9.1) The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
 # $\hat I=R_0$. Gaussian $k$ covers the fraction $\alpha_k$ of the colour behind it:
 # $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$, ending with $R_n=\mathbf{bg}$.
 #
-# **(8.2) Its weight in the pixel.** Unrolling (8.1) from the front gives
+# **(9.2) Its weight in the pixel.** Unrolling (9.1) from the front gives
 # $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$. So $\partial\hat I/\partial R_k=T_k$: every change behind is weighted by
 # the transmittance in front.
 #
-# **(8.3) One opacity.** $T_k$ does not depend on $\alpha_k$, only on the opacities in front. $R_{k+1}$ does not
+# **(9.3) One opacity.** $T_k$ does not depend on $\alpha_k$, only on the opacities in front. $R_{k+1}$ does not
 # depend on it either, only on the opacities behind. So
 # $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. More opacity adds colour of
 # Gaussian $k$ and removes colour behind it.
 #
-# **(8.4) Depth and opacity** are the same sum, with $z_k$ or $1$ instead of the colour and 0 as background. They give
+# **(9.4) Depth and opacity** are the same sum, with $z_k$ or $1$ instead of the colour and 0 as background. They give
 # $Z_k$ and $Q_k$.
 #
-# **(8.5) Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
+# **(9.5) Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
 #
 # There is no division by $1-\alpha_k$, so $\alpha_k=1$ is not a special case:
 #
@@ -290,11 +290,11 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # \end{aligned}
 # $$
 #
-# **(8.6) From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
+# **(9.6) From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
 # $\alpha=o\,e^{-q/2}$, so $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and
 # $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
 #
-# **(8.7) Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
+# **(9.7) Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
 # $\mathrm d d_y=-\mathrm dv$:
 #
 # $$
@@ -305,7 +305,7 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # \end{aligned}
 # $$
 #
-# **(8.8) Once per Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
+# **(9.8) Once per Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
 # $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
 # $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
 #
@@ -315,7 +315,7 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 
 #
 # The definition goes from $q$ to the covariance in one step, $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$
-# with $Q=\Sigma^{-1}$, instead of (8.8). The sums are the same.
+# with $Q=\Sigma^{-1}$, instead of (9.8). The sums are the same.
 #
 # <!-- definition: endotsr.definition.compositing.composite_reverse -->
 # ```python
@@ -327,15 +327,15 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 #     for i, dx, dy, value, alpha, front, taken in reversed(layers):
 #         own = np.einsum("c,chw->hw", colour[:, i], d_colour) + projected.depth[i] * d_depth + d_opacity
 #         passes = taken & (value <= settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
-#         power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (8.3), (8.6)
+#         power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (9.3), (9.6)
 #         (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
-#         px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (8.7)
+#         px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (9.7)
 #         out.d_mean2d[:, i] = (power * px).sum(), (power * py).sum()
 #         out.d_covariance2d[:, i] = np.array([power * px**2 / 2, power * px * py, power * py**2 / 2]).sum((1, 2))
 #         out.d_opacity_logit[i] = power.sum() * opacity_of(-logit[i])
 #         weight = np.where(taken, alpha * front, 0)
-#         out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()  # (8.5)
-#         rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)  # (8.1)
+#         out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()  # (9.5)
+#         rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)  # (9.1)
 #     return out._replace(d_background=(d_colour * t).sum((1, 2)))
 # ```
 
@@ -377,7 +377,7 @@ for settings in (PAPER, EXACT):
 # The examples above have five Gaussians. The running clip of this book is a simulated clip of 63 frames of 640x512, and
 # the scene below was trained on it ({doc}`14_full_sequence`). The frame is held out: training did not use it. At the
 # marked pixel the model is wrong: a highlight is narrower in the render than in the frame. The bars are the terms of the
-# blend: many faint Gaussians, and most of them behind others. The right panel has $g_{\alpha_k}$ of (8.3) for the loss
+# blend: many faint Gaussians, and most of them behind others. The right panel has $g_{\alpha_k}$ of (9.3) for the loss
 # $\frac12\|\hat I-I\|^2$. A negative gradient asks for more opacity. Which contributors should have one, the white or
 # the red ones?
 
@@ -402,7 +402,7 @@ for k in np.flatnonzero(alphas >= PAPER.alpha_cutoff):  # the scene is stored fr
 g_pixel = (
     sum(alpha * front * colour for alpha, front, colour in terms) - clip.image[:, row, column]
 )
-pulls, behind, R = [], [], np.zeros(3)  # (8.1), (8.3): back to front
+pulls, behind, R = [], [], np.zeros(3)  # (9.1), (9.3): back to front
 for alpha, front, colour in reversed(terms):
     pulls.append(front * (colour - R) @ g_pixel)
     behind.append(R)
@@ -436,7 +436,7 @@ print(f"error of the pixel: {np.abs(g_pixel).max() * 255:.0f} of 255")
 
 # %% [markdown]
 # The render has too little green and blue, so the gradient is negative where the colour has more of both than $R_{k+1}$,
-# the colour **behind**. (8.3) does not compare with the frame: one of the whiter half of the contributors has a positive
+# the colour **behind**. (9.3) does not compare with the frame: one of the whiter half of the contributors has a positive
 # gradient, as it hides something whiter. And the gradients are small where $T_k$ is small: a Gaussian at the back changes
 # the picture only after those in front of it have become fainter.
 
@@ -460,7 +460,7 @@ np.testing.assert_allclose(
 #
 # The grey box is the light that reaches a Gaussian, and the coloured part is the light that it absorbs. The loss is half
 # the squared distance to the target colour. Before you drag a handle: if the second opacity becomes 1, which gradients
-# become 0, that of the first, of the second or of the third? Derive it from (8.3), then try.
+# become 0, that of the first, of the second or of the third? Derive it from (9.3), then try.
 #
 # <div class="widget" data-widget="compositing">The figure is live in the built book.</div>
 
@@ -482,9 +482,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. A pixel has two contributors, both with $\alpha=\frac12$ and the same colour $c$. Use (8.3) to show that both
+# 1. A pixel has two contributors, both with $\alpha=\frac12$ and the same colour $c$. Use (9.3) to show that both
 #    opacities have the same gradient, and that it is 0 where $c$ equals the background.
-# 2. Write the pair of {eq}`eq-b5` from (8.1) to (8.8) and let the golden cases judge it: `--only composite`
+# 2. Write the pair of {eq}`eq-b5` from (9.1) to (9.8) and let the golden cases judge it: `--only composite`
 #    ({doc}`index`). The case `opaque_exact` refuses a division by $1-\alpha$.
 # 3. The cell below answers this one. At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to back.
 #    Which of the three opacities and colours have a gradient? Many programs recover $T_k$ in the reverse pass by

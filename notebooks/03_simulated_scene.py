@@ -11,11 +11,15 @@
 # ---
 
 # %% [markdown]
-# # 13. The simulated scene, and where the Gaussians start
+# # 3. The simulated scene, and where the Gaussians start
 #
 # For a real sequence the true motion, the true depth behind the instrument and the true light are unknown. The
 # simulator provides them: it renders a sheet of tissue given by a formula, under an endoscope, and each effect has a
-# switch. This notebook also shows how the first Gaussians are made.
+# switch.
+#
+# The second half of this chapter shows how the first Gaussians are made. It names the projection, the colour and the
+# opacity of a Gaussian, the subjects of chapters 7 to 9. A first reading can leave it out and return to it before
+# {doc}`13_optimiser_and_density`.
 #
 # The equation is {eq}`eq-b12` of {doc}`/specification/b12_initialisation`.
 
@@ -171,27 +175,27 @@ plt.show()
 # The first Gaussians should show the first frame roughly, so that gradients begin near the tissue. Each pixel $(i,j)$ that
 # is drawn in a training frame, with colour and depth $D$, becomes one Gaussian.
 #
-# **(13.1) The ray.** The projection of chapter 6 has $u=f_xx/z+c_x$. A pixel is sampled at its centre, $u=i+\frac12$, and
+# **(3.1) The ray.** The projection of chapter 7 has $u=f_xx/z+c_x$. A pixel is sampled at its centre, $u=i+\frac12$, and
 # its depth is $z=D$, so $x=(i+\frac12-c_x)\,D/f_x$, and in the same way for $y$.
 #
-# **(13.2) Into the world.** The camera has $(x,y,z)^\top=W\mu+\mathbf d$. $W$ is a rotation, so its inverse is $W^\top$:
+# **(3.2) Into the world.** The camera has $(x,y,z)^\top=W\mu+\mathbf d$. $W$ is a rotation, so its inverse is $W^\top$:
 #
 # $$
 # \mu=W^\top\left(\begin{bmatrix}(i+\tfrac12-c_x)\,D/f_x\\(j+\tfrac12-c_y)\,D/f_y\\D\end{bmatrix}-\mathbf d\right)
 # $$
 #
-# **(13.3) Colour.** The harmonics above degree 0 start at 0, so the displayed colour is $rgb=Y_{00}h_0+\frac12$ and
+# **(3.3) Colour.** The harmonics above degree 0 start at 0, so the displayed colour is $rgb=Y_{00}h_0+\frac12$ and
 # $h_0=(rgb-\frac12)/Y_{00}$.
 #
-# **(13.4) Size.** All three semi-axes are the root mean square distance to the three nearest other points, so
+# **(3.4) Size.** All three semi-axes are the root mean square distance to the three nearest other points, so
 # neighbours overlap and leave no holes. Two points may coincide; the floor keeps the logarithm finite:
 # $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. A sphere needs no rotation.
 #
-# **(13.5) Opacity** starts at 0.1. By (8.3) the gradient of a Gaussian is proportional to the light that reaches it. If all
+# **(3.5) Opacity** starts at 0.1. By (9.3) the gradient of a Gaussian is proportional to the light that reaches it. If all
 # Gaussians started opaque, those behind the first would have almost none.
 #
-# **(13.6) Motion.** The weights of the time bases start at 0 and their centres are evenly spaced: the scene is at rest.
-# By (3.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
+# **(3.6) Motion.** The weights of the time bases start at 0 and their centres are evenly spaced: the scene is at rest.
+# By (4.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
 
 
 # %% tags=["transcription"]
