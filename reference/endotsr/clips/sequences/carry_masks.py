@@ -12,8 +12,8 @@ and the mask is c_i > 1/2. With a margin, it is c_i > 1/4, grown by `margin` pix
 side is enough, near a key the far side alone is not. A mask that is too large costs less than one that is too small.
 
 Tissue that an instrument uncovers has no place in the frame before, where the flow of that side is wrong; the other
-side knows it. A check of the flow there and back finds such pixels, and others: in a trial on EndoNeRF pulling, of which
-no record is kept, it lowered the mean intersection over union. It is not used.
+side knows it. A check of the flow there and back finds such pixels, and others: in a trial on EndoNeRF pulling, of
+which no record is kept, it lowered the mean intersection over union. It is not used.
 
 The agreement of a frame is the intersection over union of the two sides. A frame below LEAST_AGREEMENT is not trusted
 and is named. The frame to draw next lies in the gap between keys that loses most agreement, where the sides disagree
