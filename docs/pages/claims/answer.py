@@ -68,13 +68,12 @@ def level(folder: Path, found: Record, clip: str) -> str:
     published = PUBLISHED[clip]["psnr_full"] or 0.0
     values = list(runs_of(found, FULL, "psnr_full").values())
     mean, limits = student(values)
-    verdict = "is not reached" if limits is not None and limits[1] < published else "is reached"
-    text = f"The published level, {published:.2f} dB, {verdict}: {shown(values, 2)} dB."
+    said = f"published level, {published:.2f} dB,"
     if limits is None:
-        text = (
-            f"Whether the published level, {published:.2f} dB, is reached is not decided: one seed has {mean:.2f} dB."
-        )
-    half = 0.0 if limits is None else limits[1] - mean
+        text, half = f"Whether the {said} is reached is not decided: one seed has {mean:.2f} dB.", 0.0
+    else:
+        verdict, half = "is not reached" if limits[1] < published else "is reached", limits[1] - mean
+        text = f"The {said} {verdict}: {shown(values, 2)} dB."
     return f"{text} {beaten(folder, clip, mean, 'The reproduction is', half)}".strip()
 
 

@@ -17,6 +17,11 @@ def few(pairs: int) -> str:
     return f"not decided: {pairs} of {LEAST_PAIRS} seeds"
 
 
+def unless_few(verdict: str, pairs: int) -> str:
+    """A verdict, if there are enough seeds for one."""
+    return verdict if pairs >= LEAST_PAIRS else few(pairs)
+
+
 def seeds_of(count: int) -> str:
     """A number of seeds in words."""
     return "one seed" if count == 1 else f"{count} seeds"

@@ -13,13 +13,12 @@ from endotsr.results.report.tables import markdown
 from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS, Contrast
 from pages.claims.estimates import Estimate, Interval, averaged, contrast, runs_of
 from pages.claims.rules import (
-    LEAST_PAIRS,
-    few,
     increment_verdict,
     largest_verdict,
     level_verdict,
     no_change_verdict,
     seeds_of,
+    unless_few,
 )
 from pages.store.intervals import interval
 from pages.store.published import MATCHED_LPIPS, MATCHED_PSNR, PRIOR, PUBLISHED
@@ -165,8 +164,7 @@ def _base_row(found: Record, clip: str) -> list[str]:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
     mean, limits = student(values)
     inside = level - most - 0.005 <= mean <= level - least + 0.005
-    verdict = "the mean lies inside" if inside else "the mean lies outside"
-    verdict = verdict if len(values) >= LEAST_PAIRS else few(len(values))
+    verdict = unless_few("the mean lies inside" if inside else "the mean lies outside", len(values))
     return [*claim, f"{mean:.2f} dB", seeds_of(len(values)), between(limits, "{:.2f} dB"), verdict, "-", "-"]
 
 
@@ -212,7 +210,7 @@ def _median_row(found: Record, key: str) -> list[str]:
     inside = first - ROUNDED[key] <= estimate.median <= last + ROUNDED[key]
     better = estimate.median > last if metric.larger else estimate.median < first
     verdict = "inside the range" if inside else "better than the range" if better else "short of the range"
-    verdict = verdict if len(estimate.values) >= LEAST_PAIRS else few(len(estimate.values))
+    verdict = unless_few(verdict, len(estimate.values))
     return [*claim, metric.signed.format(estimate.median), _cells(estimate, metric)[1], "-", verdict, "-", "-"]
 
 
@@ -225,10 +223,8 @@ def _every_seed_row(found: Record) -> list[str]:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
     shown = ", ".join(f"{METRICS[key].label} {wins} of {seeds}" for key, (wins, seeds) in counts.items())
     seeds = max(seeds for _, seeds in counts.values())
-    holds = all(wins == of for wins, of in counts.values())
-    verdict = (
-        few(seeds) if holds and seeds < LEAST_PAIRS else f"{'holds' if holds else 'does not hold'} in {seeds} seeds"
-    )
+    holds = all(wins == of for wins, of in counts.values())  # one seed that does not improve decides
+    verdict = unless_few(f"holds in {seeds} seeds", seeds) if holds else f"does not hold in {seeds_of(seeds)}"
     return [*claim, "-", shown, "-", verdict, "-", "-"]
 
 

@@ -105,7 +105,6 @@ def from_files(folder: Path, source: Path, kind: Kind, scale: float, pairing: Pa
     frames = (
         _without_mark(depth_of_values(read_plane(file), kind, scale, intrinsics, baseline, file), kind, file)
         for file in files
-        if file is not None
     )
     return MadeDepth(frames, f"{kind} from {source.name}", "", note)
 
@@ -159,7 +158,7 @@ def from_relative(
             f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
     files, note = every_frame(clip, list_pictures(source, DEPTH_ENDINGS), pairing)
-    made = relative_depth(clip, source, [file for file in files if file], align, farthest, trusted)
+    made = relative_depth(clip, source, files, align, farthest, trusted)
     return made._replace(note=note)
 
 

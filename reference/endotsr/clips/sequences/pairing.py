@@ -7,7 +7,7 @@ In: frames and files. Out: one file per frame or None, with a sentence where the
 """
 
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, NoReturn
 
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import check_pairing, frame_numbers, shortened
@@ -56,23 +56,35 @@ def paired(
     way = _chosen(found, frames, files) if pairing == "auto" else pairing
     chosen = found[way]
     if chosen is None:
-        _refuse_names(frames, files)
-    assert chosen is not None
+        _refuse_names(frames, files, _order_hint(count, files))
     notes = [f"{files[0].parent.name}: paired by {WAYS[way]}"] if way == "source" else []
     if unused := [file.name for file in files if file not in set(chosen)]:
         notes.append(f"{files[0].parent.name}: belonging to no frame, not used: {shortened(unused)}")
     return Paired(chosen, "; ".join(notes))
 
 
-def every_frame(clip: Clip, files: list[Path], pairing: Pairing = "auto") -> Paired:
-    """`paired` for the frames of a clip. Raises InputError also for a frame without a file."""
+def every_frame(clip: Clip, files: list[Path], pairing: Pairing = "auto") -> tuple[list[Path], str]:
+    """The file of each frame of a clip, and the note, as `paired`. Raises InputError also for a frame without one."""
     found = paired(clip.images, files, pairing, clip.source_names)
-    lacking = [name for name, file in zip(clip.names, found.files) if file is None]
-    if lacking:
+    if lacking := [name for name, file in zip(clip.names, found.files) if file is None]:
         raise InputError(
             f"{files[0].parent}: has no file for frame {shortened(lacking)}; {len(files)} files for {clip.count}"
             " frames; allowed: one file per frame"
         )
+    return [file for file in found.files if file is not None], found.note
+
+
+def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | None]:
+    """The file with the number of each frame, or None: `paired` by number, for the folders of a layout.
+
+    Edges:   a single file matches all frames; without numbers, files are paired with frame files by name.
+    Raises:  InputError if nothing matches. Files and frames may be left over.
+    """
+    if len(files) == 1:
+        return [files[0]] * (frames if isinstance(frames, int) else len(frames))
+    found = _by_number(frames, files)
+    if found is None:
+        _refuse_names(frames, files)
     return found
 
 
@@ -102,8 +114,9 @@ def _chosen(
 ) -> Literal["number", "source"]:
     """The way of `auto`. Raises InputError where none or several are possible."""
     possible = {way: found for way, found in ways.items() if found is not None}
+    count = frames if isinstance(frames, int) else len(frames)
     if not possible:
-        _refuse_names(frames, files)
+        _refuse_names(frames, files, _order_hint(count, files))
     fits = {
         "every frame has a file": [way for way, found in possible.items() if all(found)],
         "every file has a frame": [way for way, found in possible.items() if set(files) <= set(found)],
@@ -114,7 +127,6 @@ def _chosen(
             raise InputError(f"{files[0].parent}: {meaning} in two ways that differ; allowed: {said}")
         if fitting:
             return "number" if "number" in fitting else "source"
-    count = frames if isinstance(frames, int) else len(frames)
     lines = [
         f"by {WAYS[way]}, {found.count(None)} of {count} frames have no file and {len(set(files) - set(found))} of"
         f" {len(files)} files no frame"
@@ -127,16 +139,19 @@ def _chosen(
     )
 
 
-def _refuse_names(frames: list[Path] | int, files: list[Path]) -> None:
+def _order_hint(count: int, files: list[Path]) -> str:
+    """The end of a refusal where the files could be paired in order."""
+    return f"; allowed: --pairing order ({WAYS['order']})" if len(files) == count else ""
+
+
+def _refuse_names(frames: list[Path] | int, files: list[Path], hint: str = "") -> NoReturn:
     """Raises InputError for names that cannot be paired by number."""
     where, numbers = files[0].parent, frame_numbers(files)
-    count = frames if isinstance(frames, int) else len(frames)
-    order = f"; allowed: --pairing order ({WAYS['order']})" if len(files) == count else ""
     if isinstance(frames, int):
         if numbers is None or len(numbers[0]) != 1:
-            raise InputError(f"{where}: names without one frame number, such as {files[0].name}{order}")
-        raise InputError(f"{where}: no file has a number from 0 to {frames - 1}, such as {files[0].name}{order}")
+            raise InputError(f"{where}: names without one frame number, such as {files[0].name}{hint}")
+        raise InputError(f"{where}: no file has a number from 0 to {frames - 1}, such as {files[0].name}{hint}")
     wanted = frame_numbers(frames)
     if wanted is None or numbers is None or len(wanted[0]) != len(numbers[0]):
         check_pairing(frames, files)
-    raise InputError(f"{where}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}{order}")
+    raise InputError(f"{where}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}{hint}")

@@ -15,7 +15,7 @@ from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, scene_factor
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
-from endotsr.clips.sequences.files import check_pairing, frame_numbers, list_pictures
+from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
 from endotsr.clips.sequences.pairing import paired
 from endotsr.clips.sequences.smaller import nearest_pixels
@@ -112,35 +112,6 @@ def masks_of(files: list[Path | None], excluded_value: str, width: int, height: 
         return nearest_pixels(tissue, width, height, path)
 
     return Masks(mask, excluded_value=excluded_value, proposed=proposed)
-
-
-def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | None]:
-    """The file with the number of each frame, or None. A single file, such as a field of view, matches all frames.
-
-    frames   files, or the count of a video, whose frames have the numbers 0 .. count - 1
-
-    Edges:   without numbers, files are paired with frame files by name.
-    Raises:  InputError if nothing matches.
-    """
-    if len(files) == 1:
-        return [files[0]] * (frames if isinstance(frames, int) else len(frames))
-    numbers, where = frame_numbers(files), files[0].parent
-    if isinstance(frames, int):
-        if numbers is None or len(numbers[0]) != 1:
-            raise InputError(f"{where}: names without one frame number, such as {files[0].name}")
-        wanted = [(i,) for i in range(frames)]
-        missing = f"{where}: no file has a number from 0 to {frames - 1}, such as {files[0].name}"
-    else:
-        wanted = frame_numbers(frames)
-        if wanted is None or numbers is None or len(wanted[0]) != len(numbers[0]):
-            check_pairing(frames, files)
-            return list(files)
-        missing = f"{where}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}"
-    by_number = dict(zip(numbers, files))
-    found = [by_number.get(number) for number in wanted]
-    if not any(found):
-        raise InputError(missing)
-    return found
 
 
 def depth_of(files: list[Path | None], scale: float) -> Depth:

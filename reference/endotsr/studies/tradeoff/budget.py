@@ -57,34 +57,45 @@ def _quotient(numerator: float, denominator: float) -> float:
 
 
 def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
-    """The best setting within the budget, on the Pareto front of error against forward time.
+    """The best setting within the budget, with what to expect. Raises InputError as `best_point`, naming the option."""
+    try:
+        chosen = best_point(result, budget)
+    except InputError as error:
+        raise InputError(f"--budget {budget.text}: {error}") from None
+    where = f"measured on {_scene(result)}"
+    return Advice(chosen, [f"{budget.text}: {chosen['name']}", *_expectation(chosen), where])
+
+
+def _scene(result: dict[str, Any]) -> str:
+    about = result["scene"]
+    return f"{about['gaussians']} Gaussians at {about['width']}x{about['height']} ({about['name']})"
+
+
+def best_point(result: dict[str, Any], budget: Budget) -> dict[str, Any]:
+    """The point of the best setting within the budget, on the Pareto front of error against forward time.
 
     For a time budget: the most accurate setting with its upper quartile within the budget. For an error budget: the
     fastest setting with its largest error within the budget. Raises InputError with the reason if there is none.
     """
     by_name = {p["name"]: p for p in result["points"]}
     front = [by_name[name] for name in result["fronts"]["forward"]]
-    about = result["scene"]
-    where = f"{about['gaussians']} Gaussians at {about['width']}x{about['height']} ({about['name']})"
     if budget.kind == "frame":
         kept = [p for p in front if p["forward"]["high"] <= budget.amount]
         if not kept:
             least = min(front, key=lambda p: p["forward"]["high"])
             raise InputError(
-                f"--budget {budget.text}: no measured setting renders {where} that fast; the fastest is "
+                f"no measured setting renders {_scene(result)} that fast; the fastest is "
                 f"{least['name']} with {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels are faster"
             )
-        chosen = min(kept, key=lambda p: p["error"]["max"])
-    else:
-        kept = [p for p in front if p["error"]["max"] <= budget.amount]
-        if not kept:
-            best = min(front, key=lambda p: p["error"]["max"])
-            raise InputError(
-                f"--budget {budget.text}: no measured setting reaches this error on {where}; the most accurate is "
-                f"{best['name']} with a largest error of {best['error']['max']:.2g}"
-            )
-        chosen = min(kept, key=lambda p: p["forward"]["median"])
-    return Advice(chosen, [f"{budget.text}: {chosen['name']}", *_expectation(chosen), f"measured on {where}"])
+        return min(kept, key=lambda p: p["error"]["max"])
+    kept = [p for p in front if p["error"]["max"] <= budget.amount]
+    if not kept:
+        best = min(front, key=lambda p: p["error"]["max"])
+        raise InputError(
+            f"no measured setting reaches this error on {_scene(result)}; the most accurate is "
+            f"{best['name']} with a largest error of {best['error']['max']:.2g}"
+        )
+    return min(kept, key=lambda p: p["forward"]["median"])
 
 
 def _expectation(point: dict[str, Any]) -> list[str]:

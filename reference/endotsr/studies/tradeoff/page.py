@@ -7,9 +7,9 @@ from endotsr.results.report import parts
 from endotsr.results.report.figures import data_uri
 from endotsr.results.report.style import encoded
 from endotsr.results.report.tables import html_table
-from endotsr.studies.tradeoff.budget import frame_advice, parse_budget, settings_words
+from endotsr.studies.tradeoff.budget import best_point, parse_budget, settings_words
 from endotsr.studies.tradeoff.figure import main_figure
-from endotsr.studies.tradeoff.text import COLUMNS, front_rows, levels, made, milliseconds
+from endotsr.studies.tradeoff.text import COLUMNS, LEVELS, front_rows, levels, made, milliseconds
 
 BUDGETS = ("60 fps", "30 fps", "1/255", "0.1/255")  # answered on the page; `--budget` answers any other
 CAPTION = "Each point is a setting; lower is more accurate, further left is cheaper; the line is the front."
@@ -41,8 +41,7 @@ def compared_with_paper(result: dict[str, Any]) -> str:
     by_name = {point["name"]: point for point in result["points"]}
     paper = by_name[result["presets"]["paper"]]
     said = f"The preset paper is off by at most {levels(paper['error']['max'])} at the worst pixel"
-    allowed = parse_budget("1/255")
-    kept = [by_name[name] for name in result["fronts"]["visits"] if by_name[name]["error"]["max"] <= allowed.amount]
+    kept = [by_name[name] for name in result["fronts"]["visits"] if by_name[name]["error"]["max"] <= 1 / LEVELS]
     if not kept:
         return f"{said}. No measured setting is within one level of 8 bits."
     chosen = min(kept, key=lambda point: point["visits"])
@@ -60,9 +59,9 @@ def _answers(result: dict[str, Any]) -> list[tuple[str, str]]:
     answers = []
     for text in BUDGETS:
         try:
-            point = frame_advice(result, parse_budget(text)).point
+            point = best_point(result, parse_budget(text))
         except InputError as error:
-            answers.append((parts.text(text), parts.text(str(error).removeprefix(f"--budget {text}: "))))
+            answers.append((parts.text(text), parts.text(str(error))))
             continue
         said = f"{point['name']}: largest error {levels(point['error']['max'])}, "
         said += f"{milliseconds(point['forward']['median'])} a frame"

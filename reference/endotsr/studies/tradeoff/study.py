@@ -73,10 +73,10 @@ def run_study(
     plan = plan or NamedSettings(scene)
     begin(1 + len(plan.names) * (1 + repeats))
     aim = reference_setting(scene)
-    reference, reference_visits = frame(prepare(scene, aim))
+    shared: Shared = {}
+    reference, reference_visits = frame(prepare(scene, aim, shared))
     step(1)
     keep("reference", reference)
-    shared: Shared = {}
     prepared = [prepare(scene, setting, shared) for setting in plan.names]
     points = []
     for number, (ready, (setting, name)) in enumerate(zip(prepared, plan.names.items())):

@@ -41,7 +41,7 @@ from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
-from endotsr.clips.sequences.sources import matching_files
+from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.splits import parse_frame_range, split_frames
 from endotsr.config import Config, lengthened, with_fixed_length
 from endotsr.errors import InputError

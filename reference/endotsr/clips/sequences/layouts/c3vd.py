@@ -17,8 +17,8 @@ from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matri
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import matching_files
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose

@@ -15,8 +15,9 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import depth_of, matching_files, pictures_from_files, size_of, with_stated
+from endotsr.clips.sequences.sources import depth_of, pictures_from_files, size_of, with_stated
 from endotsr.errors import InputError
 
 CAMERA = "intrinsics.txt"

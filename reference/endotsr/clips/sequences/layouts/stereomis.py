@@ -14,8 +14,9 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
+from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import masks_of, matching_files
+from endotsr.clips.sequences.sources import masks_of
 from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
 from endotsr.errors import InputError
 
