@@ -17,6 +17,17 @@
 # three semi-axes and a rotation. A gradient step may lead to any real number, so both are stored in a form that allows
 # every number: the quaternion may have any length, and the axes are stored as logarithms.
 #
+# | Symbol | Meaning | Shape in the code |
+# |---|---|---|
+# | $\tilde q$ | stored quaternion, in the order $(w,x,y,z)$, of any length | (4, N) |
+# | $q=(w,\mathbf v)$ | the same with length 1; $\mathbf v=(x,y,z)$ | (4, N) |
+# | $s$ | stored logarithms of the semi-axes | (3, N) |
+# | $S=e^s$ | semi-axes at one standard deviation, in scene units | (3, N) |
+# | $R$ | rotation; column $k$ is the direction of semi-axis $k$ | (3, 3, N) |
+# | $\Sigma$ | covariance, in scene units squared | (3, 3, N) |
+# | $[\mathbf v]_\times$ | matrix of the cross product: $[\mathbf v]_\times\mathbf a=\mathbf v\times\mathbf a$ | (3, 3) |
+# | $g_X$ | gradient of the loss with respect to $X$ | that of $X$ |
+#
 # The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -58,6 +69,9 @@ N = 6
 # \Sigma &= R\,\mathrm{diag}(S)^2R^\top .
 # \end{aligned}
 # $$
+#
+# Two inputs need a rule. A log-scale outside $[-40,40]$ is clipped to that interval, since the square of a larger scale
+# could overflow. The zero quaternion, whose direction is undefined, is taken as the identity $(1,0,0,0)$.
 #
 # <!-- definition: endotsr.definition.covariance.unit -->
 # ```python
@@ -121,7 +135,7 @@ np.testing.assert_allclose(text.rotation, printed, atol=1e-14)
 
 # %% [markdown]
 # The length of the raw quaternion has no effect, even if its square would overflow or underflow. $q$ and $-q$ are the
-# same rotation. The zero quaternion, which the FDM can produce by addition, is the identity.
+# same rotation. The zero quaternion can occur, because the deformation model adds an offset to the stored one.
 
 # %%
 for factor in (1e-300, 1e-30, -1.0, 1e300):
@@ -131,6 +145,7 @@ for factor in (1e-300, 1e-30, -1.0, 1e300):
         atol=1e-14,
     )
 assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(3))
+np.testing.assert_allclose(covariance_forward(q, s + 60)[0].scale, np.exp(40.0))
 
 # %% [markdown]
 # ## The reverse pass, line by line
@@ -145,7 +160,8 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 # **(6.2) Its two factors.** $M_{jk}=R_{jk}S_k$. With $S$ held fixed, $g_{R_{jk}}=g_{M_{jk}}S_k$. With $R$ held fixed,
 # a semi-axis scales one whole column, so $g_{S_k}=\sum_jR_{jk}\,g_{M_{jk}}$.
 #
-# **(6.3) The logarithm.** $S_k=e^{s_k}$ gives $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$.
+# **(6.3) The logarithm.** $S_k=e^{s_k}$ gives $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$. A clipped
+# log-scale, $|s_k|>40$, does not change $S_k$ and has the gradient 0; at exactly $\pm40$ the gradient passes.
 #
 # $$
 # g_M=(g_\Sigma+g_\Sigma^\top)M,\qquad g_{S_k}=\sum_j R_{jk}\,g_{M_{jk}},\qquad g_{s_k}=S_k\,g_{S_k},\qquad g_{R_{jk}}=g_{M_{jk}}S_k .
@@ -172,6 +188,9 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 # **(6.8) The length.** $q=\tilde q/\|\tilde q\|$ gives
 # $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the rotation, so
 # that part of $g_q$ is removed. A longer $\tilde q$ rotates less for the same step, so the rest is divided by its length.
+# At $\tilde q=0$ the gradient is set to 0.
+#
+# Indices of $G$ count from 0, as in the code.
 #
 # $$
 # \begin{aligned}
@@ -250,12 +269,16 @@ np.testing.assert_allclose(
     covariance_reverse(Shape(g_R, g_S), covariance_forward(5 * q, s)[1]).d_quaternion,
     grads.d_quaternion / 5,
 )
+# The two rules: no gradient at the zero quaternion, none of a clipped log-scale.
+at_zero, clipped = covariance_forward(0 * q, s)[1], covariance_forward(q, s + 60)[1]
+assert not covariance_reverse(Shape(g_R, g_S), at_zero).d_quaternion.any()
+assert not covariance_reverse(Shape(g_R, g_S), clipped).d_log_scale.any()
 
 # %% [markdown]
 # ## Figure: a shape found by its gradient
 #
-# The next cell minimises $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass, with
-# $g_\Sigma=2(\Sigma-\Sigma^\star)$.
+# Can a nearly round Gaussian become a long, turned one through these gradients alone? The next cell minimises
+# $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass, with $g_\Sigma=2(\Sigma-\Sigma^\star)$.
 
 # %% tags=["hide-input"]
 q_now, s_now = np.array([[1.0], [0.1], [0.2], [0.1]]), np.log([[0.6], [0.5], [0.55]])
@@ -302,7 +325,7 @@ plt.show()
 # ## The gradient check
 #
 # `check_function` takes any forward and reverse function. The first check is the chain through $\Sigma$ as derived
-# above; the second is the registered pair.
+# above; the second is the pair `covariance` of `endotsr gradcheck`.
 
 
 # %%

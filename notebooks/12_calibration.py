@@ -18,6 +18,16 @@
 # loss with respect to the rendered image has a fixed ratio $r$ to the gradient of the photometric loss. It shares the
 # result, 0.83, over all sequences. Whether another sequence asks for another weight is not measured here.
 #
+# | Symbol | Meaning | In `paper` |
+# |---|---|---|
+# | $\mathcal L_{\mathrm{rgb}}$ | photometric term, $(1-w)\mathcal L_1+w(1-\mathcal S)$ ({doc}`11_base_losses`) | $w=0.1$ |
+# | $\mathcal L_{\mathrm{lap}}$ | Laplacian loss without its weight ({doc}`10_laplacian_pyramid`) | |
+# | $\lambda_{\mathrm{lap}}$ | weight of the Laplacian loss: the result | 0.83 |
+# | $r$ | required ratio of the two gradients | 0.25 |
+# | $v$ | a view: a training frame and its render | 16 of them |
+# | $\hat I_{v,c,p}$ | the render of view $v$, channel $c$, pixel $p$ | |
+# | $n$, $H$, $W$ | tissue pixels, height and width of a frame | |
+#
 # The equation is {eq}`eq-7` of {doc}`/specification/07_calibration`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -42,10 +52,11 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # %% [markdown]
 # ## The equation
 #
-# The views are spread over the training frames: positions
-# $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered by the base model. Here a
-# blurred frame stands in for the base render. The results of true base renders differ from those below; the last tables
-# of {doc}`/specification/rulings` have them for two clips.
+# The views are spread over the $n_{\mathrm{train}}$ training frames: positions
+# $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$, with halves rounded to the even number. A position
+# that occurs twice counts once. Each view is rendered by the base model, without A and S. This chapter uses a blurred
+# frame in place of the base render. The results of true base renders differ from those below; the last tables of
+# {doc}`/specification/rulings` have them for two clips.
 #
 # **(12.1) Two gradients.** The objective contains
 # $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the
@@ -71,8 +82,7 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # \end{aligned}
 # $$
 #
-# $\mathcal L_{\mathrm{rgb}}$ is the whole photometric term $(1-w)\mathcal L_1+w(1-\mathcal S)$.
-# $\mathcal L_{\mathrm{lap}}$ has weight 1.
+# $\mathcal L_{\mathrm{lap}}$ has weight 1 here: the gradient is taken before any weight is applied.
 #
 # **(12.5) The size of the L1 gradient is known.** By (11.1) each of the $3n$ tissue values has $\pm1/(3n)$, and the
 # others have 0. The root mean square over $3HW$ values is $1/(3\sqrt{nHW})$ for every render that differs from its frame
@@ -113,7 +123,9 @@ w, r = PAPER.loss.ssim_weight, PAPER.loss.gradient_ratio
 chosen = sequence.train_index[
     calibration_views(len(sequence.train_index), PAPER.loss.calibration_views)
 ]
+assert (w, r) == (0.1, 0.25) and PAPER.loss.lambda_lap == 0.83, "the table"
 assert len(chosen) == 16 and not set(chosen) & set(sequence.test_index)
+assert len(calibration_views(5, 16)) == 5, "a short clip has fewer views"
 
 
 def gradients(index, blur, w, stretch=1.0):

@@ -24,6 +24,7 @@
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 
 import matplotlib.pyplot as plt
+import msgspec
 import numpy as np
 from running_clip import load
 from scipy.ndimage import uniform_filter
@@ -41,6 +42,7 @@ from endotsr.method.losses.masked_ssim import (
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.covariance import covariance_forward
 from endotsr.method.splatting.render import Scene, render_forward, render_reverse
+from endotsr.method.splatting.settings import EXACT
 from endotsr.method.splatting.settings import PAPER as RASTER
 from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.training.fitting.adam import adam_state, adam_step, adam_update, regather
@@ -66,11 +68,14 @@ rng = np.random.default_rng(12)
 # \end{aligned}
 # $$
 #
-# The constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
+# $\theta$ is one stored number, $g$ its gradient, $\eta$ its rate, and $m$, $v$ its two moments, which begin at 0. The
+# constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k=1,2,\dots$ counts the steps of one array.
 #
 # **(13.1) Two averages.** Written out from $m=0$, the recursion is
 # $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$: an average of the gradients in which old ones fade. $v_k$ is the same
-# average of $g_j^2$; with $\beta_2$ they fade more slowly, by the factor $0.1/0.001$.
+# average of $g_j^2$; with $\beta_2$ they fade more slowly, by the factor $0.1/0.001$. A first moment below the smallest
+# normal float32 number, $1.18\cdot10^{-38}$, is set to 0: it would move nothing, and such numbers are slow to compute
+# with.
 #
 # **(13.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with 0.
 # The division by $1-\beta_1^k$ makes it a weighted mean, and so does the division by $1-\beta_2^k$ for $v$.
@@ -137,10 +142,27 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # %% [markdown]
 # ## The rates
 #
-# By (13.3) the rate is the size of a step. Training needs large steps at first and small ones at the end.
+# By (13.3) the rate is the size of the first step. Each array has its own, because a step of the same size means
+# something else for a position and for an opacity. In `paper`:
 #
-# **(13.5) Exponential decay.** The rates of position, deformation and residuals fall to $\varphi=0.01$ of their start.
-# Every iteration multiplies them by the same factor, $\varphi^{1/T}$. The decay of the residuals starts at $K_s$:
+# | Array | Symbol | Rate $\eta_0$ | Course |
+# |---|---|---|---|
+# | position | $\mu$ | $1.6\cdot10^{-3}$ | decays |
+# | deformation: weights, centres, widths | $w,\theta,\sigma$ | $1.6\cdot10^{-3}$ | decays |
+# | opacity logit | $o=1/(1+e^{-\mathrm{logit}})$ | $0.05$ | constant |
+# | log-scale | $s$ | $0.005$ | constant |
+# | quaternion | $\tilde q$ | $0.001$ | constant |
+# | harmonics of degree 0 | $h_0$ | $2.5\cdot10^{-3}$ | constant |
+# | harmonics of degree 1 to 3 | $h_1,\dots,h_{15}$ | $1.25\cdot10^{-4}$ | constant |
+# | colour residual | $A$ | $3.125\cdot10^{-3}$ | decays from $K_s$ |
+# | translation residual | $C$ | $1.6\cdot10^{-4}$ | decays from $K_s$ |
+#
+# The harmonics are one array with one step count, although their rates differ. $A$ and $C$ enter at $i=K_s+1$ as zeros,
+# with moments 0 and step count 0.
+#
+# **(13.5) Exponential decay.** A decaying rate falls to $\varphi=0.01$ of its start. Every iteration multiplies it by
+# the same factor, $\varphi^{1/T}$. $i$ is the iteration, $T=6000$ the last one. The decay of the residuals starts at
+# $K_s=3000$:
 #
 # $$
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
@@ -181,6 +203,14 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 
 # %% tags=["hide-input"]
 T, K_s = PAPER.training.iterations, PAPER.training.residual_activation
+o = PAPER.optimiser
+assert (T, K_s, o.final_factor) == (6000, 3000, 0.01), "what the text says"
+falling = (o.position, o.deformation, o.deformation * o.deformation_position_factor)
+np.testing.assert_allclose(falling, 1.6e-3)
+constant = (o.opacity, o.scale, o.rotation, o.harmonics_base, o.harmonics_rest)
+assert constant == (0.05, 0.005, 0.001, 2.5e-3, 1.25e-4) and o.annealed_factor == 1
+residual = o.deformation * o.appearance_factor, o.deformation * o.spectral_motion_factor
+np.testing.assert_allclose(residual, (3.125e-3, 1.6e-4))
 figure, axis = plt.subplots(figsize=(7, 3.2), layout="constrained")
 steps = np.arange(1, T + 1, 10)
 for name, label in (
@@ -219,9 +249,23 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # ## Density control
 #
 # A large gradient with respect to the screen centre of a Gaussian is taken as a sign that one Gaussian covers a region
-# that needs two. That is the heuristic of 3DGS. The statistic is the mean norm of this gradient over the views in which the Gaussian is visible.
+# that needs two. This is the heuristic of 3DGS ({doc}`/references`). The statistic is the mean norm of this gradient over
+# the views in which the Gaussian is visible.
 #
-# **(13.6) The unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
+# | Symbol | Meaning | In `paper` |
+# |---|---|---|
+# | $g_{u_i},g_{v_i}$ | gradient of the whole objective with respect to the screen centre, per pixel ({doc}`09_compositing`) | |
+# | $W,H$ | width and height of the image in pixels | |
+# | $o_i$ | opacity | |
+# | $S_i=e^{s_i}$ | the three semi-axes, in scene units ({doc}`06_covariance`) | |
+# | $R(q_i)$ | rotation of the Gaussian ({doc}`06_covariance`) | |
+# | $g_{\mathrm{thr}}$ | least $\bar g_i$ of a Gaussian that grows | $2\cdot10^{-4}$ |
+# | $o_{\mathrm{min}}$ | least opacity of a Gaussian that stays | 0.005 |
+# | $e$ | extent of the scene, in scene units | 10 |
+# | $p$ | the fraction of the extent that separates small from large | 0.01 |
+# | $M$ | largest number of Gaussians | 400 000 |
+#
+# **(13.6) The statistic, and its unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
 # $\mathrm du=\frac W2\,\mathrm dx$ and $\mathrm dv=\frac H2\,\mathrm dy$. By the chain rule $g_x=\frac W2g_u$ and
 # $g_y=\frac H2g_v$:
 #
@@ -229,9 +273,43 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # \bar g_i=\frac{\sum_{\text{visible}}\Bigl\|\bigl(\tfrac W2g_{u_i},\ \tfrac H2g_{v_i}\bigr)\Bigr\|_2}{\sum_{\text{visible}}1}
 # $$
 #
-# The rule has three steps, in this order. **Prune** Gaussians with an opacity below 0.005. **Clone** a candidate whose
-# largest semi-axis is at most $p\,e=0.1$ scene units. **Split** a larger candidate into two children of $1/1.6$ of its
-# size, whose positions are drawn from it. Children inherit all other parameters; their moments start at 0.
+# Each iteration before 4000 adds its one view to both sums. A Gaussian is *visible* in a view if it is in front of the
+# near plane and the box around its support, the ellipse with $\alpha\ge\alpha_{\mathrm{cut}}$, contains the centre of a
+# pixel. A Gaussian that no view has shown has $\bar g_i=0$. In these units the threshold $g_{\mathrm{thr}}$ does not depend
+# on the size of the image.
+#
+# The rule runs at the iterations that are multiples of 100, after 500 and before 4000. It reads and writes the stored
+# parameters after the step of Adam, not the deformed ones. Afterwards both sums of all Gaussians are 0.
+#
+# **(13.7) Prune, then choose.** A Gaussian with $o_i<o_{\mathrm{min}}$ is removed; $N$ Gaussians stay. A candidate is one
+# that stays and has $\bar g_i\ge g_{\mathrm{thr}}$. Each candidate adds one Gaussian, so there is room for $M-N$ of them.
+# If there are more, those with the largest $\bar g_i$ remain; of equal ones, those with the lower index. (The presets
+# with a budget replace threshold and room by (20.1).)
+#
+# **(13.8) Clone or split.** A candidate whose largest semi-axis is at most $p\,e=0.1$ scene units is small for its region:
+# an exact copy is added, at the same place. A larger candidate is replaced by two children:
+#
+# $$
+# \max_kS_{ki}\le p\,e:\ \text{clone},\qquad
+# \max_kS_{ki}>p\,e:\quad \mu'=\mu_i+R(q_i)\,(S_i\odot\xi),\quad s'=s_i-\ln1.6,\quad \xi\sim\mathcal N(0,I_3).
+# $$
+#
+# Each child has its own $\xi$. Clones and children copy everything else: quaternion, opacity, harmonics, deformation,
+# $A$ and $C$. Their moments of Adam are 0; the step count of the array continues. The new order of the arrays is: the
+# Gaussians that stay and were not split, in their old order; the clones; the first children; the second children. The
+# normal numbers are one draw of shape (2, 3, number of splits).
+#
+# **(13.9) What the children cover.** $\xi$ has the covariance $I$, so $R\,(S\odot\xi)$ has the covariance
+# $R\,\mathrm{diag}(S)^2R^\top=\Sigma$: a child lies where its parent had weight. The two positions have the expected
+# covariance $\frac12\Sigma$ about their mean, and each child has $\Sigma/1.6^2$. The pair has
+# $(\frac12+\frac1{2.56})\Sigma=0.89\,\Sigma$ in expectation: about the region of the parent, with twice as many parameters.
+#
+# **(13.10) The opacity stays.** Two layers of the same $\alpha$ at one place absorb $1-(1-\alpha)^2$, more than one of
+# them. A clone therefore changes the picture. Its moments are 0 and those of its parent are not, so the next step of Adam
+# moves the two apart, even if their gradients are equal. 3DGS also resets opacities at intervals; `paper` does not.
+#
+# With a moving camera, `density.extent = "cameras"` takes $e=1.1\max_k\|\mathbf o_k-\bar{\mathbf o}\|$ over the optical
+# centres $\mathbf o_k$ of the training frames, as 3DGS does. For a camera that rests this is 0 and is refused.
 #
 # <!-- definition: endotsr.definition.density_control.gather_statistics -->
 # ```python
@@ -250,13 +328,13 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 #     by_threshold = config.growth == "threshold"
 #     least = config.gradient_threshold if by_threshold else 0
 #     runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
-#     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
+#     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))  # (13.7)
 #     room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
 #     steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
 #     candidates = np.sort(steepest_first[:room])
 #     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
 #     clone = candidates[~large]
-#     split = candidates[large]
+#     split = candidates[large]  # (13.8)
 #     survivors = np.setdiff1d(np.flatnonzero(alive), split)
 #     source = np.concatenate([survivors, clone, split, split])
 #     made = type(gaussians)(*(None if array is None else array[..., source] for array in gaussians))
@@ -310,6 +388,11 @@ steep = text.gradient_sum / np.maximum(text.visits, 1)
 np.testing.assert_allclose(
     statistics.gradient_sum / np.maximum(statistics.visits, 1), steep, rtol=1e-12
 )
+d = PAPER.density
+assert (d.gradient_threshold, d.prune_opacity, d.extent, d.dense_fraction, d.maximum) == (
+    *(2e-4, 0.005, 10),
+    *(0.01, 400_000),
+), "the table"
 rule = DensityConfig(gradient_threshold=float(np.quantile(steep, 0.6)))
 extent, p = 10.0, rule.dense_fraction
 after = densify(gaussians, statistics, rule, np.random.default_rng(5), extent)
@@ -385,6 +468,51 @@ parents = np.tile(gaussians.log_scale[:, to_split], 2)
 np.testing.assert_allclose(children, parents - np.log(1.6), rtol=1e-12)
 
 # %% [markdown]
+# The next cell writes (13.8) once more, with the draws of the same generator, and checks the room of (13.7), the
+# covariance of (13.9) and the two statements of (13.10).
+
+# %%
+xi = np.random.default_rng(5).standard_normal((2, 3, len(to_split)))
+form, _ = covariance_forward(
+    gaussians.quaternion[:, to_split], gaussians.log_scale[:, to_split]
+)
+drawn = [np.einsum("jkn,kn->jn", form.rotation, form.scale * one) for one in xi]
+expected = np.hstack([gaussians.position[:, to_split] + offset for offset in drawn])
+np.testing.assert_allclose(
+    after.gaussians.position[:, -2 * len(to_split) :], expected, rtol=1e-12
+)
+
+room = 3
+full = msgspec.structs.replace(rule, maximum=int(alive.sum()) + room)
+crowded = densify(gaussians, statistics, full, np.random.default_rng(5), extent)
+grown = np.setdiff1d(np.flatnonzero(candidate), np.argsort(-steep * candidate)[room:])
+np.testing.assert_array_equal(
+    np.unique(crowded.plan.source[crowded.plan.survivors :]), grown, "the steepest three"
+)
+assert crowded.gaussians.count == alive.sum() + room
+
+one_Sigma = form.rotation[:, :, 0] * form.scale[:, 0] ** 2 @ form.rotation[:, :, 0].T
+factor = np.linalg.cholesky(one_Sigma)
+pairs = factor @ np.random.default_rng(6).standard_normal(
+    (20_000, 2, 3, 1)
+)  # children of one parent
+spread = pairs - pairs.mean(axis=1, keepdims=True)
+pair = (spread @ spread.swapaxes(2, 3)).mean(axis=(0, 1)) + one_Sigma / 1.6**2
+np.testing.assert_allclose(pair, 0.89 * one_Sigma, atol=0.02 * one_Sigma.max())
+
+front = to_clone[:1]
+alone, twice = (
+    Scene(*(array if array is None else array[..., some] for array in scene))
+    for some in (front, np.repeat(front, 2))
+)
+once, doubled = (render_forward(s, camera, EXACT, degree=0)[0].opacity for s in (alone, twice))
+np.testing.assert_allclose(doubled, 1 - (1 - once) ** 2, atol=1e-12)
+assert doubled.max() > once.max() > 0.1
+moved = np.zeros(2)  # the same gradient; the first has moments, the clone has none
+adam_step(moved, np.ones(2), np.array([0.5, 0]), np.array([0.5, 0]), 600, 0.01, *constants)
+assert abs(moved[0] - moved[1]) > 1e-3
+
+# %% [markdown]
 # ### Figure: growth of the running clip
 #
 # The presets `quick` and `sharp` replace the threshold by a budget: every run of density control adds the steepest
@@ -455,8 +583,8 @@ assert report.passed
 # 2. Write `adam_step` and let the golden cases judge it: `--only adam` ({doc}`index`). Then write `densify`:
 #    `--only density`. The case `on_the_thresholds` decides between $<$ and $\le$.
 # 3. The cell below answers this one. A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and
-#    continues. How large is the first update of a child added at $k=600$, in units of $\eta$? How large is it when the
-#    count is very large?
+#    continues. Predict from (13.2): is the first update of a child added at $k=600$ larger or smaller than $\eta$, and by
+#    what factor? What is the factor when the count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and bias

@@ -42,6 +42,8 @@ NO_LINE = {
     (12, 5): "says what (11.1) gives for a whole view",
     (13, 3): "says what (13.2) gives for the first step",
     (13, 4): "says what follows from (13.2)",
+    (13, 9): "says what follows from (13.8)",
+    (13, 10): "says what (13.8) leaves unchanged",
     (19, 6): "leads to (19.7)",
     (20, 2): "says what follows from (20.1)",
     (21, 2): "says what follows from (21.1)",

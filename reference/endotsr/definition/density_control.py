@@ -39,13 +39,13 @@ def densify(gaussians, statistics, config, rng, extent, remaining=1):
     by_threshold = config.growth == "threshold"
     least = config.gradient_threshold if by_threshold else 0
     runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
-    candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
+    candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))  # (13.7)
     room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
     steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
     candidates = np.sort(steepest_first[:room])
     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
     clone = candidates[~large]
-    split = candidates[large]
+    split = candidates[large]  # (13.8)
     survivors = np.setdiff1d(np.flatnonzero(alive), split)
     source = np.concatenate([survivors, clone, split, split])
     made = type(gaussians)(*(None if array is None else array[..., source] for array in gaussians))
