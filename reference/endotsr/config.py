@@ -45,6 +45,8 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     """frames in a held-out block, which starts every max(24, 2 x length) frames, or in the held-out end"""
     depth_percentiles: tuple[float, float] = (3.0, 99.8)
     """per-frame clip of the non-zero prior depth, percent"""
+    depth_outliers: Literal["kept", "removed"] = "kept"
+    """wrong far depth, in frames whose depth reaches much farther than in those around them: kept, or made no depth"""
     memory: NonNegative = 0.0
     """limit in GB for frames and derived data, the rest is kept in a file; 0 = half of this machine's memory"""
 
@@ -335,6 +337,7 @@ def lengthened(config: Config, training_frames: int) -> Config:
 
 SHARP = Config(
     preset="sharp",
+    sequence=SequenceConfig(depth_outliers="removed"),
     model=ModelConfig(initial_width=0.05),
     loss=LossConfig(ssim_weight=0.7, lambda_lap=1.2),
     optimiser=OptimiserConfig(deformation_position_factor=3.0, annealed_factor=0.05),

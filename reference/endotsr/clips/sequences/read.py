@@ -7,7 +7,6 @@ assumption, or an `InputError`. The steps, in order: reading, world, tissue frac
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -15,12 +14,13 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.copies import copied_frames, steps_between, without_twins
-from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts
+from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts, depth_note, far_limits
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts
 from endotsr.clips.sequences.checks.guard import guarded
 from endotsr.clips.sequences.checks.kinds import KINDS, ONE_CAMERA
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import check_depth_scale, clip_depth, depth_plane, read_plane
+from endotsr.clips.sequences.depth_outliers import outlying_frames, remove_outliers
 from endotsr.clips.sequences.files import hash_files
 from endotsr.clips.sequences.folder_reader import of_size
 from endotsr.clips.sequences.frame_store import FrameStore
@@ -57,9 +57,9 @@ def sequence_of(clip: Clip, config: SequenceConfig, near: float = NEAR) -> Seque
     near     near plane, scene units; a sequence whose depth is entirely in front of it is refused
 
     Frame range, split and t = i / n apply to the selected frames. Masks become True = tissue. Depth is clipped per
-    frame to percentiles of its non-zero values (0 stays 0). Then everything is scaled by `config.scale`: pictures are
-    averaged over areas, a pixel is tissue only if all pixels it covers are, depth is the mean of the non-zero values
-    it covers, and the camera follows.
+    frame to percentiles of its non-zero values (0 stays 0), and outliers are removed if configured. Then everything is
+    scaled by `config.scale`: pictures are averaged over areas, a pixel is tissue only if all pixels it covers are,
+    depth is the mean of the non-zero values it covers, and the camera follows.
 
     Raises:  InputError naming file, frame and reason.
     """
@@ -69,10 +69,13 @@ def sequence_of(clip: Clip, config: SequenceConfig, near: float = NEAR) -> Seque
     config, notes = _depth_percentiles(clip, config)
     sequence, store = _allocated(clip, frames, config, notes)
     facts = _filled(sequence, clip, frames, config, store)
+    facts = _without_depth_outliers(sequence, facts) if config.depth_outliers == "removed" else facts
     sequence = _without_twins(sequence, facts, clip)
     sequence = _in_scene_units(sequence, clip)
     notes += _mask_notes(sequence, clip, config)
-    notes.append(_depth_note(sequence.depth, near, clip))
+    assert clip.depth is not None
+    unit = "scene units" if clip.arbitrary else clip.unit_in_words
+    notes.append(depth_note(sequence.depth, near, clip.depth.files[0].parent, unit))
     notes += guarded(clip, frames, sequence, facts, near)
     notes += [store.note] if store.note else []
     if clip.masks:
@@ -200,6 +203,14 @@ def _filled(sequence: Sequence, clip: Clip, frames: range, config: SequenceConfi
     return [fact for fact in facts if fact is not None]
 
 
+def _without_depth_outliers(sequence: Sequence, facts: list[Facts]) -> list[Facts]:
+    """Remove the outliers of the prior depth in place, with a note; returns the facts with the usual limits."""
+    if found := outlying_frames(far_limits([prior for _, prior in facts])):
+        sequence.notes.append(remove_outliers(sequence.depth, found))
+    usual = {outlying.frame: outlying.usual for outlying in found}
+    return [(picture, prior._replace(limit=usual.get(k, prior.limit))) for k, (picture, prior) in enumerate(facts)]
+
+
 def _without_twins(sequence: Sequence, facts: list[Facts], clip: Clip) -> Sequence:
     """The sequence without training frames that a held-out frame repeats, with a note. Raises InputError."""
     copies = copied_frames(steps_between([picture.small for picture, _ in facts]))
@@ -258,40 +269,3 @@ def _scaled(sequence: Sequence, clip: Clip, config: SequenceConfig) -> Sequence:
         at_scale = f"{clip.masks.files[0].parent} at scale {scale:g}"
         check_tissue_fraction(sequence.masks, at_scale, clip.masks.excluded_value, config.allow_tissue_fraction)
     return sequence
-
-
-def _depth_note(depth: NDArray[np.float32], near: float, clip: Clip) -> str:
-    """The note on the prior depth. Raises InputError for a sequence without depth."""
-    assert clip.depth is not None
-    where, unit = clip.depth.files[0].parent, "scene units" if clip.arbitrary else clip.unit_in_words
-    rows = [_extent(plane, near) for plane in depth]  # frame by frame, without an array over all frames
-    known, before = sum(row.known for row in rows), sum(row.before for row in rows)
-    if not known:
-        raise InputError(f"{where}: no pixel of the {len(depth)} frames has a depth")
-    nearest, farthest = min(row.nearest for row in rows), max(row.farthest for row in rows)
-    if farthest <= near:
-        raise InputError(f"{where}: the largest depth is {farthest:g}, in front of the near plane at {near:g}")
-    empty = [i for i, row in enumerate(rows) if not row.known]
-    behind = before / known
-    return (
-        f"depth in {unit}, {nearest:g} to {farthest:g} after clipping;"
-        f" missing on {1 - known / depth.size:.4f} of the pixels"
-        + (f"; frames without any: {', '.join(map(str, empty))}" if empty else "")
-        + (f"; {behind:.1%} of it is in front of the near plane at {near:g}" if behind else "")
-    )
-
-
-class _Extent(NamedTuple):
-    """Statistics of the prior depth of a frame."""
-
-    known: int  # pixels with depth
-    before: int  # pixels with depth up to the near plane
-    nearest: np.floating
-    farthest: np.floating
-
-
-def _extent(plane: NDArray[np.float32], near: float) -> _Extent:
-    values = plane[plane > 0]
-    if not values.size:
-        return _Extent(0, 0, np.float32(np.inf), np.float32(0))
-    return _Extent(values.size, int(np.count_nonzero(values <= near)), values.min(), values.max())

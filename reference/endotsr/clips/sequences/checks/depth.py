@@ -3,12 +3,16 @@
 In: one `DepthFacts` per frame. Out: findings. Plausible lengths are those of endoscopy: tissue at 5 to 500 mm.
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.depth_files import CLIPPED
+from endotsr.clips.sequences.depth_outliers import outlying_frames, said
+from endotsr.errors import InputError
 
 NEAREST, FARTHEST = 5.0, 500.0  # mm; a median outside indicates another unit
 FEW_LEVELS = 6  # whole millimetres, as in published clips, give a dozen or more
@@ -32,6 +36,7 @@ class DepthFacts(NamedTuple):
     stored_highest: float  # largest stored value
     integers: bool  # the file stores integers
     at_highest: float = 0.0  # fraction of the pixels with depth that have the largest value
+    limit: float = 0.0  # far limit: the upper percentile to which a reader clips
 
 
 def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: NDArray[np.bool_] | None) -> DepthFacts:
@@ -49,6 +54,7 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
         float(np.nanmax(stored)) if stored.size else 0.0,
         stored.dtype.kind in "iu",
         float((values == values.max()).mean()) if values.size else 0.0,
+        float(np.percentile(values, CLIPPED[1])) if values.size else 0.0,
     )
 
 
@@ -74,6 +80,8 @@ def depth_findings(
     if usual <= near:
         found.append(finding("near-plane", where, f"median depth {usual:.4g} is before the near plane"))
     found += [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, usual, where, i)]
+    if outlying := outlying_frames(far_limits(facts)):
+        found.append(finding("depth-outliers", where, f"the depth reaches much farther in frame {said(outlying)}"))
     coverage = float(np.mean([fact.tissue_coverage for fact in facts]))
     if coverage < LITTLE:
         found.append(finding("little-depth", where, f"{coverage:.1%} of the tissue has depth"))
@@ -83,6 +91,11 @@ def depth_findings(
 def usual_depth(facts: list[DepthFacts]) -> float:
     """The median over the frames with depth of their median depth; 0 without depth."""
     return float(np.median([fact.median for fact in facts if fact.median] or [0.0]))
+
+
+def far_limits(facts: list[DepthFacts]) -> NDArray[np.float64]:
+    """The far limit (n,) of the depth of every frame; 0 without depth."""
+    return np.array([fact.limit for fact in facts], np.float64)
 
 
 def _of_frame(fact: DepthFacts, usual: float, where: str, i: int) -> list[Finding]:
@@ -164,3 +177,38 @@ def light_finding(correlations: list[float], where: str) -> list[Finding]:
         return []
     what = f"brightness increases with depth (rank correlation {np.median(known):.2f}; a true depth has a negative one)"
     return [finding("depth-against-light", where, what)]
+
+
+def depth_note(depth: NDArray[np.float32], near: float, where: Path, unit: str) -> str:
+    """The note on the prior depth (n, H, W) of a folder, in this unit. Raises InputError if there is no depth."""
+    rows = [_extent(plane, near) for plane in depth]  # frame by frame, without an array over all frames
+    known, before = sum(row.known for row in rows), sum(row.before for row in rows)
+    if not known:
+        raise InputError(f"{where}: no pixel of the {len(depth)} frames has a depth")
+    nearest, farthest = min(row.nearest for row in rows), max(row.farthest for row in rows)
+    if farthest <= near:
+        raise InputError(f"{where}: the largest depth is {farthest:g}, in front of the near plane at {near:g}")
+    empty = [i for i, row in enumerate(rows) if not row.known]
+    behind = before / known
+    return (
+        f"depth in {unit}, {nearest:g} to {farthest:g} after clipping;"
+        f" missing on {1 - known / depth.size:.4f} of the pixels"
+        + (f"; frames without any: {', '.join(map(str, empty))}" if empty else "")
+        + (f"; {behind:.1%} of it is in front of the near plane at {near:g}" if behind else "")
+    )
+
+
+class _Extent(NamedTuple):
+    """Statistics of the prior depth of a frame."""
+
+    known: int  # pixels with depth
+    before: int  # pixels with depth up to the near plane
+    nearest: np.floating
+    farthest: np.floating
+
+
+def _extent(plane: NDArray[np.float32], near: float) -> _Extent:
+    values = plane[plane > 0]
+    if not values.size:
+        return _Extent(0, 0, np.float32(np.inf), np.float32(0))
+    return _Extent(values.size, int(np.count_nonzero(values <= near)), values.min(), values.max())

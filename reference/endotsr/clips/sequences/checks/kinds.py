@@ -97,6 +97,9 @@ KINDS: dict[str, Kind] = {
                        "state the unit: prepare --depth-unit and --depth-scale, or [depth] in sequence.toml"),
     "depth-far-off": Kind("warning", "the depth of this frame may be in another unit or normalised",
                           "write all frames with one scale"),
+    "depth-outliers": Kind("warning", "the depth loss divides by the largest depth of a frame: a few wrong far depths"
+                           " change it in the whole frame",
+                           "remove them: sequence.depth_outliers = removed, as in the presets quick and sharp"),
     "metres-cut": Kind("refusal", "metres were truncated to whole numbers",
                        "store millimetres, or a smaller step with its scale"),
     "marked-depth": Kind("warning", "the value seems to mark pixels without depth but is read as a distance",
