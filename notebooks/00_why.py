@@ -14,8 +14,8 @@
 # # 0. Why: light, motion and detail
 #
 # A surgeon moves an endoscope over tissue that breathes, beats and is pulled by instruments. The clip shows one view at
-# each time. The task is to recover the colour, depth and motion of the scene at every time of the clip, even where an
-# instrument hides the tissue and between two frames.
+# each time. The task is to recover the colour, depth and motion of the scene at every time of the clip. That includes
+# the tissue behind an instrument and the times between two frames.
 #
 # The task is ambiguous. A pixel becomes brighter when the light grows stronger, and also when a brighter piece of
 # tissue moves there. A single picture cannot distinguish these causes. The paper therefore uses separate components:
@@ -95,7 +95,10 @@ axis.set_title("one training iteration; chapters in brackets")
 plt.show()
 
 # %% [markdown]
-# The objective is a weighted sum. L and the Matérn prior of S are terms of it; A and S change the render.
+# The objective is a weighted sum of losses. L and the Matérn prior of S are terms of it; A and S change the render. Each
+# $\mathcal L$ and $\mathcal S$ is a number for one render and one frame, the other factors are weights, $i$ is the
+# iteration, and a bracket $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise. {doc}`14_full_sequence` has the
+# table of all symbols.
 #
 # $$
 # \begin{aligned}
@@ -136,9 +139,9 @@ plt.show()
 # %% [markdown]
 # ## Two clips with one cause each
 #
-# Both clips have 24 frames; every eighth is held out. In the first, the exposure drifts and a patch of tissue
-# brightens. In the second, the tissue breathes four times, so one breath takes six frames. In a third clip it breathes
-# once. The only effect common to all is noise.
+# Both clips have 24 frames. Every eighth is *held out*: training does not use it, and the model has to predict it. In the
+# first clip, the exposure drifts and a patch of tissue brightens. In the second, the tissue breathes four times, so one
+# breath takes six frames. In a third clip it breathes once. The only effect common to all is noise.
 
 # %%
 FRAMES, ITERATIONS = 24, 500
@@ -187,8 +190,10 @@ runs = {
 # %% [markdown]
 # ## The numbers
 #
-# *Training* and *held out* are the mean PSNR over tissue. *Trajectory error* is the distance between the motion of the
-# model and the true motion, in pixels; the last column is the error of a model that stands still.
+# *Training* and *held out* are the mean PSNR over tissue of the training frames and of the held-out frames, in dB; a higher
+# value is better. *Trajectory error* is the distance between the motion of the model and the true motion, in pixels; the
+# last column is the error of a model that stands still. Before you read on, write down a prediction for each clip: which
+# component gains on the training frames, and does it gain on the held-out frames as well?
 
 # %%
 scores = {}
@@ -253,9 +258,9 @@ show("motion")
 # model, with S and without. A nevertheless gains on the training frames. It cannot move a Gaussian, so training changes
 # the colours of static Gaussians until each training frame looks right. No light changes in this clip.
 #
-# The learning rate of S is 10 %<!--=rate.motion--> of the rate of the deformation. One might blame this rate,
-# so the next cell trains S with the rate of the deformation and with a tenfold one. A faster S does not follow the motion either, and the held-out
-# frames become worse.
+# The learning rate of S is 10 %<!--=rate.motion--> of the rate of the deformation. Is this rate the cause? The next cell
+# trains S with the rate of the deformation and with a tenfold one. A faster S does not follow the motion either, and the
+# held-out frames become worse.
 
 # %%
 assert min(gain("light", "A")) > 0.3, "A explains light, on held-out frames too"
@@ -276,8 +281,8 @@ for factor in (1.0, 10.0):
 # %% [markdown]
 # ## When A harms
 #
-# Colour that imitates motion is fitted at the training times, and no loss constrains it between them. The figure shows one pixel over the whole clip. The
-# simulator also provides its true colour between the frames.
+# Colour that imitates motion is fitted at the training times, and no loss constrains it between them. The figure shows
+# one pixel over the whole clip. The simulator also provides its true colour between the frames.
 
 # %% tags=["hide-input"]
 DENSE = 4  # true pictures for each frame
@@ -354,8 +359,9 @@ assert held[1] > 0 > held[4] and held[6] > held[4], "not monotonic in the rate"
 #   above is that of one seed after 500 iterations; it does not show that A is needed for this clip.
 #
 # Two rules follow. First, a gain on training frames does not show that A is right; held-out frames can show that it is
-# wrong. Second, motion needs a component that moves Gaussians. In the preset `sharp` the Gaussians start with tracked motion {eq}`eq-b15`, and
-# {doc}`/effects` shows that the colour residual is then smaller.
+# wrong. Second, motion needs a component that moves Gaussians. `sharp`, a preset of this package, therefore measures the
+# motion before training and gives it to the Gaussians ({doc}`19_tracked_motion`); {doc}`/effects` shows that the colour
+# residual is then smaller.
 #
 # ## Exercise
 #

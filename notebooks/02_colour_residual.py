@@ -17,6 +17,15 @@
 # of each Gaussian follow such a change, by at most $\beta$ in display units for all values of its coefficients. The
 # bound limits the size of the residual, not what it represents.
 #
+# | Symbol | Meaning | Shape in the code |
+# |---|---|---|
+# | $A_{cki}$ | coefficients: colour channel $c$, atom $k$, Gaussian $i$ | (3, 2F, N) |
+# | $\bar\phi_k(t)$ | normalised atoms of {doc}`01_dictionary` | (2F,) |
+# | $\beta$ | bound of a change of displayed colour; 0.3 in `paper` | |
+# | $x_{ci}(t)$ | argument of the residual | (3, N) |
+# | $\Delta h_{0,ci}(t)$ | the residual, added to the degree-0 harmonic coefficient $h_0$ | (3, N) |
+# | $Y_{00}$ | the constant spherical harmonic | |
+#
 # The equation is {eq}`eq-2` of {doc}`/specification/02_appearance`; {doc}`01_dictionary` introduces the atoms.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -43,8 +52,6 @@ statistics = atom_statistics(stamps, omega)
 # x_{ci}(t) = \sum_{k=1}^{2F} A_{cki}\,\bar\phi_k(t),\qquad
 # \Delta h_{0,ci}(t) = \frac{\beta}{Y_{00}}\tanh x_{ci}(t),\qquad Y_{00}=\frac{1}{\sqrt{4\pi}} .
 # $$
-#
-# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$].
 #
 # **(2.1) The unit.** The residual is added to the degree-0 harmonic coefficient $h_0$, and the displayed colour is
 # $Y_{00}h_0+\dots+\tfrac12$. A displayed change of $\beta\tanh x$ therefore needs
@@ -81,7 +88,7 @@ assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 # %% [markdown]
 # **The limit of the bound.** Each Gaussian has separate coefficients, so neighbours may change in opposite directions.
 # A texture that moves over static Gaussians with a contrast of 0.2 is within the bound of 0.3, and the residual
-# reproduces it exactly. Only the data can distinguish such a texture from light.
+# reproduces it exactly. The bound alone does not distinguish such a texture from light.
 
 # %%
 place = np.linspace(0, 1, N)
@@ -102,10 +109,11 @@ assert contrast > 0.2 and moved > 0.2 and np.abs(frames).max() < beta
 # ## Figure: brightening explained by colour, or by motion
 #
 # A patch of tissue becomes paler and recovers, without moving. Component A represents this by a change of colour over
-# time. A model without A has constant colours. It can make a pixel brighter at one time by moving, turning or scaling
-# Gaussians; in the figure, a bright neighbour a few pixels away is shifted so that the pixel has the same brightness at each
-# time. The image at this pixel is right in both cases, but the geometry of the second is wrong by several pixels. The
-# paper gives colour and motion separate components.
+# time (left panel). A model without A has constant colours. It can make a pixel brighter at one time by moving, turning
+# or scaling Gaussians. In the middle panel, a bright neighbour four pixels away is shifted so that the pixel has the same
+# brightness at each time. How far do you expect it to move? The image at this pixel is right in both cases, but the
+# geometry of the second is wrong. The paper gives colour and motion separate components. (The right panel belongs to
+# step (2.4).)
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 0.98, 197)
@@ -168,8 +176,8 @@ plt.show()
 #
 # **(2.4) A slope that keeps its digits.** $1/\cosh^2x=1-\tanh^2x$. In float32 the right side loses its digits one by
 # one (right panel above). Correctly rounded, $\tanh x$ is 1 from $x=13\ln2\approx9.01$ on, and the slope is then
-# exactly 0: a saturated residual has no gradient. NumPy's $\tanh$ reaches 1 at $x\approx10$. With $e=\exp(-2|x|)$,
-# $\cosh x=(1+e)/(2\sqrt e)$, so the slope is $4e/(1+e)^2$. Nothing cancels in it and nothing overflows.
+# exactly 0: a saturated residual has no gradient. With $e=\exp(-2|x|)$, $\cosh x=(1+e)/(2\sqrt e)$, so the slope is
+# $4e/(1+e)^2$. This form subtracts nothing and cannot overflow.
 #
 # **(2.5) One coefficient** is multiplied by one atom: $\partial x_{ci}/\partial A_{cki}=\bar\phi_k$, so
 # $g_{A_{cki}}=g_{x_{ci}}\bar\phi_k$.

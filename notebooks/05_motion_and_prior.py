@@ -17,6 +17,16 @@
 # Gaussian. Its sixteen free coefficients per axis can also produce implausible motion between the frames, so a
 # Matérn-5/2 prior penalises fast motion.
 #
+# | Symbol | Meaning | Shape in the code |
+# |---|---|---|
+# | $C_{dki}$ | coefficients: direction $d$, atom $k$, Gaussian $i$; scene units | (3, 2F, N) |
+# | $\phi_k(t)$ | raw atoms of {doc}`01_dictionary`; $F$ sines, then $F$ cosines | (2F,) |
+# | $\Delta\mu_i(t)$ | translation of Gaussian $i$, scene units | (3, N) |
+# | $\ell$ | correlation length of the prior, in normalised time; 0.2 in `paper` | |
+# | $\omega_f$ | frequency, cycles per sequence | (F,) |
+# | $\rho_f$ | weight of frequency $f$, with mean 1 | (F,) |
+# | $\mathcal L_{\mathrm{msp}}$ | the penalty, scene units squared; its weight is $\lambda_{\mathrm{msp}}$, 1 in `paper` | |
+#
 # The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -55,9 +65,9 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # \mu_i(t) = \mu_i + \psi_{0:3,i}(t) + \Delta\mu_i(t).
 # $$
 #
-# $\psi$ is the offset of the deformation model of {doc}`04_deformation`. The atoms are **raw**, not normalised: for
-# raw pairs the penalty below is invariant to the phase of a sine and cosine pair. The sine and the cosine of a normalised
-# pair have different scales, and for them it is not.
+# $\mu_i$ is the stored position, and $\psi$ is the offset of the deformation model of {doc}`04_deformation`. The atoms are
+# **raw**, not normalised. For a raw pair of sine and cosine the penalty below does not depend on the phase. The sine and
+# the cosine of a normalised pair have different scales, and the penalty would depend on it.
 #
 # <!-- definition: endotsr.definition.motion.motion_forward -->
 # ```python
@@ -206,8 +216,9 @@ assert np.ptp(difference - normalised(turned(C, theta), 0.5) + normalised(C, 0.5
 #
 # A point moves on a smooth path. It is observed with a little noise in the training frames of a short clip: 17 stamps
 # for 16 coefficients. With almost as many unknowns as observations, many series fit the stamps equally well and differ
-# between them. The Fourier series is fitted twice: by least squares alone, and with $\lambda\,\mathcal L_{\mathrm{msp}}$ added. The
-# minimum of a quadratic is one linear system; its matrix is built from the reverse pass below.
+# between them. The Fourier series is fitted twice: by least squares alone, and with
+# $\lambda_{\mathrm{msp}}\,\mathcal L_{\mathrm{msp}}$ added. The minimum of a quadratic is the solution of one linear system,
+# whose matrix is built from the reverse pass below. Where will the two fits differ more, at the stamps or between them?
 
 # %% tags=["hide-input"]
 stamps = np.delete(np.arange(20), np.arange(1, 20, 8)) / 20

@@ -17,6 +17,16 @@
 # spherical harmonics per channel. They are evaluated in the direction from the camera to the deformed centre. The
 # colour residual of {doc}`02_colour_residual` is added to the first of them.
 #
+# | Symbol | Meaning | Shape in the code |
+# |---|---|---|
+# | $h_{kci}$ | coefficient $k$ of channel $c$ and Gaussian $i$ | (16, 3, N) |
+# | $\Delta h_{0,ci}$ | colour residual | (3, N) |
+# | $Y_k$ | real spherical harmonic; $Y_0=Y_{00}$ is constant | |
+# | $K$ | number of active functions, $(\text{degree}+1)^2$; the degree is 0 to 3 | |
+# | $\mu_i(t)$, $\mathbf o$ | deformed centre of Gaussian $i$, and optical centre of the camera, in the world | (3, N), (3,) |
+# | $\mathbf n_i=(x,y,z)$ | unit vector from the camera to the Gaussian | (3, N) |
+# | $rgb_{ci}$ | displayed colour | (3, N) |
+#
 # The equation is {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -43,8 +53,8 @@ N = 9
 # \end{aligned}
 # $$
 #
-# The specification has the table of the $Y_k$. Each is a polynomial in $x,y,z$ of degree at most 3. The definition stores
-# the polynomials as lists: a factor, then coefficient and exponents of each monomial.
+# Each $Y_k$ is a polynomial in $x,y,z$ of degree at most 3. The definition stores the polynomials as lists: a factor, then
+# coefficient and exponents of each monomial. A Gaussian at the camera itself has no direction; its $\mathbf n$ is set to 0.
 
 # %%
 for k, (factor, polynomial) in enumerate(definition.POLYNOMIALS):
@@ -117,7 +127,9 @@ for band in range(4):
 # ## Figure: the sixteen functions
 #
 # Each function is drawn over the whole sphere (longitude to the right, latitude upwards); red is positive and blue is
-# negative. The kernel evaluates them, with one Gaussian per direction and one coefficient set to 1.
+# negative. The kernel evaluates them, with one Gaussian per direction and one coefficient that is not 0. Before you look:
+# the camera moves to the opposite side of a Gaussian, so $\mathbf n$ becomes $-\mathbf n$. In which rows of the figure
+# does every function change its sign?
 
 # %% tags=["hide-input"]
 lon, lat = np.meshgrid(np.linspace(-np.pi, np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37))
@@ -154,6 +166,12 @@ gram = (
 )
 assert np.abs(gram - np.eye(16)).max() < 0.05, "orthonormal on the sphere"
 plt.show()
+sign = (-1.0) ** np.repeat([0, 1, 2, 3], [1, 3, 5, 7])[:, None]
+opposite = definition.basis(-around, 16)
+np.testing.assert_allclose(opposite, sign * definition.basis(around, 16), atol=1e-14)
+
+# %% [markdown]
+# In the second and the fourth row: the polynomials of degree 1 and 3 are odd.
 
 # %% [markdown]
 # ## The reverse pass, line by line
@@ -168,15 +186,16 @@ plt.show()
 # $g_{h_k}=Y_k\,g^{\mathrm{pre}}$. The residual has the factor $Y_0$ of the coefficient to which it is added.
 #
 # **(8.3) The direction.** The three channels share $\mathbf n$. Each coefficient contributes the slope of its polynomial:
-# $g_{\mathbf n}=\sum_k\bigl(\sum_cg^{\mathrm{pre}}_ch_{kc}\bigr)\,\partial Y_k/\partial(x,y,z)$. $Y_0$ is constant and
-# has no slope.
+# $g_{\mathbf n}=\sum_k\bigl(\sum_cg^{\mathrm{pre}}_ch_{kc}\bigr)\,\partial Y_k/\partial(x,y,z)$. $Y_0$ is constant, so its
+# slope is 0.
 #
 # **(8.4) The slope of a monomial.** $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$, with $x,y,z$ taken as independent.
 # The gradient then has a part along $\mathbf n$, which (8.5) removes.
 #
 # **(8.5) The normalisation.** $\mathbf n=\mathbf v/\|\mathbf v\|$ gives
 # $\mathrm d\mathbf n=(I-\mathbf n\mathbf n^\top)\,\mathrm d\mathbf v/\|\mathbf v\|$. Only the part of $g_{\mathbf n}$ that is
-# perpendicular to $\mathbf n$ remains, divided by the distance. This is the rule (6.8) of the quaternion.
+# perpendicular to $\mathbf n$ remains, divided by the distance. This is the rule (6.8) of the quaternion. At the camera
+# itself $g_{\mathbf v}$ is set to 0.
 #
 # **(8.6) The two ends.** $\mathbf v=\mu-\mathbf o$: the centre of the Gaussian receives $+g_{\mathbf v}$. The optical
 # centre is shared by all Gaussians and receives $-\sum_ig_{\mathbf v_i}$.
@@ -235,7 +254,7 @@ np.testing.assert_allclose(along, powers[:, None] * definition.basis(n, 16), ato
 # %% [markdown]
 # ## The gradient check
 #
-# There is one pair per active degree.
+# There is one pair of a forward and a reverse pass for each active degree.
 
 # %%
 with one_thread():

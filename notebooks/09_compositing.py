@@ -14,7 +14,20 @@
 # # 9. Compositing, and its reverse pass line by line
 #
 # At a pixel the Gaussians are ordered by depth. From front to back, each absorbs a fraction of the light that remains.
-# This is the central stage of the renderer. Its reverse pass is derived here line by line.
+# This chapter derives this blend, called *compositing*, and its reverse pass line by line.
+#
+# | Symbol | Meaning |
+# |---|---|
+# | $(u,v)$, $z$ | centre of a Gaussian on the screen, in px, and its depth ({doc}`07_projection`) |
+# | $a,b,c$ | its covariance on the screen, $\begin{pmatrix}a&b\\b&c\end{pmatrix}$, in px²; $\det=ac-b^2$ |
+# | $d_x,d_y$ | position of the pixel centre minus $(u,v)$ |
+# | $m=b/c$, $r=1/c$, $A=c/\det$ | numbers of the ellipse that the code stores |
+# | $o$, $\mathrm{logit}$ | opacity, $o=1/(1+e^{-\mathrm{logit}})$, and the stored number |
+# | $\alpha$ | opacity at the pixel, clamped to $\alpha_{\max}$ |
+# | $\alpha_{\mathrm{cut}}$, $T_{\mathrm{stop}}$ | cutoff of $\alpha$, and the transmittance below which a pixel ends |
+# | $T_k$ | transmittance: the fraction of the light that passes all Gaussians in front of Gaussian $k$ |
+# | $rgb_k$, $\mathbf{bg}$ | colour of Gaussian $k$ ({doc}`08_harmonics`), and of the background |
+# | $\hat I,\hat D,\hat O$ | composited colour, depth and opacity of the pixel |
 #
 # The equations are {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
 
@@ -80,8 +93,8 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # \end{aligned}
 # $$
 #
-# Here $o=1/(1+e^{-\mathrm{logit}})$. $q$ is the squared Mahalanobis distance. It is written as a sum of two squares, so
-# it is never negative and is accurate for needles.
+# $q$ is the squared distance in units of the standard deviations of the ellipse (the Mahalanobis distance). It is written
+# as a sum of two squares. Such a sum is never negative, and it is accurate for needles ({doc}`15_hard_cases`).
 #
 # ## Forward: the blend
 #
@@ -96,8 +109,9 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # \end{aligned}
 # $$
 #
-# A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ does not contribute. If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel
-# ends before Gaussian $k$ is blended.
+# Gaussians of equal depth keep the order of their index. A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ does not contribute.
+# If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel ends before Gaussian $k$ is blended. The preset `paper` has
+# $\alpha_{\max}=0.99$, $\alpha_{\mathrm{cut}}=1/255$ and $T_{\mathrm{stop}}=10^{-4}$; `exact` has 1, 0 and 0.
 #
 # <!-- definition: endotsr.definition.compositing.opacity_of -->
 # ```python
@@ -181,6 +195,8 @@ def contributors_of(column, row, scene, settings):
 
 
 # %%
+for preset, numbers in ((PAPER, (0.99, 1 / 255, 1e-4)), (EXACT, (1, 0, 0))):
+    assert (preset.alpha_max, preset.alpha_cutoff, preset.transmittance_stop) == numbers
 opaque = scene | {"logit": np.full(N, 7.0)}  # so opaque that some pixels end early
 assert any(
     len(contributors_of(x, y, opaque, PAPER)[0]) < len(contributors_of(x, y, opaque, EXACT)[0])
@@ -305,14 +321,13 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # \end{aligned}
 # $$
 #
-# **(9.8) Once per Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
+# **(9.8) Once per Gaussian**, after the sum over pixels. $m=b/c$, $r=1/c$ and $A=c/(ac-b^2)$ have the derivatives
 # $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
 # $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
 #
 # $$
 # g_a=-A^2g_A,\qquad g_b=2A^2m\,g_A+r\,g_m,\qquad g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r .
 # $$
-
 #
 # The definition goes from $q$ to the covariance in one step, $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$
 # with $Q=\Sigma^{-1}$, instead of (9.8). The sums are the same.
@@ -378,8 +393,8 @@ for settings in (PAPER, EXACT):
 # the scene below was trained on it ({doc}`14_full_sequence`). The frame is held out: training did not use it. At the
 # marked pixel the model is wrong: a highlight is narrower in the render than in the frame. The bars are the terms of the
 # blend: many faint Gaussians, and most of them behind others. The right panel has $g_{\alpha_k}$ of (9.3) for the loss
-# $\frac12\|\hat I-I\|^2$. A negative gradient asks for more opacity. Which contributors should have one, the white or
-# the red ones?
+# $\frac12\|\hat I-I\|^2$. Where the gradient is negative, more opacity lowers the loss. Which contributors should have a
+# negative gradient, the white or the red ones?
 
 # %% tags=["hide-input"]
 clip = load()
@@ -436,15 +451,16 @@ print(f"error of the pixel: {np.abs(g_pixel).max() * 255:.0f} of 255")
 
 # %% [markdown]
 # The render has too little green and blue, so the gradient is negative where the colour has more of both than $R_{k+1}$,
-# the colour **behind**. (9.3) does not compare with the frame: one of the whiter half of the contributors has a positive
-# gradient, as it hides something whiter. And the gradients are small where $T_k$ is small: a Gaussian at the back changes
-# the picture only after those in front of it have become fainter.
+# the colour **behind**. (9.3) compares a Gaussian with what it hides, not with the frame: one of the whiter half of the
+# contributors has a positive gradient, because it hides something whiter. The gradients are small where $T_k$ is small: a
+# Gaussian at the back changes the picture little while those in front of it are opaque.
 
 # %% [markdown]
-# The released rasteriser of 3DGS (`diff-gaussian-rasterization`) adds a small number to $\det^2$ in this last step, which
-# multiplies its $g_a,g_b,g_c$ by
-# $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces this under the name `conic_epsilon`. The next cell uses a
-# number that is large enough to be visible.
+# ## A deviation of `diff-gaussian-rasterization`
+#
+# The released rasteriser of 3DGS (`diff-gaussian-rasterization`) adds a small number to $\det^2$ in step (9.8). It
+# multiplies its $g_a,g_b,g_c$ by $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces this under the name
+# `conic_epsilon`. The next cell uses a number that is large enough to be visible.
 
 # %%
 exact, damped = (

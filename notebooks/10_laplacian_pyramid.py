@@ -17,6 +17,16 @@
 # compares fine detail separately, in the bands of a pyramid. The difficulty is the instrument: a filter that reads one
 # of its pixels gives a wrong value. L counts a band value only if **no excluded pixel has any weight in it**.
 #
+# | Symbol | Meaning |
+# |---|---|
+# | $\hat I$, $I$ | render and frame, (3, H, W), display units; both are set to 0 at excluded pixels |
+# | $\mathsf D$, $\mathsf U$ | down-sampling to half the size, up-sampling to twice the size |
+# | $G_j$ | the image after $j$ down-samplings; $G_0$ is the image itself |
+# | $P_j$ | band $j$: what $G_{j-1}$ loses when it is down-sampled and up-sampled again |
+# | $S_j$, $V_j$ | samples of $G_j$ without an excluded pixel; valid values of band $j$ |
+# | $n_j$, $n_c$ | number of valid values of band $j$; number of samples of the coarse image along the axis |
+# | $\mathrm{refl}(k,n)$ | index $k$ reflected into $0,\dots,n-1$: $-1\mapsto1$, $n\mapsto n-2$ |
+#
 # The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -44,10 +54,10 @@ rng = np.random.default_rng(9)
 # border is reflected without repeating the edge sample:
 #
 # $$
-# (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
+# (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr].
 # $$
 #
-# Up-sampling $\mathsf U$ is linear per axis, by one of two rules:
+# Up-sampling $\mathsf U$ is linear interpolation along each axis, by one of two rules. The preset `paper` uses `co_sited`:
 #
 # $$
 # \begin{aligned}
@@ -134,9 +144,9 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 # %% [markdown]
 # ## Which values are valid
 #
-# A boolean support passes through the same operations. A coarse sample is supported if all of its $5\times5$ inputs are
-# supported. A band value is valid if its own fine sample is supported, and so is every coarse sample that $\mathsf U$
-# reads there:
+# The mask, true on tissue, passes through the same operations and gives the *support* of each level; $S_0$ is the mask. A
+# coarse sample is supported if all of its $5\times5$ inputs are supported. A band value is valid if its own fine sample is
+# supported, and so is every coarse sample that $\mathsf U$ reads there:
 #
 # $$
 # \begin{aligned}
@@ -214,9 +224,9 @@ assert np.array_equal(
 # %% [markdown]
 # ## Figure: valid masks per level, and the effect of masking first
 #
-# Above: the valid values of each level (grey: tissue whose value is not used, because its support touches the
-# instrument). Below: the bands of the observed image if it is first multiplied by the mask and then filtered. The edge
-# of the instrument is then the strongest detail of the image, and the loss would make the render reproduce it.
+# The upper row has the valid values of each level. Grey is tissue whose value is not used, because its support touches the
+# instrument. The lower row has the bands of the observed image if it is first multiplied by the mask and then filtered.
+# Where do you expect the strongest detail then? At the edge of the instrument: the loss would make the render reproduce it.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(10.1, 4.6), layout="constrained")
@@ -258,7 +268,8 @@ plt.show()
 # **(10.3) One band.** $P_j=G_{j-1}-\mathsf UG_j$. So $g_{P_j}$ is added to the gradient of $G_{j-1}$, and
 # $-\mathsf U^\top g_{P_j}$ to the gradient of $G_j$.
 #
-# **(10.4) The next level.** $G_{j+1}=\mathsf DG_j$ adds $\mathsf D^\top g_{G_{j+1}}$ to the gradient of $G_j$.
+# **(10.4) The next level.** Since $G_{j+1}=\mathsf DG_j$, the term $\mathsf D^\top g_{G_{j+1}}$ is added to the gradient of
+# $G_j$.
 #
 # **(10.5) From coarse to fine.** $G_3$ occurs in $P_3$ only, so the reverse pass begins there. $G_2$ and $G_1$ collect the
 # three parts of (10.3) and (10.4). $G_0=\hat I$ is the fine image of $P_1$ and the source of $G_1$.
@@ -307,6 +318,8 @@ for rule in ("co_sited", "half_pixel"):
 
 # %% [markdown]
 # ## The gradient check
+#
+# There is one pair for each rule of up-sampling.
 
 # %%
 with one_thread():

@@ -18,6 +18,20 @@
 # (SSIM), the depth against the prior depth, and smoothness. The colour terms use no value under the instrument. There
 # the depth term uses only its two maxima, and smoothness only the render.
 #
+# | Symbol | Meaning |
+# |---|---|
+# | $\hat I$, $I$ | render and frame, display units; channel $c$, pixel $p$ |
+# | $M$, $n$ | mask, true on tissue; number of tissue pixels |
+# | $H,W$ | height and width |
+# | $x$, $y$ | $\hat I$ and $I$ where $M$ is true, 0 elsewhere (SSIM) |
+# | $C_1,C_2$ | constants of SSIM, $10^{-4}$ and $9\cdot10^{-4}$ |
+# | $\hat D$, $D$ | rendered depth and prior depth, scene units; $D=0$ means that there is none |
+# | $V$ | pixels of tissue whose prior depth is above 0 and finite (depth) |
+# | $E$, $\nu$ | edges of the rendered depth; $\nu_p$ is 1 on tissue that is no edge, and 0 elsewhere (smoothness) |
+# | $\mathcal P$ | all pairs $(p,p')$ of horizontal and of vertical neighbours |
+# | $\bar x$, $K$ | the image $x$ under the instrument, 0 on tissue; its number of channels, 1 or 3 |
+# | $f$ | factor of the total variations, 30 in `paper` |
+#
 # The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
 # {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
 # {doc}`/specification/b09_smoothness`.
@@ -90,9 +104,11 @@ H, W = M.shape
 # \begin{aligned}
 # B_1&=\tfrac12(\mu_f^2+\mu_e^2)+C_1,\qquad B_2=\tfrac12(\sigma_f^2+\sigma_e^2)+C_2,\\
 # P&=1-\frac{\mu_e^2}{B_1},\qquad Q=1-\frac{\sigma_e^2}{B_2},\\
-# s&=PQ,\qquad 1-s=(1-P)+P(1-Q),
+# s&=PQ,\qquad 1-s=(1-P)+P(1-Q).
 # \end{aligned}
 # $$
+#
+# Without tissue $\mathcal L_1$ is 0 and $\mathcal S$ is 1.
 #
 # <!-- definition: endotsr.definition.masked_l1.masked_l1_forward -->
 # ```python
@@ -158,12 +174,15 @@ np.testing.assert_allclose(S, S_text, rtol=1e-11)
 x, y = np.where(M, I_hat, 0), np.where(M, I, 0)
 np.testing.assert_allclose(stable_map(x, y), ssim_text_saved.map, atol=1e-11)
 assert masked_ssim_forward(I, target)[0] == 1.0
+nothing = np.zeros_like(M)
+assert masked_l1_forward(I_hat, I, nothing)[0] == 0
+assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 
 # %% [markdown]
 # ## Normalised depth
 #
-# Rendered depth and prior depth are each divided by their own largest value over the whole image, so the scale of the
-# prior has no effect.
+# Rendered depth and prior depth are each divided by their own largest finite value over the whole image, so the scale of the
+# prior has no effect. Here $n$ counts the pixels of $V$. With fewer than 10 of them the loss is 0.
 #
 # $$
 # m=\max_{p}\hat D_p,\qquad m_D=\max_{p}D_p,\qquad
@@ -172,14 +191,14 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 #
 # ## Smoothness
 #
-# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. The two total variations keep depth and
-# colour flat under the instrument, where nothing is observed.
+# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$ (an edge map of Canny, {doc}`/references`). The
+# two total variations keep depth and colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}
 # \mathcal L_{\mathrm{smooth}}&=\mathcal Q(\hat D)+f\,\mathrm{TV}(\bar D)+f\,\mathrm{TV}(\bar I),\\
 # \mathcal Q(\hat D)&=\frac{\sum_{(p,p')\in\mathcal P}[\nu_p\nu_{p'}]\,(\hat D_p-\hat D_{p'})^2}{\sum_p\nu_p+10^{-6}},\\
-# \mathrm{TV}(x)&=\frac{1}{K\,H\,W}\sum_{c=1}^{K}\sum_{(p,p')\in\mathcal P}|x_{cp}-x_{cp'}|,
+# \mathrm{TV}(x)&=\frac{1}{K\,H\,W}\sum_{c=1}^{K}\sum_{(p,p')\in\mathcal P}|x_{cp}-x_{cp'}| .
 # \end{aligned}
 # $$
 #
@@ -270,9 +289,9 @@ np.testing.assert_allclose(L_smooth, smooth_text, rtol=1e-12)
 # %% [markdown]
 # ## Figure: why SSIM is used in addition to L1
 #
-# A window of the running clip: the held-out frame, and the render of the trained scene ({doc}`14_full_sequence`). Beside
-# it are three changes of the frame with the **same** masked L1 as the render. Which one has the lowest SSIM? L1 does not
-# distinguish the four; SSIM does. (The maps show $1-s$, averaged over channels.)
+# The figure shows a window of the running clip: the held-out frame, and the render of the trained scene
+# ({doc}`14_full_sequence`). Beside it are three changes of the frame with the **same** masked L1 as the render. Which one
+# has the lowest SSIM? L1 does not distinguish the four; SSIM does. (The maps show $1-s$, averaged over channels.)
 
 # %% tags=["hide-input"]
 from scipy.ndimage import gaussian_filter
@@ -316,8 +335,8 @@ assert abs(scores["render"] - scores["noisy"]) < 0.01
 plt.show()
 
 # %% [markdown]
-# The SSIM of the render is about that of noise of the same size. Its map shows the rest: bright spots where a highlight
-# and two fine vessels are missing.
+# The SSIM of the render is about that of noise of the same size. Its map has bright spots where a highlight and two fine
+# vessels are missing.
 
 # %% [markdown]
 # ## The reverse passes, line by line
@@ -457,9 +476,14 @@ for found, text in zip(
 # %% [markdown]
 # ## The exposure of a frame
 #
+# A camera may change gain and white balance from frame to frame. With `model.exposure`, which no preset switches on, each
+# training frame $k$ has a logarithmic gain $\gamma_{kc}$ and a bias $b_{kc}$ for each channel:
+#
 # $$
 # \tilde I_{cp}=e^{\gamma_{kc}}\,\hat I_{cp}+b_{kc}.
 # $$
+#
+# $\tilde I$ replaces $\hat I$ in every loss above.
 #
 # **(11.12) Exposure.** All pixels of a channel share two numbers, so their gradients are sums over the pixels:
 # $g_{b_c}=\sum_pg_{\tilde I_{cp}}$ and $g_{\gamma_c}=e^{\gamma_c}\sum_pg_{\tilde I_{cp}}\hat I_{cp}$. The colour has
@@ -494,6 +518,8 @@ for array, expected in zip(found, exposure_definition.exposure_reverse(g_I, text
 
 # %% [markdown]
 # ## The gradient check
+#
+# There is one pair for each loss, and one for the exposure.
 
 # %%
 with one_thread():

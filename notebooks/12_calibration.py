@@ -167,13 +167,16 @@ np.testing.assert_allclose(
 # %% [markdown]
 # ## Figure: two gradients of the same image
 #
-# Left and middle: the absolute gradients of the two losses. The gradient of L1 has the same size everywhere and changes
-# only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel. Near the
-# instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.) Right:
-# $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these substitutes for
-# a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. The base itself,
-# at iteration 3000, gives a result much closer to it ({doc}`/specification/rulings`). Because the result depends on $w$
-# and on the state of the render, the preset uses the published number and does not calibrate.
+# Before you look: where on the tissue is the gradient of the Laplacian loss 0, although the render is wrong there?
+#
+# The second and third panel have the absolute gradients of the two losses. The gradient of L1 has the same size everywhere
+# and changes only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel.
+# Near the instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.)
+#
+# The right panel has $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these
+# substitutes for a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. The
+# base itself, at iteration 3000, gives a result much closer to it ({doc}`/specification/rulings`). Because the result
+# depends on $w$ and on the state of the render, the preset uses the published number and does not calibrate.
 
 # %% tags=["hide-input"]
 weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])

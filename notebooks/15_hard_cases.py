@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 15. Hard cases
 #
-# Code that is correct on random input can still be wrong. Each section below has input that breaks plausible code,
-# names the mistake, and states the required result. The last section asks whether the gradient check can fail.
-# {doc}`/hard_cases` has the full list with a bound and a test for each case, and the naive formulas evaluated in both
-# precisions.
+# Code that is correct on random input can still be wrong. Each section below has input that breaks plausible code. It
+# names the mistake and states the required result. Before you read a section, predict from its title what such code
+# returns. The last section asks whether the gradient check can fail. {doc}`/hard_cases` has the full list with a bound and
+# a test for each case, and the naive formulas evaluated in both precisions. The symbols are those of
+# {doc}`09_compositing`.
 #
 # Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears again, because its **form** is what makes the
 # first case accurate.
@@ -91,8 +92,9 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 # ## The needle: digits lost in the inverse matrix
 #
 # Seen at an angle, a needle of $1000$ pixels has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
-# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$: a difference of numbers near $10^{12}$, divided by $3\cdot10^5$, that should
-# give 1. The specification writes a sum of squares:
+# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are near $10^{12}$ and $\det$ is about
+# $3\cdot10^5$, while $q$ should be about 1: the difference of the products has lost its digits in float32. The
+# specification writes a sum of squares:
 #
 # $$
 # \begin{aligned}
@@ -131,6 +133,7 @@ single, saved_32 = render(made(**needle, dtype=np.float32), wide)
 a, b, c = saved.projected.covariance2d[:, 0]
 det, o = saved.projected.determinant[0], 1 / (1 + np.exp(-2.0))
 along = np.arange(300)
+np.testing.assert_allclose((a, b, c, det), (5e5, 5e5, 5e5, 3e5), rtol=0.05)
 # The pixels of the diagonal, which the needle covers.
 d = along + 0.5 - saved.projected.mean2d[:, :1]
 truth = double.opacity[along, along]
@@ -154,8 +157,9 @@ np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)
 # %% [markdown]
 # ## Equal depths: an undefined order
 #
-# Stereo depth is often a whole number, so equal depths are common. Gaussians with equal $z$ keep the order of their
-# index. With distinct $z$, the image is bitwise independent of the order of the input.
+# Stereo depth is often a whole number, so equal depths are common. A sort that is not stable may give another picture in the
+# next run. Gaussians with equal $z$ keep the order of their index. With distinct $z$, the image is bitwise independent of
+# the order of the input.
 
 # %%
 tie = made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
@@ -171,7 +175,7 @@ assert np.array_equal(render(many, small)[0].colour, render(shuffled, small)[0].
 
 # %% [markdown]
 # **Crossing depths.** When two Gaussians cross in depth, the image jumps by $\alpha_1\alpha_2(rgb_1-rgb_2)$. The
-# derivative does not contain this jump. The checker therefore refuses differences across a change of order.
+# derivative does not contain this jump. The gradient check therefore refuses differences across a change of order.
 
 
 # %%
@@ -195,8 +199,8 @@ np.testing.assert_allclose(jump, alpha**2 * np.array([1.0, 0.0, -1.0]), atol=1e-
 # %% [markdown]
 # ## Behind the camera, on the near plane, at the camera
 #
-# Such Gaussians do not contribute. Their gradients are exactly 0, not merely small, and the image is bitwise that of
-# the scene without them.
+# A division by $z$ gives infinity or mirrors such a Gaussian into the picture. It must not contribute. Its gradients are
+# exactly 0, not merely small, and the image is bitwise that of the scene without it.
 
 # %%
 plain = made([[0.1], [0.0], [2.0]])
@@ -213,7 +217,7 @@ for z in (-1.0, 0.0, 1e-300, PAPER.near):
 # %% [markdown]
 # ## Empty input
 #
-# Without Gaussians the image is the background, and there is no gradient. An image of one pixel is valid.
+# Pruning may leave no Gaussian. The image is then the background, and there is no gradient. An image of one pixel is valid.
 
 # %%
 nothing = made(np.zeros((3, 0)))
@@ -226,7 +230,7 @@ assert render_reverse(out.colour, out.depth, None, saved).d_position.shape == (3
 # %% [markdown]
 # ## Two thousand faint sheets
 #
-# For equal sheets of opacity $\alpha$ and colour $c$, the image must be $c\,(1-E)$ with $E=(1-\alpha)^n$. The opacity
+# For $n$ equal sheets of opacity $\alpha$ and colour $c$, the image must be $c\,\bigl(1-(1-\alpha)^n\bigr)$. The opacity
 # image is the **sum** of the weights. In float32, $1-T_n$ would be 0 for one sheet of $\alpha=10^{-8}$.
 
 # %%
@@ -242,6 +246,7 @@ expected = 0.8 * -np.expm1(n * np.log1p(-faint))
 np.testing.assert_allclose(value, expected, rtol=1e-5)
 one_sheet = made([[0.0], [0.0], [2.0]], log_scale=8.0, logit=np.log(1e-8), dtype=np.float32)
 assert render(one_sheet, small)[0].opacity[6, 8] > 0.99e-8
+assert 1 - (np.float32(1) - np.float32(1e-8)) == 0, "one minus the transmittance"
 
 # %% [markdown]
 # ## NaN under the instrument, and an empty level
@@ -290,8 +295,8 @@ assert np.isfinite(loss) and np.isfinite(laplacian_loss_reverse(1.0, saved)).all
 # %% [markdown]
 # ## The same scene in metres, millimetres, micrometres
 #
-# A constant with a hidden unit in the code (a fixed near plane, an epsilon added to $z$) becomes visible when the unit
-# changes.
+# A constant with a hidden unit, such as a fixed near plane or an epsilon added to $z$, changes the picture when the unit
+# changes. The picture of the same scene must be the same in every unit, and its depth must have the factor of the unit.
 
 # %%
 reference = render(many, small, PAPER)[0]
@@ -307,6 +312,9 @@ for factor in (1e-3, 1e3):
 
 # %% [markdown]
 # ## Figure: three of these cases
+#
+# The left panel has the needle in both forms and precisions, the middle one the jump of two crossing depths, and the right
+# one the equal sheets.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(10.5, 3.2), layout="constrained")
@@ -354,7 +362,7 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass: a check that can fail
 #
-# The checker receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by
+# The gradient check receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by
 # one thousandth, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
 
 # %%

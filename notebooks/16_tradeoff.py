@@ -15,7 +15,8 @@
 #
 # A Gaussian has unbounded support, and the transmittance behind an opaque stack never reaches 0. A fast renderer
 # truncates both. This notebook measures the error and the gain in time: first on a scene small enough to render exactly,
-# then on the running clip.
+# then on the running clip. The symbols are those of {doc}`09_compositing`; $\alpha_{\mathrm{cut}}$ is called the *cutoff*
+# and $T_{\mathrm{stop}}$ the *stop*.
 #
 # The equation is {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/tradeoff` shows the same
 # measurement for every setting.
@@ -125,9 +126,9 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 # %% [markdown]
 # ## How large the error can be, and how the work grows
 #
-# At a pixel many Gaussians are skipped, each with $\alpha<\alpha_{\mathrm{cut}}$. In this scene the error never exceeds
-# five cutoffs. That is no bound: $n$ faint Gaussians of one colour, each just below the cutoff, are skipped together, and
-# the error is $1-(1-\alpha_{\mathrm{cut}})^n$ of that colour.
+# At a pixel many Gaussians are skipped, each with $\alpha<\alpha_{\mathrm{cut}}$. How large is the error together: below one
+# cutoff, or many? In this scene the error never exceeds five cutoffs. That is no bound: $n$ faint Gaussians of one colour,
+# each just below the cutoff, are skipped together, and the error is $1-(1-\alpha_{\mathrm{cut}})^n$ of that colour.
 #
 # $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
 # $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow at most with the **logarithm** of the
@@ -217,15 +218,14 @@ print("\n".join(lines))
 # The bound is $T_{\mathrm{stop}}/(1-\alpha_{\max})$ of the range of colours. A stop of $10^{-4}$ loses a quarter of that range
 # at some pixels. The Gaussian before which a pixel ends may be the opaque one that fills it: with $\alpha=0.9999$ and
 # $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the weight $\alpha T_k$ is lost. In general
-# $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. So the clamp $\alpha_{\max}=0.99$ of the preset `paper` is
-# what makes its stop harmless: at most a hundred times $T_{\mathrm{stop}}$ is lost. Whoever raises one of the two has to
-# lower the other.
+# $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. With the clamp $\alpha_{\max}=0.99$ of the preset `paper` at
+# most a hundred times $T_{\mathrm{stop}}$ is lost. If you raise one of the two, lower the other.
 #
 # ## The front of settings
 #
 # Cutoff, stop, clamp and precision vary together, on the same frame. A setting is **dominated** if another setting takes
-# no more time, has no larger error, and is strictly better in one. The undominated settings form the front. The best
-# setting for a given budget is on the front. Times of the same arithmetic scatter, so neighbours on the front may
+# no more time, has no larger error, and is strictly better in one. The undominated settings form the front. The setting
+# with the smallest error for a given time is on it. Times of the same arithmetic scatter, so neighbours on the front may
 # exchange their places.
 
 # %%

@@ -54,9 +54,10 @@ found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 # %% [markdown]
 # ## Noise first
 #
-# Every test uses the noise as its unit. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes slow changes.
-# Independent noise of deviation $\sigma$ gives it the deviation $\sqrt{1+4+1}\,\sigma$. The median of the absolute
-# values is $0.6745$ deviations for a normal distribution, and a few moving edges hardly change it.
+# Every test uses the noise as its unit. Let $x_t$ be the value of a pixel in frame $t$ and $\sigma$ the standard deviation
+# of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes slow changes. Independent noise gives it
+# the deviation $\sqrt{1+4+1}\,\sigma$. The median of the absolute values is $0.6745$ deviations for a normal distribution,
+# and a few moving edges hardly change it.
 
 
 # %% tags=["transcription"]
@@ -89,8 +90,9 @@ assert abs(found["still"].noise.level / sigma - 1) < 0.15
 # ## Motion, in units of the flow from noise
 #
 # Even in a static scene the optical flow between two frames is not 0. The test therefore also measures the flow between
-# the reference frame and copies of it with new noise. A tile counts as moving if its flow exceeds twice this value and
-# 0.05 px<!--=effects.motion-->.
+# the reference frame and copies of it with new noise. A tile, a square of pixels, counts as moving if its flow exceeds
+# twice this value and 0.05 px<!--=effects.motion-->. Three clips follow: one is still, one has a beating spot, and one has
+# light that drifts. In which of the six panels do you expect a signal?
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 3, figsize=(9.4, 5.2), layout="constrained")
@@ -127,9 +129,9 @@ assert (
 # ## A clip that is too short
 #
 # The beat of the second clip has five cycles. With 16 frames the same beat is found as motion, but not as a rate: the
-# verdict is *irregular*, and the plan switches off component S, which is the one made for it. In 14 training frames no
-# rate passes the test, which asks for a line at 1 %<!--=effects.rates--> with the same wave in each third of the clip. The remedy is more
-# frames of the same five beats.
+# verdict is *irregular*, and the plan switches off component S, which is the one made for it. A rate passes the test if its
+# line in the spectrum is significant at 1 %<!--=effects.rates--> and its wave is the same in each third of the clip. In 14
+# training frames no rate passes. The remedy is more frames of the same five beats.
 
 # %% tags=["hide-input"]
 short = msgspec.structs.replace(plain, frames=16)
@@ -185,10 +187,11 @@ assert [round(cycles) for cycles in stored["cycles"]] == [5] and not stored["pla
 # %% [markdown]
 # ## A moving camera and a static scene
 #
-# The whole picture then flows. In a rigid scene one number per tile explains the flow to all frames: its inverse depth
-# $\rho$. With the pose $(R_k,\mathbf t_k)$ from the reference camera to camera $k$, a point at $\mathbf x$ in the
-# reference is seen at the projection of $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and the
-# residual is motion of the tissue. Depth is not needed.
+# If the camera moves, the whole picture flows. In a rigid scene one number per tile explains the flow to all frames: its
+# inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference camera and $(R_k,\mathbf t_k)$ the
+# pose from the reference camera to camera $k$. Camera $k$ sees the tile at the projection of
+# $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and the residual is motion of the tissue. Depth is not
+# needed.
 
 
 # %% tags=["transcription"]
@@ -229,9 +232,9 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
 # $$
 #
-# A clip of $n$ frames resolves at most $n/2$ cycles: at equal steps, every faster sinusoid equals a slower one. The
-# rank of the dictionary over the stamps, centred and scaled to RMS 1, need not show this: the slower sinusoid is seldom
-# one of the eight, so the rank is full for 20 frames and 16 cycles. The plan therefore limits three quantities: the
+# A clip of $n$ frames resolves at most $n/2$ cycles: at equal steps, every faster sinusoid equals a slower one. Does the
+# rank of the dictionary over the stamps, centred and scaled to RMS 1, show this for 20 frames and 16 cycles? It need not.
+# The slower sinusoid is seldom one of the eight, and the rank is full. The plan therefore limits three quantities: the
 # highest frequency, the rank, and the condition number, which is the ratio of the largest to the smallest singular
 # value. The condition number bounds the amplification of frame noise in the coefficients. It is large for the shortest
 # clips and varies little from 33 frames on.
@@ -290,9 +293,9 @@ plt.show()
 # %% [markdown]
 # ## The plan and its savings
 #
-# A Gaussian always stores 11 base parameters. There are also three harmonic coefficients for each of the $(d+1)^2$
-# functions up to degree $d$, ten channels of $B$ bases with three numbers each, and $2\cdot3F$ numbers for each Fourier
-# component. The optimiser stores two more numbers for each.
+# A Gaussian always stores 11 base parameters: position, quaternion, log-scales and opacity. There are also three harmonic
+# coefficients for each of the $(d+1)^2$ functions up to degree $d$, ten channels of $B$ time bases with three numbers each,
+# and $2\cdot3F$ numbers for each of the Fourier components A and S. The optimiser stores two more numbers for each.
 
 
 # %% tags=["transcription"]

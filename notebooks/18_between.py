@@ -40,8 +40,9 @@ from endotsr.results.evaluation.trajectories import trajectory_error
 # ## The problem
 #
 # The clip is the one of {doc}`00_why` that breathes four times: 24 frames, three held out. It is trained twice with the
-# preset `paper`, shortened: once unchanged, and once with 70 %<!--=sharp.bridged--> of the iterations at times
-# between the frames, the fraction of `sharp`. The simulator also renders the true picture at three times between any two frames.
+# preset `paper`, shortened: once unchanged, and once with 70 %<!--=sharp.bridged--> of the iterations at times between the
+# frames, the fraction of `sharp`. The simulator also renders the true picture at three times between any two frames. Sketch
+# the PSNR over time of both runs before you look at the figure: where are its peaks?
 
 # %%
 FRAMES, MOMENTS, ITERATIONS = 24, 4, 500
@@ -103,19 +104,33 @@ alone, both = runs
 assert mean[alone, "at held-out frames"] < mean[alone, "at training frames"] - 4
 assert mean[both, "at held-out frames"] > mean[alone, "at held-out frames"] + 3
 assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 0.5
+lost = mean[alone, "at training frames"] - mean[both, "at training frames"]
+assert 0.3 < lost < 1, "less than a decibel"
+worst = {name: int(np.argmin(values)) for name, values in course.items()}
+gap = MOMENTS * clip.sequence.test_index
+assert min(abs(gap - worst[alone])) < MOMENTS, "the worst time is beside a held-out frame"
 swing = {name: np.ptp(values) for name, values in course.items()}
 print("from the worst to the best time:", {name: f"{v:.1f} dB" for name, v in swing.items()})
 assert swing[both] < swing[alone] - 2
 
 # %% [markdown]
-# If the model is trained only on frames, its PSNR peaks at each training time and falls on both sides, most around a
-# held-out frame, where the gap is twice as wide. With targets it still swings, but less: the training frames lose a
+# If the model is trained only on frames, its PSNR peaks at the training times and falls on both sides, most around a
+# held-out frame, where the gap is twice as wide. With targets it still varies, but less: the training frames lose less than a
 # decibel, and the held-out frames gain several.
 #
 # ## The equation
 #
-# $I_0$ and $I_1$ are two successive training frames, with the flow $f$ from the first to the second and $g$ from the
-# second to the first. $a\in(0,1)$ is the intermediate time. $G_2$ is a Gaussian window of 2 px<!--=between.window-->.
+# | Symbol | Meaning |
+# |---|---|
+# | $I_0,I_1$; $M_0,M_1$ | two successive training frames; their masks, true on tissue |
+# | $f$, $g$ | optical flow from $I_0$ to $I_1$, and from $I_1$ to $I_0$, in px |
+# | $a\in(0,1)$ | the intermediate time, as a fraction of the gap |
+# | $v$ | motion field at time $a$: the displacement from $I_0$ to $I_1$ of the point at a pixel |
+# | $J_0,J_1$ | both frames, moved to time $a$: the *moved pair*; $I_0,I_1$ are the *static pair* |
+# | $e_{\mathrm m},e_{\mathrm s}$ | local mean squared difference of the moved and of the static pair |
+# | $G_2*$ | average with a Gaussian window of 2 px<!--=between.window--> |
+# | $q$ | fraction of the static pair in the target |
+# | $I_a,M_a$ | the target and its mask |
 #
 # $$
 # \begin{aligned}
@@ -145,7 +160,8 @@ assert swing[both] < swing[alone] - 2
 # **(18.4) Three steps of a fixed-point iteration** solve both. Start from $v^{(0)}=f(x)$ and repeat
 # $v^{(k+1)}=f(x-av^{(k)})$. If $f$ changes by at most $L$ from one pixel to the next, then
 # $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: the error shrinks by the factor $aL$ in every step, if $aL<1$. Tissue that neither
-# folds nor stretches to twice its length has $L<1$, and then $aL<1$ at every $a$. The start has the error $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
+# folds nor stretches to twice its length has $L<1$, and then $aL<1$ at every $a$. The start has the error
+# $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
 #
 # **(18.5) Which of the two.** $v_0$ is read $a|v|$ away from $x$, and $v_1$ is read $(1-a)|v|$ away. The nearer one has
 # the larger weight: $v=(1-a)v_0+av_1$. Exchange the frames and replace $a$ by $1-a$: $f$ and $g$ change places, $v_0$
@@ -380,8 +396,8 @@ for name, run in runs.items():
 # well. The motion itself is the subject of {doc}`19_tracked_motion`.
 #
 # On the real clip the target is closer to the held-out frames than either pair alone when four or more frames in a row
-# are missing; with every eighth frame held out the moved pair alone is a little closer. The table is on the page of {eq}`eq-b14`. {doc}`/results/README` gives the
-# effect of the targets on training.
+# are missing. With every eighth frame held out the moved pair alone is a little closer. The table is on the page of
+# {eq}`eq-b14`. {doc}`/results/README` gives the effect of the targets on training.
 #
 # ## The reverse pass
 #

@@ -15,8 +15,8 @@
 #
 # A model can show a moving clip without moving: it changes colours ({doc}`00_why`), or it fades one Gaussian out and
 # another one in. The runs below do so. Our explanation, which is not tested, is that such changes lower the loss at once,
-# whereas motion lowers it when many Gaussians move together. The preset `sharp` therefore measures the motion before the training from
-# optical flow and the prior depth, and the Gaussians start with it.
+# whereas motion lowers it when many Gaussians move together. The preset `sharp` therefore measures the motion before
+# training, from optical flow and the prior depth, and the Gaussians start with it.
 #
 # The equation is {eq}`eq-b15` of {doc}`/specification/b15_tracked_motion`. It is optional and not in the paper.
 
@@ -52,8 +52,8 @@ rho = matern_weights(omega, length)
 #
 # A clip breathes twice in 24 frames. It is trained three times for 500 iterations: as in the paper, with tracked
 # motion, and with tracked motion and the targets of {doc}`18_between`. *Trajectory error* is the distance between the
-# motion of the model and the true motion. The last column is the error of a model that
-# stands still.
+# motion of the model and the true motion. The last column is the error of a model that stands still. What do you expect of
+# the first run: does a good PSNR on training frames imply a small trajectory error?
 
 # %%
 settings = with_effects(SimulatorSettings(width=96, height=76, frames=24), "breathing", "noise")
@@ -97,8 +97,9 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # %% [markdown]
 # ## The equation
 #
-# A track is the position $X_p(t_i)$ of a point $p$ at every training time. $a_{pi}$ is 1 where the point was followed
-# and 0.1 elsewhere. For each point, the position $\mu$ and the motion coefficients $C$ of {eq}`eq-3` minimise
+# A track is the position $X_p(t_i)$ of a point $p$ at every training time $t_i$. Its weight $a_{pi}$ is 1 where the point
+# was followed and 0.1 elsewhere. $\phi$ are the raw atoms {eq}`eq-1`, and $\rho_f$ is the Matérn weight {eq}`eq-4` of
+# frequency $f$. For each point, the position $\mu_p$ and the motion coefficients $C_p$ of {eq}`eq-3` minimise
 #
 # $$
 # \sum_i a_{pi}\,\bigl\lVert\mu_p+C_p\,\phi(t_i)-X_p(t_i)\bigr\rVert^2
@@ -284,7 +285,7 @@ assert error[-1, one] > 1, "found again, on other tissue"
 #
 # **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
 # is one atom of amplitude $A$ is fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. The weight $0.1$ costs $0.1/10.1$ of it at 20
-# times; $30\rho$ removes the fastest atoms. In this way the penalty {eq}`eq-4` acts before the training.
+# times; $30\rho$ removes the fastest atoms. In this way the penalty {eq}`eq-4` acts before training begins.
 #
 # <!-- definition: endotsr.training.scene.tracked_motion.with_tracked_motion -->
 # ```python
@@ -366,9 +367,9 @@ assert expected[0] > 0.99 and expected[-1] < 0.2
 #
 # ## Why not the deformation
 #
-# The deformation {eq}`eq-b1` could also represent the motion, but it starts at 0. Its centres and widths are learned,
-# and the effect of one step of a centre is proportional to the weight of its basis, by (4.5), so it has no bound. The
-# atoms are fixed functions of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes by at most
+# The deformation {eq}`eq-b1` could also represent the motion. Its centres and widths are learned, and the effect of one
+# step of a centre is proportional to the weight of its basis, by (4.5), so it has no bound. The atoms are fixed functions
+# of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes by at most
 # $\eta\sum_k|\phi_k(t)|\le\sqrt2\,F\eta=11.3\,\eta$, because $|\sin|+|\cos|\le\sqrt2$ for each of the $F$ pairs.
 
 # %%
@@ -421,7 +422,7 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: tracks and coefficients are computed before the training and are not differentiated. From the first
+# There is none: tracks and coefficients are computed before training and are not differentiated. From the first
 # iteration on, training changes $\mu$ and $C$ through the reverse pass of {eq}`eq-3`, which is the pair to check.
 # (19.6) is the same reverse pass with a quadratic loss at every training time, set to 0.
 

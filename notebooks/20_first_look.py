@@ -14,9 +14,9 @@
 # # 20. A first look: fewer pixels and a known number of Gaussians
 #
 # The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in training the render
-# is still far from the frame, so its finest detail says little about what to change; and how many Gaussians there are
-# follows from a threshold that nobody chose for this clip. The preset `quick` starts on frames of half size and grows to a given number
-# of Gaussians.
+# is still far from the frame, so its finest detail says little about what to change. The number of Gaussians follows from
+# a threshold that was not chosen for the clip. The preset `quick` therefore starts on frames of half size and grows to a
+# given number of Gaussians.
 #
 # The equation of the coarse start is {eq}`eq-b17` of {doc}`/specification/b17_coarse_start`; the growth to a budget is
 # a rule of {doc}`/specification/b11_density`. Both are optional and not in the paper.
@@ -89,9 +89,9 @@ rng = np.random.default_rng(20)
 # ```
 
 # %% [markdown]
-# The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. All
-# gradients are then multiplied by 3, as larger weights of the losses would do. At every call a twentieth of the Gaussians have
-# faded and are pruned.
+# The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. At every
+# call a twentieth of the Gaussians have faded and are pruned. All gradients are then multiplied by 3, as larger weights of
+# the losses would do. By what factor does the final number of Gaussians change under each rule?
 
 
 # %%
@@ -136,8 +136,14 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # %% [markdown]
 # ## The coarse start
 #
-# $e$ is the mean error of the renders at half size, after iteration $i$. $d$ is the mean magnitude of the finest
-# Laplacian band of the frames. $K$ is a set of eight training frames.
+# Two numbers decide when the start at half size ends: $e$, the mean error of the
+# renders at half size, and $d$, the mean magnitude of the finest Laplacian band of the frames.
+#
+# | Symbol | Meaning |
+# |---|---|
+# | $K$ | a set of eight training frames |
+# | $\hat I_k'(i)$, $I_k'$, $M_k'$ | render after iteration $i$, frame and mask, at half size |
+# | $P_1(I_k)$, $S_1$ | finest band of the frame at full size, and its valid values ({doc}`10_laplacian_pyramid`) |
 #
 # $$
 # e(i)=\operatorname*{mean}_{k\in K}\ \operatorname*{mean}_{c,\,p:M_k'(p)}\bigl|\hat I_k'(i)-I_k'\bigr|,\qquad
@@ -246,7 +252,8 @@ np.testing.assert_allclose(ratios, [2.0, 0.5, 1.0], rtol=0.1)
 #
 # The scene of the demonstration at 128x96 pixels is trained twice for 400 iterations with the preset `paper`,
 # shortened: with a coarse start and without one. The work of a run is the number of pixels that it compares with a
-# frame. The curve of $e$ in the figure is from a third training, which stays at half size to the end.
+# frame. The curve of $e$ in the figure is from a third run, which stays at half size to the end. Where should the coarse
+# start end in this figure, and what fraction of the work is then saved?
 
 # %% tags=["hide-input"]
 T = 400

@@ -78,7 +78,8 @@ print([(window.first, window.end) for window in plan.windows])
 # %% [markdown]
 # ## The blend
 #
-# Window $k+1$ begins with frame $b$, and window $k$ ends before frame $e$. At frame $g$ the scene shows
+# Window $k+1$ begins with frame $b$, and window $k$ ends before frame $e$. $g$ is the number of a frame of the recording,
+# $\hat I_k(g)$ the render of window $k$ at its time, and $w$ the weight of the later window. At frame $g$ the scene shows
 #
 # $$
 # \hat I_{\mathrm{scene}}(g)=\bigl(1-w(g)\bigr)\,\hat I_k(g)+w(g)\,\hat I_{k+1}(g),\qquad w(g)=\frac{g-b}{e-b},\quad b\le g\le e
@@ -162,8 +163,9 @@ assert values[2] > max(values[:2])
 # %% [markdown]
 # ## The warm start
 #
-# The second window takes the Gaussians of the first at one shared frame, the join, at the time $t^*$ of the neighbour
-# and $u^*$ of its own:
+# The second window takes the Gaussians of the first at one shared frame, the *join*. The index $n$ marks the quantities of
+# the neighbour, which are taken at its time $t^*$ of the join; $u^*$ is the same time in the new window. Position $\mu$,
+# quaternion $q$, log-scale $s$ and degree-0 coefficient $h_0$ of the new window are
 #
 # $$
 # \mu=\mu_n(t^*)-C\,\phi(u^*),\qquad q=q_n(t^*),\qquad s=s_n(t^*),\qquad
@@ -193,8 +195,9 @@ assert not state.gaussians.fdm_weight.any() and state.gaussians.motion_coefficie
 # %% [markdown]
 # ## Figure: the seam, and the saving of the warm start
 #
-# Left: the step from one frame to the next across the overlap (grey). Right: the loss of the second window from a cold
-# and from a warm start, each smoothed over 20 iterations.
+# The left panel has the step from one frame to the next across the overlap (grey). The right panel has the loss of the
+# second window from a cold and from a warm start, each smoothed over 20 iterations. Which of the two starts with the lower
+# loss, and does the other one catch up?
 
 # %% tags=["hide-input"]
 losses = {
@@ -224,6 +227,11 @@ print(f"iterations: cold {losses['cold'].size}, warm {losses['warm'].size}")
 print("mean loss of the first 20: cold {cold[0]:.4f}, warm {warm[0]:.4f}".format(**smooth))
 assert smooth["warm"][0] < 0.7 * smooth["cold"][0]
 assert losses["warm"].size == 0.4 * losses["cold"].size
+print(
+    "mean loss of the last 20: cold {cold[0]:.4f}, warm {warm[0]:.4f}".format(
+        **{name: course[-1:] for name, course in smooth.items()}
+    )
+)
 
 # %% [markdown]
 # ## The reverse pass

@@ -15,9 +15,19 @@
 #
 # Most scopes are held by hand, and their recordings have no poses. With depth, the pose of one frame relative to another
 # is a problem of registration: move the points of one picture by the right pose, and they fall on pixels of the other
-# picture that look the same. This chapter derives the residual {eq}`eq-b19` and its Jacobian {eq}`eq-b19b`, recovers
-# the pose of a simulated scope, and shows which motion no method can tell from that of the tissue. Both equations are
-# on the page {doc}`/specification/b19_registration` and not in the paper.
+# picture that look the same. This chapter derives the residual {eq}`eq-b19` and its Jacobian {eq}`eq-b19b` and recovers
+# the pose of a simulated scope. It also shows a motion of the scope that cannot be distinguished from a motion of the
+# tissue. Both equations are on the page {doc}`/specification/b19_registration` and not in the paper.
+#
+# | Symbol | Meaning |
+# |---|---|
+# | $\mathbf x_m$ | point $m$ of the source frame, from its pixel and depth, in the axes of the source camera; scene units |
+# | $W,\mathbf d$ | pose of the target camera relative to the source camera: $(X,Y,Z)^\top=W\mathbf x+\mathbf d$ |
+# | $u_m,v_m$ | pixel coordinates of the moved point in the target frame, $u=f_xX/Z+c_x$ and $v=f_yY/Z+c_y$ |
+# | $I_{ji}$ | value of the target picture in row $j$ and column $i$; $I_u,I_v$ are its slopes at a point |
+# | $q_m$ | value of the point in the source picture |
+# | $r_m$ | residual: the interpolated target value minus $q_m$ |
+# | $\boldsymbol\omega,\boldsymbol\tau$ | small rotation (axis times angle) and translation of a camera |
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
@@ -38,8 +48,9 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 # %% [markdown]
 # ## Two frames
 #
-# The simulated scope orbits tissue that does not move. The local mean of the pictures is removed and the rest divided
-# by the local contrast, because the lamp moves with the scope.
+# The simulated scope orbits tissue that does not move. The lamp moves with the scope, so the local mean of the pictures is
+# removed and the rest is divided by the local contrast. The figure shows the residuals without motion and at the true pose.
+# Will they be 0 at the true pose?
 
 # %%
 size = SimulatorSettings(width=160, height=128, frames=24)
@@ -74,7 +85,10 @@ figure.colorbar(shown, ax=axes, label="residual, local standard deviations")
 plt.show()
 medians = [np.median(np.abs(r[s.seen])) for r, s in (still, right)]
 print("no motion {:.3f}, true pose {:.3f}".format(*medians))
-assert medians[1] < 0.5 * medians[0]
+assert 0 < medians[1] < 0.5 * medians[0]
+
+# %% [markdown]
+# They are smaller and not 0: the frames have noise, and interpolation and rounding have errors of their own.
 
 # %% [markdown]
 # ## The residual
@@ -91,8 +105,8 @@ assert medians[1] < 0.5 * medians[0]
 # $$
 #
 # **(22.1) The kernel.** $k$ is cubic on $|s|<1$ and on $1\le|s|<2$. It is 1 at 0 and 0 at every other whole number, so
-# the sum passes through the pixels; its values and its slopes agree at 1 and at 2, so the slope of the sum is
-# continuous. These conditions leave one number free, $a=k'(1)$ from the right. $a=-\tfrac12$ reproduces parabolas.
+# the sum equals the picture at the pixel centres. The values and slopes of the pieces agree at 1 and at 2, so the slope of
+# the sum is continuous. These conditions leave one number free, the slope $a=k'(1)$. $a=-\tfrac12$ reproduces parabolas.
 #
 # <!-- definition: endotsr.definition.registration.keys -->
 # ```python
@@ -208,9 +222,9 @@ for one, other in zip(compose(true[1], inverse(moved)), expected):
 # %% [markdown]
 # ## The pose, found
 #
-# The next cell takes Gauss-Newton steps from the rows (22.5), beginning without motion. Weights leave out points that
-# do not fit. Here the motion is a few pixels, and the finest level alone suffices; `endotsr poses` begins with
-# the flow of the pictures.
+# The next cell takes Gauss-Newton steps from the rows (22.5), beginning without motion. A Gauss-Newton step solves the
+# least-squares problem of the linearised residuals. Points whose residual is large get the weight 0. Here the motion is a
+# few pixels, and the finest level alone suffices; `endotsr poses` begins with the flow of the pictures.
 
 # %%
 found, courses = CameraPose(np.eye(3), np.zeros(3)), []
@@ -236,13 +250,14 @@ assert courses[-1][1] < 0.1
 # %% [markdown]
 # ## What no picture tells
 #
-# **(22.7) One motion in two words.** Let the whole tissue move by the rigid motion $B$, and the camera be at $T_j$. The
+# **(22.7) Two motions, one picture.** Let the whole tissue move by the rigid motion $B$, and the camera be at $T_j$. The
 # picture and the depth are those of still tissue and a camera at $T_jB$. They depend on $T_jB$ alone, so the residual,
-# and any other measure of pictures and depth, has the same value for both. Breathing has such a common part. Its amount
-# is an error of the path that no estimate avoids; the scene is consistent with either.
+# and any other function of pictures and depth, has the same value for both. Breathing has such a common part. An estimate
+# from pictures and depth assigns it to the scope, and the path is wrong by that amount.
 #
-# Here the tissue breathes in front of a scope that does not move. The best rigid motion of the tissue is what a
-# registration reports as motion of the scope.
+# In the next cell the tissue breathes in front of a scope that does not move. The rigid motion that fits the tissue best
+# is the motion that a registration reports for the scope. The tissue moves by 2.5 mm; by how much does the scope seem to
+# move?
 
 # %%
 breathing = simulate(
@@ -270,6 +285,8 @@ assert apparent > 0.3
 
 # %% [markdown]
 # ## The gradient check
+#
+# The pair has the residual with respect to pose, points and reference values.
 
 # %%
 with one_thread():
