@@ -92,9 +92,9 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 # ## The needle: digits lost in the inverse matrix
 #
 # Seen at an angle, a needle of $1000$ pixels has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
-# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are near $10^{12}$ and $\det$ is about
-# $3\cdot10^5$, while $q$ should be about 1: the difference of the products has lost its digits in float32. The
-# specification writes a sum of squares:
+# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are near $10^{12}$ and
+# $\det$ is about $3\cdot10^5$, while $q$ should be about 1: the difference of the products has lost its digits in
+# float32. The specification writes a sum of squares:
 #
 # $$
 # \begin{aligned}
