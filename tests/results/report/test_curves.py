@@ -81,3 +81,11 @@ def test_similarity_is_drawn_as_what_is_minimised():
     assert curves.minimised({"ssim": 0.75}, "ssim") == 0.25
     assert curves.minimised({"l1": 0.75}, "l1") == 0.75
     assert curves.minimised({"l1": None}, "l1") is None
+
+
+@pytest.mark.parametrize("last", [6690, 9550, 95500])
+def test_no_number_on_an_axis_is_cut_off_at_the_edge(last):
+    log = [{**entry, "iteration": 1 + round(k * (last - 1) / 59)} for k, entry in enumerate(log_of(60))]
+    for chart in curves.charts(log):
+        seen = np.asarray(Image.open(io.BytesIO(curves.chart_png(chart, "light"))))[..., 3]
+        assert not seen[:, -2:].any() and not seen[:, :2].any() and not seen[-2:].any(), chart.title

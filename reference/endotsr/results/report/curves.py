@@ -89,7 +89,7 @@ def frame_lines(evaluation: EvaluationRecord | None, key: str) -> list[tuple[str
 def chart_png(chart: Chart, theme: str, dots: int = 220) -> bytes:
     """One chart as a PNG file with a transparent background, 4.4 x 2.75 inches."""
     figure = new_figure(4.4, 2.75, constrained=False)
-    figure.subplots_adjust(left=0.13, right=0.985, top=0.97, bottom=0.17)
+    figure.subplots_adjust(left=0.13, right=0.93, top=0.97, bottom=0.17)
     _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
     return encoded(figure, "png", dots, transparent=True)
 

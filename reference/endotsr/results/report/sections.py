@@ -10,6 +10,7 @@ import numpy as np
 from endotsr.results.report import curves, figures, parts
 from endotsr.results.report.data import DECIDING, FramePictures, ReportData
 from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
+from endotsr.results.report.misfits import misfits_html
 from endotsr.results.report.run_text import SHOWN, facts, interpolation_sentence, pose_sentence, trajectory_sentence
 from endotsr.results.report.tables import duration, html_table
 
@@ -126,11 +127,10 @@ def _motion(data: ReportData) -> str:
 
 
 def training(data: ReportData) -> str:
-    """The curves of the log."""
+    """The curves of the log, and the training frames that fit badly."""
     found = curves.charts(data.log, data.evaluation)
-    return parts.section(
-        "Training", f'<div class="charts">{"".join(map(curves.chart_figure, found))}</div>' if found else ""
-    )
+    charts = f'<div class="charts">{"".join(map(curves.chart_figure, found))}</div>' if found else ""
+    return parts.section("Training", charts, misfits_html(data.log))
 
 
 def pictures(data: ReportData) -> str:
