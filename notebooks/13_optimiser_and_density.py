@@ -290,8 +290,10 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # an exact copy is added, at the same place. A larger candidate is replaced by two children:
 #
 # $$
-# \max_kS_{ki}\le p\,e:\ \text{clone},\qquad
-# \max_kS_{ki}>p\,e:\quad \mu'=\mu_i+R(q_i)\,(S_i\odot\xi),\quad s'=s_i-\ln1.6,\quad \xi\sim\mathcal N(0,I_3).
+# \begin{aligned}
+# \max_kS_{ki}&\le p\,e:\quad\text{clone},\\
+# \max_kS_{ki}&>p\,e:\quad\mu'=\mu_i+R(q_i)\,(S_i\odot\xi),\quad s'=s_i-\ln1.6,\quad\xi\sim\mathcal N(0,I_3).
+# \end{aligned}
 # $$
 #
 # Each child has its own $\xi$. Clones and children copy everything else: quaternion, opacity, harmonics, deformation,

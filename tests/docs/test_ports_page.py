@@ -1,4 +1,4 @@
-"""docs/guides/ports.md: its table is that of the stored certificates, and each certificate is one."""
+"""docs/guides/port.md: its table is that of the stored certificates, and each certificate is one."""
 
 import importlib
 import json

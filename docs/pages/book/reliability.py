@@ -1,4 +1,4 @@
-"""Tables of docs/guides/reliability.md from the results of the campaigns: python docs/make.py book.reliability
+"""Tables of docs/guides/run_folder.md from the results of the campaigns: python docs/make.py book.reliability
 
 docs/results/faults.json   python tests/faults/campaign.py --kills 50 --json docs/results/faults.json
 docs/results/fuzz.json     python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json
@@ -12,7 +12,7 @@ from typing import Any
 from pages.store.marks import read_json, write_marked
 
 ROOT = Path(__file__).parents[3]
-PAGE = ROOT / "docs" / "guides" / "reliability.md"
+PAGE = ROOT / "docs" / "guides" / "run_folder.md"
 RESULTS = ROOT / "docs" / "results"
 MAKERS = {
     "faults": "python tests/faults/campaign.py --kills 50 --json docs/results/faults.json",

@@ -1,4 +1,4 @@
-"""Ports that hold a certificate: the table of docs/guides/ports.md, by
+"""Ports that hold a certificate: the table of docs/guides/port.md, by
 
     python docs/make.py ports.certified
 
@@ -14,7 +14,7 @@ from endotsr.results.report.tables import markdown
 from pages.store.marks import write_marked
 
 ROOT = Path(__file__).parents[3]
-PAGE = ROOT / "docs" / "guides" / "ports.md"
+PAGE = ROOT / "docs" / "guides" / "port.md"
 FOLDER = ROOT / "docs" / "results" / "certificates"
 
 
