@@ -2,7 +2,7 @@
 
     --python PYTHON   an interpreter that has the programs (pip install gsplat splax torch); by default this one
     --program NAME    this one alone; what is known of the others is kept
-    --write           replace docs/results/golden_programs.json and the page made from it, docs/who_computes_what.md
+    --write           replace docs/results/golden_programs.json and its tables in docs/who_computes_what.md
 
 A program that cannot be imported there is left out. The programs run in float32, which all of them support.
 """
@@ -22,6 +22,7 @@ from endotsr.port.judge.verdict import CaseReport, Report, judge
 
 HERE, DOCS = Path(__file__).parent, Path(__file__).parents[3] / "docs"
 RESULT, PAGE = DOCS / "results" / "golden_programs.json", DOCS / "who_computes_what.md"
+START, END = "<!-- programs:tables:start -->", "<!-- programs:tables:end -->"
 PROGRAMS = {  # file: (name, distribution, what is used of it)
     "gsplat_port.py": ("gsplat", "gsplat", "reference in plain PyTorch, by automatic differentiation"),
     "splax_port.py": ("splax", "splax", "harmonics in JAX, by automatic differentiation"),
@@ -84,14 +85,8 @@ def survey(python: str, only: str = "") -> dict[str, Any]:
 
 
 def page(result: dict[str, Any]) -> str:
-    """The page as Markdown."""
-    lines = [
-        "# Who computes what",
-        "",
-        *textwrap.wrap(INTRODUCTION.format(**result), 118),
-        "",
-        "This page is made by `python tests/port/programs/survey.py --write`, from the programs that are installed.",
-    ]
+    """The generated part of the page: the introduction, and a table for each program."""
+    lines = textwrap.wrap(INTRODUCTION.format(**result), 118)
     for one in result["programs"]:
         lines += ["", f"## {one['program']} {one['version']}", "", f"Used of it: {one['used']}.", ""]
         lines += ["| Case | Passed | Refused or missing | Deviation | Largest |", "|---|---|---|---|---|"]
@@ -123,7 +118,8 @@ def main(words: list[str]) -> int:
     print(page(result))
     if options.write:
         RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        PAGE.write_text(page(result), encoding="utf-8")
+        head, mark, rest = PAGE.read_text(encoding="utf-8").partition(START)
+        PAGE.write_text(head + mark + "\n" + page(result) + END + rest.partition(END)[2], encoding="utf-8")
     return 0
 
 
