@@ -1,78 +1,11 @@
-"""Each dial of the renderer separately, from `tradeoff.json`: a panel of the error against the cost for every dial."""
+"""Pictures of the page: error against cost from `tradeoff.json`, held-out quality against time from `training.json`."""
 
-import math
 from pathlib import Path
 from typing import Any
 
 from endotsr.results.report.labels import Label, place_labels
-from endotsr.results.report.style import BLUE, FAINT, GREEN, INK, NORMAL, SMALL, new_figure, save
-from endotsr.studies.tradeoff.figure import (
-    FLOOR,
-    cost_factor,
-    cost_name,
-    draw_levels,
-    error_height,
-    logarithmic_axes,
-    main_figure,
-)
-from endotsr.studies.tradeoff.study import cost_of
-
-
-def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
-    """One panel per dial, on common axes, with labelled points.
-
-    cost    `forward`, `both` or `visits` (dials of the temporal model count basis terms there)
-    error   `max` or `gradient`
-    """
-    dials = [d for d in result["dials"] if cost != "visits" or d["name"] not in ("precision", "exponential", "threads")]
-    columns = 4
-    rows = -(-len(dials) // columns)
-    figure = new_figure(3.1 * columns, 2.75 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-    by_name = {p["name"]: p for p in result["points"]}
-    labels = []
-    for axes, dial in zip(panels, dials, strict=False):
-        labels += _dial(axes, dial, by_name, cost, error)
-        if error == "max":
-            draw_levels(axes, result, named=False)
-        counted = "basis terms" if cost == "visits" and dial["cost"] == "terms" else cost_name(cost)
-        logarithmic_axes(axes, counted, SMALL, title=dial["title"])
-        _room(axes)
-    for axes in panels[len(dials) :]:
-        axes.set_axis_off()
-    name = "largest error, 1/255" if error == "max" else "worst gradient block, relative"
-    figure.supylabel(name, fontsize=NORMAL.text, color=INK)
-    place_labels(figure, labels)
-    return figure
-
-
-def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, error: str) -> list[Label]:
-    """Draw one curve; returns the labels of its points."""
-    factor = cost_factor(cost)
-    points = [by_name[name] for name in dial["points"].values()]
-    terms = cost == "visits" and dial["cost"] == "terms"
-    xs = [max(p["terms"], 1) if terms else cost_of(p, cost) * factor for p in points]
-    ys = [error_height(p, error) for p in points]
-    if cost != "visits":
-        spreads = [p[cost] for p in points]
-        below = [(s["median"] - s["low"]) * factor for s in spreads]
-        above = [(s["high"] - s["median"]) * factor for s in spreads]
-        axes.errorbar(xs, ys, xerr=[below, above], fmt="none", ecolor=FAINT, elinewidth=2.2, zorder=1)
-    axes.plot(xs, ys, color=GREEN if dial["lossless"] else BLUE, marker="o", markersize=4, linewidth=1.2, zorder=3)
-    return [Label(axes, label, x, y, INK) for label, x, y in zip(dial["points"], xs, ys, strict=True)]
-
-
-def _room(axes: Any) -> None:
-    """Show at least two decades of cost around the points, for comparable curves and space for labels."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    low, high = axes.get_xlim()
-    middle, reach = math.sqrt(low * high), max(10.0, math.sqrt(high / low) * 3)
-    axes.set_xlim(middle / reach, middle * reach)
-    axes.set_ylim(FLOOR, 1000)
-    axes.xaxis.set_major_locator(LogLocator())
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.tick_params(labelleft=True)
+from endotsr.results.report.style import GREY, LIGHT, SMALL, name_axes, new_figure, save
+from endotsr.studies.tradeoff.figure import logarithmic_axes, main_figure
 
 
 def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
@@ -84,12 +17,55 @@ def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
 
 
 def draw(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> list[str]:
-    """All pictures of a study; returns the written stems."""
-    pictures = {name: main_figure(result)} if result["joint"] else {}
-    if result.get("dials"):
-        pictures |= {
-            f"{name}_dials": dials_figure(result, "forward"),
-            f"{name}_dials_visits": dials_figure(result, "visits"),
-            f"{name}_dials_gradients": dials_figure(result, "both", "gradient"),
-        }
-    return save_pictures(pictures, folder)
+    """The picture of a study; returns the written stems."""
+    return save_pictures({name: main_figure(result)}, folder) if result["joint"] else []
+
+
+def training_figure(result: dict[str, Any]) -> Any:
+    """PSNR against time: one panel per question, the base in grey with the trainings that answer it."""
+    by_name = {c["name"]: c for c in result["configurations"]}
+    dials = [d for d in dict.fromkeys(c["dial"] for c in result["configurations"]) if d != "base"] or ["base"]
+    rows, columns = -(-len(dials) // 3), min(3, len(dials))
+    figure = new_figure(3.1 * columns, 2.6 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+    labels = []
+    for axes, dial in zip(panels, dials, strict=False):
+        same = [c for c in result["configurations"] if c["dial"] == dial and dial != "base"]
+        lines = [(c, LIGHT.colours[i % 4]) for i, c in enumerate(same)]
+        lines += [(by_name["base"], GREY)] if "base" in by_name else []
+        labels += [_line(axes, configuration, colour) for configuration, colour in lines]
+        logarithmic_axes(axes, "minutes of training", SMALL, title=dial, log_y=False)
+        name_axes(axes, y="PSNR, dB", sizes=SMALL)
+        axes.label_outer()
+    for axes in panels[len(dials) :]:
+        axes.set_axis_off()
+    _room(panels[: len(dials)])
+    place_labels(figure, labels)
+    return figure
+
+
+def _line(axes: Any, configuration: dict[str, Any], colour: str) -> Label:
+    """Draw one curve; returns the label at its end."""
+    rows = [row for row in configuration["milestones"] if row["psnr_full"] is not None]
+    xs, ys = [row["seconds"] / 60 for row in rows], [row["psnr_full"] for row in rows]
+    axes.plot(xs, ys, color=colour, linewidth=1.4, marker="o", markersize=3)
+    return Label(axes, configuration["name"], xs[-1], ys[-1], colour, 8, "bold")
+
+
+def _room(panels: Any) -> None:
+    """Set plain numbers along the common axis, and space for the labels at the right."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    low, high = panels[0].get_xlim()
+    panels[0].set_xlim(low, high * (high / low) ** 0.25)
+    bottom, top = panels[0].get_ylim()
+    panels[0].set_ylim(bottom, top + 0.12 * (top - bottom))
+    for axes in panels:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 200 * low else (1,)))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def draw_training(result: dict[str, Any], folder: Path, name: str) -> list[str]:
+    """PSNR against time; returns the written stems."""
+    return save_pictures({name: training_figure(result)}, folder) if result["configurations"] else []

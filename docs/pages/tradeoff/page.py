@@ -24,8 +24,7 @@ from endotsr.studies.tradeoff.study import described
 from endotsr.training.runs.files import write_json
 from pages.store.marks import read_json, write_marked
 from pages.tradeoff import stop as tradeoff_stop
-from pages.tradeoff.curves import draw_training
-from pages.tradeoff.figures import draw
+from pages.tradeoff.figures import draw, draw_training
 from pages.tradeoff.parts import fragments
 from pages.tradeoff.study import run_whole_study
 from pages.tradeoff.train import TRAINING

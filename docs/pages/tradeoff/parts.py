@@ -6,7 +6,9 @@ from endotsr.results.report.tables import markdown
 from endotsr.studies.tradeoff.text import COLUMNS, front_rows, levels, made
 from pages.tradeoff.dials import OMITTED
 from pages.tradeoff.text import (
+    DIAL_COLUMNS,
     advice,
+    dial_rows,
     eight_bit_setting,
     error_over_cutoff,
     float32_floor,
@@ -33,6 +35,7 @@ def fragments(
         "advice": _numbered(advice(result)),
         "made": made(result),
         "front": markdown(COLUMNS, front_rows(result)),
+        "dials": markdown(DIAL_COLUMNS, dial_rows(result)),
         "presets": _bullets(preset_lines(result)),
         "certificate": certificate_line(result),
         "omitted": _bullets([f"{what}: {why}." for what, why in omitted.items()]),

@@ -5,7 +5,7 @@ from typing import Any
 
 from endotsr.results.report.tables import duration, plain
 from endotsr.studies.tradeoff.study import Ranked, dominates
-from endotsr.studies.tradeoff.text import levels, small
+from endotsr.studies.tradeoff.text import levels, milliseconds, small
 
 # Dominated presets with the reason to keep them. A test fails for a dominated preset without a reason.
 KEPT = {
@@ -60,6 +60,22 @@ def error_over_cutoff(result: dict[str, Any]) -> float:
 def float32_floor(result: dict[str, Any]) -> float:
     """The smallest largest error of the sweep in float32."""
     return min((p["error"]["max"] for p in _joint(result, "float32")), default=float("nan"))
+
+
+DIAL_COLUMNS = ("Dial", "Value", "frame", "with reverse", "work", "largest error", "worst gradient block")
+
+
+def dial_rows(result: dict[str, Any]) -> list[list[str]]:
+    """Every value of every dial, from accurate to fast: times, visited pairs or basis terms, errors."""
+    by_name, rows = {p["name"]: p for p in result["points"]}, []
+    for dial in result["dials"]:
+        for label, name in dial["points"].items():
+            point = by_name[name]
+            work = f"{point[dial['cost']]:,} {dial['cost']}".replace(",", " ")
+            times = [milliseconds(point[part]["median"]) for part in ("forward", "both")]
+            errors = [levels(point["error"]["max"]), f"{point['error']['gradient']:.2g}"]
+            rows.append([dial["title"], label, *times, work, *errors])
+    return rows
 
 
 def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:

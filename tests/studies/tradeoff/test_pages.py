@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from pages.tradeoff.figures import dials_figure, draw
+from pages.tradeoff.figures import draw
 from pages.tradeoff.study import run_whole_study
-from pages.tradeoff.text import advice, error_over_cutoff
+from pages.tradeoff.text import advice, dial_rows, error_over_cutoff
 
 from endotsr.studies.tradeoff.figure import main_figure
 from endotsr.studies.tradeoff.settings import CUTOFFS
@@ -37,35 +37,33 @@ def overlaps(figure) -> list[tuple[str, str]]:
     return found
 
 
-def figures(result):
-    if result["joint"]:
-        yield main_figure(result)
-    yield dials_figure(result, "forward")
-    yield dials_figure(result, "visits")
-    yield dials_figure(result, "both", "gradient")
-
-
 def test_no_word_covers_another(result):
-    for figure in figures(result):
-        assert sum(len(axes.texts) for axes in figure.axes) > 10
-        assert overlaps(figure) == []
+    figure = main_figure(result)
+    assert sum(len(axes.texts) for axes in figure.axes) > 10
+    assert overlaps(figure) == []
 
 
 @pytest.mark.parametrize("file", COMMITTED, ids=lambda file: file.stem)
 def test_no_word_covers_another_in_the_committed_pictures(file):
     committed = json.loads(file.read_text(encoding="utf-8"))
-    if "points" in committed:
-        assert all(overlaps(figure) == [] for figure in figures(committed))
+    if "points" in committed and committed["joint"]:
+        assert overlaps(main_figure(committed)) == []
 
 
 def test_pictures_are_drawn(result, tmp_path):
-    """Of the whole study, and of the measurement of the command, which has no dials."""
-    stems = draw(result, tmp_path)
-    assert stems == ["tradeoff", "tradeoff_dials", "tradeoff_dials_visits", "tradeoff_dials_gradients"]
-    for stem in stems:
-        assert (tmp_path / f"{stem}.png").read_bytes()[:4] == b"\x89PNG"
-        assert "<svg" in (tmp_path / f"{stem}.svg").read_text()
-    assert draw({key: value for key, value in result.items() if key != "dials"}, tmp_path) == ["tradeoff"]
+    assert draw(result, tmp_path) == ["tradeoff"]
+    assert (tmp_path / "tradeoff.png").read_bytes()[:4] == b"\x89PNG"
+    assert "<svg" in (tmp_path / "tradeoff.svg").read_text()
+
+
+def test_every_value_of_every_dial_has_a_row(result):
+    """With the figures of its own point."""
+    rows, points = dial_rows(result), {p["name"]: p for p in result["points"]}
+    assert [row[:2] for row in rows] == [[d["title"], label] for d in result["dials"] for label in d["points"]]
+    names = [(d, name) for d in result["dials"] for name in d["points"].values()]
+    for row, (dial, name) in zip(rows, names, strict=True):
+        assert row[4].replace(" ", "") == f"{points[name][dial['cost']]}{dial['cost']}"
+        assert row[5] == f"{points[name]['error']['max'] * 255:.2g}/255"
 
 
 def test_equal_results_give_equal_pictures(result, tmp_path):

@@ -7,7 +7,7 @@ from endotsr.results.report.style import BLUE, FAINT, GREY, NORMAL, ORANGE, Size
 from endotsr.studies.tradeoff.study import cost_of
 from endotsr.studies.tradeoff.text import LEVELS, small
 
-TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
+COSTS = {"forward": ("milliseconds a frame", 1e3), "visits": ("visited pixel-Gaussian pairs", 1.0)}  # label, factor
 FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn
 
 
@@ -18,8 +18,8 @@ def main_figure(result: dict[str, Any]) -> Any:
     labels = []
     for axes, cost in ((left, "forward"), (right, "visits")):
         labels += _sweep(axes, result, cost)
-        draw_levels(axes, result)
-        logarithmic_axes(axes, cost_name(cost))
+        _draw_levels(axes, result)
+        logarithmic_axes(axes, COSTS[cost][0])
         axes.set_ylim(FLOOR / 10, 1000)
         low, high = axes.get_xlim()
         axes.set_xlim(low / 4, high * 2)
@@ -32,10 +32,10 @@ def main_figure(result: dict[str, Any]) -> Any:
 def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
     """Draw the points; returns their labels, presets first."""
     by_name = {p["name"]: p for p in result["points"]}
-    factor = cost_factor(cost)
+    factor = COSTS[cost][1]
 
     def at(name: str) -> tuple[float, float]:
-        return cost_of(by_name[name], cost) * factor, error_height(by_name[name])
+        return cost_of(by_name[name], cost) * factor, max(by_name[name]["error"]["max"] * LEVELS, FLOOR)
 
     for precision, marker in (("float64", "s"), ("float32", "o")):
         chosen = [at(n) for n in result["joint"] if by_name[n]["setting"]["precision"] == precision]
@@ -62,31 +62,17 @@ def _short(point: dict[str, Any], cost: str) -> str:
     return ", ".join(words + (["half size"] if scale != 1 else []))
 
 
-def error_height(point: dict[str, Any], error: str = "max") -> float:
-    value = point["error"][error]
-    return max(value * LEVELS if error == "max" else value, FLOOR)
-
-
-def cost_factor(cost: str) -> float:
-    return 1.0 if cost == "visits" else 1e3
-
-
-def cost_name(cost: str) -> str:
-    return "visited pixel-Gaussian pairs" if cost == "visits" else TIME[cost]
-
-
-def draw_levels(axes: Any, result: dict[str, Any], named: bool = True) -> None:
+def _draw_levels(axes: Any, result: dict[str, Any]) -> None:
     """Half a step of an 8-bit picture, and the noise of the sensor."""
     lines = [(result["lines"]["eight_bit"], "half a step of 8 bit", "--")]
     if result["lines"]["sensor_noise"]:
         lines.append((result["lines"]["sensor_noise"], "sensor noise", ":"))
     for value, label, dashes in lines:
         axes.axhline(value * LEVELS, color=GREY, linestyle=dashes, linewidth=1, zorder=1)
-        if named:
-            axes.annotate(
-                label, (1, value * LEVELS), xycoords=("axes fraction", "data"), xytext=(-3, 2),
-                textcoords="offset points", ha="right", va="bottom", fontsize=8, color=GREY,
-            )  # fmt: skip
+        axes.annotate(
+            label, (1, value * LEVELS), xycoords=("axes fraction", "data"), xytext=(-3, 2),
+            textcoords="offset points", ha="right", va="bottom", fontsize=8, color=GREY,
+        )  # fmt: skip
 
 
 def logarithmic_axes(axes: Any, name: str, sizes: Sizes = NORMAL, title: str = "", log_y: bool = True) -> None:
