@@ -77,8 +77,9 @@ def run(words: list[str]) -> int:
     if kind == "page":
         _write_page(options)
         return 0
-    said = export(open_any(options.scene), options.out, times, content)
-    print(said)
+    scene = open_any(options.scene)
+    said = export(scene, options.out, times, content)
+    print("\n".join([said, *(f"  {note}" for note in scene.notes)]))
     files = sorted(options.out.iterdir()) if options.out.is_dir() else [options.out]
     sizes = {file.name: file.stat().st_size for file in files}
     write_result(options.json, out=options.out, content=options.content, bytes=sizes, said=said)

@@ -74,6 +74,8 @@ def run(words: list[str]) -> int:
     pictures.check_outputs(options.out, options.film, options.rate, options.slow)
     use_threads(options.threads)
     scene = open_any(options.scene)
+    for note in scene.notes:
+        print(f"  {note}")
     for path in filter(None, (options.out, options.film)):
         if scene.folder is not None:
             refuse_inside_data(path, scene.folder)

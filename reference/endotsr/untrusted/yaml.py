@@ -15,8 +15,9 @@ DIRECTIVE = "%YAML"  # written by OpenCV with a colon, which is not YAML
 
 
 def read_yaml(path: Path) -> Keys:
-    """The mapping of a file, whose documents are equal. An OpenCV matrix becomes a mapping with rows, cols and data.
+    """The mapping of a file. An OpenCV matrix becomes a mapping with rows, cols and data.
 
+    Edges:   several documents that differ in `header` alone, as `rostopic echo` prints them, are one.
     Raises:  InputError if the file cannot be read or is not a mapping. Tags never create objects.
     """
     import yaml
@@ -32,7 +33,8 @@ def read_yaml(path: Path) -> Keys:
         documents = [document for document in yaml.load_all(text, Loader) if document is not None]
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise InputError(f"{path}: not YAML: {str(error).splitlines()[0] if str(error) else 'too deep'}") from None
-    found = documents[0] if documents and documents.count(documents[0]) == len(documents) else None
+    bare = [{k: v for k, v in d.items() if k != "header"} if isinstance(d, dict) else d for d in documents]
+    found = documents[0] if bare and bare.count(bare[0]) == len(bare) else None
     if len(documents) > 1 and found is None:
         raise InputError(f"{path}: {len(documents)} documents that differ; use a file with one")
     if not isinstance(found, dict):

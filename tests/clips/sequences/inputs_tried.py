@@ -70,6 +70,7 @@ from input_kinds import (
 from left_inputs import LEFT_ROWS
 from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
 from odd_inputs import ODD_ROWS
+from silent_inputs import SILENT_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
 
@@ -284,6 +285,7 @@ ROWS = [
       for name, *words in (("a.spz",), ("a.splat",), ("a.obj", "--content", "mesh"), ("a.gltf", "--content", "mesh"))),
     *ODD_ROWS,
     *LEFT_ROWS,
+    *SILENT_ROWS,
 ]  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.sequences.camera import rows_of_motion
 from endotsr.clips.sequences.files import shortened
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -182,9 +183,10 @@ def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
         notes.append(f"{path}: not used: {shortened([plain_line(name) for name in more])}; a pair has cam0 and cam1")
     if not isinstance(keys.get("cam1"), dict):
         return StoredCalibration(left, notes=tuple(notes))
-    motion = matrix(keys["cam1"].get("T_cn_cnm1"), f"{path}: cam1: T_cn_cnm1", (4, 4))
+    where = f"{path}: cam1: T_cn_cnm1"
+    turn, shift = rows_of_motion(matrix(keys["cam1"].get("T_cn_cnm1"), where, (4, 4)), where)
     right = _kalibr_camera(path, keys["cam1"], "cam1")
-    return StoredCalibration(left, right, motion[:3, :3], 1000.0 * motion[:3, 3], notes=tuple(notes))
+    return StoredCalibration(left, right, turn, 1000.0 * shift, notes=tuple(notes))
 
 
 def _kalibr_camera(path: Path, keys: Keys, name: str) -> StoredIntrinsics:
@@ -257,7 +259,7 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
     """
     size, notes = _opencv_size(keys), ()
     if any(name in keys for names in (*ONE, *PAIRS) for name in names[:1]):
-        notes = tuple(OPENCV.noted(keys, path))
+        notes = (*OPENCV.noted(keys, path), *_four_coefficients(keys, path))
     for left, left_distortion, right, right_distortion in PAIRS:
         if left in keys and right in keys:
             for name in ("R", "T"):
@@ -280,6 +282,15 @@ def _opencv_camera(
     found = matrix(keys[name], f"{path}: {name}", (3, 3))
     given = matrix(keys[distortion], f"{path}: {distortion}", (-1,)) if distortion in keys else None
     return StoredIntrinsics(found, () if given is None else distortion_of(given, f"{path}: {distortion}"), size)
+
+
+def _four_coefficients(keys: Keys, path: Path) -> list[str]:
+    """A note on four coefficients, which OpenCV's fisheye model has too, stored under the same names."""
+    stored = [keys.get(name) for names in (*ONE, *PAIRS) for name in names[1::2]]
+    values = [value.get("data") if isinstance(value, dict) else value for value in stored]
+    if not any(isinstance(value, list) and len(value) == 4 and any(value) for value in values):
+        return []
+    return [f"{path.name}: 4 coefficients are read as k1 k2 p1 p2; those of a fisheye model, stored alike, are not"]
 
 
 def _opencv_size(keys: Keys) -> tuple[int, int] | None:

@@ -8,12 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.clips.sequences.calibration_formats import FORMATS, StoredCalibration, StoredIntrinsics
+from endotsr.clips.sequences.calibration_formats import FORMATS as GENERAL
+from endotsr.clips.sequences.calibration_formats import StoredCalibration, StoredIntrinsics
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration, checked_rotation, intrinsics_of_matrix
+from endotsr.clips.sequences.slam_calibrations import FORMATS as SLAM
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.storage import read_storage
 from endotsr.untrusted.yaml import read_yaml
+
+FORMATS = (*SLAM, *GENERAL)  # in the order in which they are tried
 
 
 def read_calibration(path: Path) -> StoredCalibration:

@@ -90,6 +90,17 @@ def inverse_pose(rotation: FloatArray, translation: FloatArray) -> CameraPose:
     return CameraPose(turned, -turned @ translation + 0.0)
 
 
+def rows_of_motion(matrix: FloatArray, where: object) -> tuple[FloatArray, FloatArray]:
+    """Rotation (3, 3) and translation (3,) of a matrix of 3x4 or 4x4.
+
+    Raises:  InputError for a last row other than 0 0 0 1, in which a transposed matrix has its translation.
+    """
+    if len(matrix) == 4 and (matrix[3] != (0, 0, 0, 1)).any():
+        last = " ".join(f"{value:g}" for value in matrix[3])
+        raise InputError(f"{where}: the last row of the matrix is {last}; use 0 0 0 1: is the matrix transposed?")
+    return matrix[:3, :3], matrix[:3, 3]
+
+
 def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
     """The matrix. Raises InputError unless it is a finite rotation."""
     if not np.isfinite(matrix).all():

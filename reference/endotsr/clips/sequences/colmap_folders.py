@@ -62,10 +62,14 @@ def choose_model(path: Path, name: str = "") -> ChosenModel:
     else:
         found = max(models, key=lambda folder: counts[folder])
     others = [f"{names[folder]} ({counts[folder]} pictures)" for folder in models if folder != found]
+    forms = [ending for ending in (".txt", ".bin") if (found / f"cameras{ending}").is_file()]
+    notes = [f"{names[found]}: the text files are read, not the binary ones beside them"] if len(forms) > 1 else []
     if not others:
-        return ChosenModel(found, ["there is one model: --model changes nothing"] if name else [])
+        return ChosenModel(found, [*notes, *(["there is one model: --model changes nothing"] if name else [])])
     why = "as stated" if name else "the largest model"
-    return ChosenModel(found, [f"{names[found]} is read, {why}; not read: {', '.join(others)}; --model selects one"])
+    return ChosenModel(
+        found, [*notes, f"{names[found]} is read, {why}; not read: {', '.join(others)}; --model selects one"]
+    )
 
 
 def _shown(folder: Path, path: Path) -> str:

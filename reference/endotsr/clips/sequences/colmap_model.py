@@ -138,11 +138,26 @@ def _images_text(path: Path) -> list[ModelImage]:
         words, where = line.split(maxsplit=9), f"{path}: line {number}"
         try:
             values, camera, name = [float(word) for word in words[1:8]], int(words[8]), words[9].strip()
-            points = np.array(seen.split()[2::3], np.float64).astype(np.int64)
         except (ValueError, IndexError):
             raise InputError(f"{where}: allowed: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then points") from None
+        points = _visible_points(seen, f"{path}: line {number}: the line below it")
         found.append(ModelImage(name, camera, _pose(values, where), points[points >= 0]))
     return found
+
+
+def _visible_points(line: str, where: str) -> NDArray[np.int64]:
+    """The ids of the points of a picture, -1 for a keypoint without a point.
+
+    Raises:  InputError for another line, such as that of the next picture in a file that leaves out lines of points.
+    """
+    words = line.split()
+    try:
+        numbers = np.array(words, np.float64).reshape(-1, 3)
+    except ValueError:
+        raise InputError(
+            f"{where}: allowed: X Y POINT3D_ID of each keypoint, or an empty line: every picture has two lines"
+        ) from None
+    return numbers[:, 2].astype(np.int64)
 
 
 def _points_text(path: Path) -> dict[int, FloatArray]:
@@ -151,7 +166,10 @@ def _points_text(path: Path) -> dict[int, FloatArray]:
         if line.strip():
             words = line.split()
             try:
-                found[int(words[0])] = np.array([float(word) for word in words[1:4]])
+                point = np.array([float(word) for word in words[1:4]])
+                if len(words) < 8 or len(words) % 2 or not np.isfinite(point).all():
+                    raise ValueError
+                found[int(words[0])] = point
             except (ValueError, IndexError):
                 raise InputError(f"{path}: line {number}: allowed: POINT3D_ID X Y Z R G B ERROR TRACK") from None
     return found
@@ -179,6 +197,14 @@ class _Bytes:
             raise InputError(f"{self.path}: states {number} entries; the file has {len(self.data)} bytes")
         return number
 
+    def end(self) -> None:
+        """Raises InputError for bytes behind the last entry."""
+        if self.place < len(self.data):
+            raise InputError(
+                f"{self.path}: {len(self.data) - self.place} bytes behind the last entry: another version of the"
+                " format, or a damaged file; export the model again, or as text"
+            )
+
     def name(self) -> str:
         """A zero-terminated string."""
         end = self.data.find(b"\0", self.place)
@@ -198,6 +224,7 @@ def _cameras_binary(path: Path) -> dict[int, Intrinsics]:
             raise InputError(f"{where}: camera model number {model}: allowed: {', '.join(MODELS)}")
         values = list(stream.take(f"{PARAMETERS[NUMBERS[model]]}d"))
         found[key] = _intrinsics(NUMBERS[model], width, height, values, where)
+    stream.end()
     return found
 
 
@@ -208,6 +235,7 @@ def _images_binary(path: Path) -> list[ModelImage]:
         name, seen = stream.name(), stream.count(24)
         points = np.array([stream.take("ddq")[2] for _ in range(seen)], np.int64)
         found.append(ModelImage(name, camera, _pose(values, f"{path}: image {key}"), points[points >= 0]))
+    stream.end()
     return found
 
 
@@ -216,5 +244,8 @@ def _points_binary(path: Path) -> dict[int, FloatArray]:
     for _ in range(stream.count(43)):
         key, x, y, z, *_ = stream.take("QdddBBBd")
         stream.take(f"{2 * stream.count(8)}i")
+        if not np.isfinite([x, y, z]).all():
+            raise InputError(f"{path}: point {key}: allowed: finite numbers")
         found[key] = np.array([x, y, z])
+    stream.end()
     return found

@@ -36,7 +36,7 @@ class Inventory(NamedTuple):
         unknown = []
         for name in map(str, fields):
             why = self.reason(self.refused, name)
-            if why is not None and not self._changes_nothing(name, values.get(name)):
+            if why is not None and not (name in values and self._changes_nothing(name, values[name])):
                 raise InputError(f"{where}: {name} = {shown(values[name])}: {why}" if name in values else
                                  f"{where}: {name}: {why}")  # fmt: skip
             if why is None and self.reason(self.used, name) is None and self.reason(self.harmless, name) is None:
@@ -46,5 +46,7 @@ class Inventory(NamedTuple):
     def _changes_nothing(self, name: str, value: object) -> bool:
         """Whether a refused field has a neutral value: nothing, zero, false, empty or one that is listed."""
         if not value or (isinstance(value, list) and not any(value)):
+            return True
+        if isinstance(value, dict) and not any(value.values()):  # such as roi of rostopic echo
             return True
         return any(value == neutral for neutral in self.neutral.get(name, ()))

@@ -200,7 +200,7 @@ def stated_poses(
     unit = options.trajectory_unit or "m"
     trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes or "opencv")
     poses, how = poses_of_frames(trajectory, count, rate, times, numbers)
-    return poses, [f"{options.trajectory.name}: {how}; positions in {unit}"]
+    return poses, ["; ".join([f"{options.trajectory.name}: {how}", f"positions in {unit}", *trajectory.notes])]
 
 
 def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:

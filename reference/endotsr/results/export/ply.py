@@ -12,21 +12,36 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.constants import Y00
 from endotsr.method.splatting.render import Scene
 from endotsr.training.scene.gaussians import Gaussians, arrays
-from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.ply import read_vertices
 from endotsr.untrusted.writing import replace_file
 
-PLY_TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1", "uint8": "u1",
-             "char": "i1", "int8": "i1", "short": "<i2", "int16": "<i2", "ushort": "<u2", "uint16": "<u2",
-             "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4"}  # fmt: skip
 TYPE_NAMES = {np.dtype("<f4"): "float", np.dtype("u1"): "uchar"}
 LARGEST_FILE = 1 << 33  # bytes
 REST = (0, 9, 24, 45)  # number of f_rest columns for degree 0 to 3
 LEAST_NORM = 1e-12  # lower bound for the norm of a quaternion
+MOVES = "the Gaussians of this file move or change, and one picture of them needs a time: export one time of the scene"
+GAUSSIAN = Inventory(
+    "the vertices of a 3-D Gaussian splatting file",
+    used={
+        "x y z": "centre",
+        "f_dc_0 f_dc_1 f_dc_2 f_rest_*": "coefficients of the spherical harmonics; 0, 9, 24 or 45 of f_rest",
+        "opacity": "logit",
+        "scale_0 scale_1 scale_2": "logarithms of the standard deviations",
+        "rot_0 rot_1 rot_2 rot_3": "quaternion w x y z",
+        "filter_3D": "standard deviation of the filter of Mip-Splatting, added in quadrature",
+    },
+    refused={
+        "motion_* trbf_* t scale_t rot_r_* omega_* velocity_* vel_* accel_* deform*": MOVES,
+        "f_t_* feature_t_* f_fourier_*": MOVES,
+    },
+    harmless={"nx ny nz": "Gaussians have no normals", "red green blue": "the colour is that of f_dc"},
+)
 
 
 def gaussian_vertices(scene: Scene) -> NDArray[np.void]:
@@ -97,19 +112,46 @@ def write_ply(
 def read_gaussians(path: Path) -> Gaussians:
     """The Gaussians of a file, float32, without those with a number that is not finite.
 
+    A property `filter_3D` of Mip-Splatting widens the Gaussians, as its program does before it renders them.
+
     Raises: InputError naming file and reason.
     """
+    return read_gaussians_noted(path)[0]
+
+
+def read_gaussians_noted(path: Path) -> tuple[Gaussians, list[str]]:
+    """As `read_gaussians`, and notes on properties that are not used."""
+    vertices, others = read_vertices(path, LARGEST_FILE)
+    names = vertices.dtype.names or ()
+    notes = GAUSSIAN.noted(names, path.name)
+    if others:
+        notes.append(f"{path.name}: not used: its {', '.join(others)}")
+    if "scale_1" in names and "scale_2" not in names:
+        raise InputError(f"{path}: property scale_2 is missing: flat Gaussians, as 2-D Gaussian splatting writes them;"
+                         " use a 3-D Gaussian splatting file")  # fmt: skip
     try:
-        found = _gaussians(_vertices(read_bytes(path, LARGEST_FILE)))
+        found = _gaussians(vertices)
     except KeyError as error:
         raise InputError(
             f"{path}: property {error.args[0]} is missing; allowed: a 3-D Gaussian splatting file"
         ) from None
-    except InputError:
-        raise
     except ValueError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
-    return sound(found, path)
+    if "filter_3D" in names:
+        found = _filtered(found, vertices["filter_3D"].astype(np.float64))
+    return sound(found, path), notes
+
+
+def _filtered(found: Gaussians, width: FloatArray) -> Gaussians:
+    """The Gaussians convolved with one of standard deviation `width` (N,); the opacity keeps its integral.
+
+    s' = sqrt(s^2 + w^2)        o' = o prod(s) / prod(s')
+    """
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # `sound` leaves out what is not finite
+        wide = 0.5 * np.logaddexp(2 * found.log_scale, 2 * np.log(np.abs(width)))
+        opacity = np.exp((found.log_scale - wide).sum(axis=0)) / (1 + np.exp(-found.opacity_logit))
+        logit = np.log(opacity) - np.log1p(-opacity)
+    return found._replace(log_scale=wide, opacity_logit=logit)
 
 
 def sound(found: Gaussians, path: Path) -> Gaussians:
@@ -143,25 +185,3 @@ def _gaussians(vertex: NDArray[np.void]) -> Gaussians:
         columns("x", "y", "z"), columns("rot_0", "rot_1", "rot_2", "rot_3"), columns("scale_0", "scale_1", "scale_2"),
         columns("opacity")[0], harmonics,
     )  # fmt: skip
-
-
-def _vertices(content: bytes) -> NDArray[np.void]:
-    """The vertices of a binary little-endian PLY file, whose first element must be `vertex`."""
-    head, mark, body = content.partition(b"end_header\n")
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    if not mark or lines[:1] != [["ply"]] or ["format", "binary_little_endian", "1.0"] not in lines:
-        raise ValueError("not a binary little-endian PLY file")
-    elements = [i for i, line in enumerate(lines) if line[:1] == ["element"]]
-    first = lines[elements[0]] if elements else []
-    if len(first) != 3 or first[1] != "vertex" or not first[2].isdecimal():
-        raise ValueError("the first element is not `vertex` with a count")
-    properties = [line for line in lines[elements[0] : (elements + [None])[1]] if line[:1] == ["property"]]
-    if any(len(line) != 3 or line[1] not in PLY_TYPES for line in properties):
-        raise ValueError("a vertex property is not a plain number")
-    names, count = [line[2] for line in properties], int(first[2])
-    if len(set(names)) < len(names) or not names:
-        raise ValueError("no vertex property, or two with the same name")
-    kind = np.dtype([(line[2], PLY_TYPES[line[1]]) for line in properties])
-    if count < 1 or len(body) < count * kind.itemsize:
-        raise ValueError(f"{count} vertices of {kind.itemsize} bytes expected, {len(body)} bytes found")
-    return np.frombuffer(body, kind, count=count)

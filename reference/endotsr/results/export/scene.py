@@ -18,7 +18,7 @@ from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut, Scene
 from endotsr.results.export.model import load_slim_model
 from endotsr.results.export.placement import HERE, Placement, placement_of
-from endotsr.results.export.ply import read_gaussians
+from endotsr.results.export.ply import read_gaussians_noted
 from endotsr.training.fitting.model import corrected_cameras, render_at, scene_at, spectral_from, without
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.model import Model, load_model
@@ -40,6 +40,7 @@ class MovingScene:
     loaded: Model | None = None
     folder: RunFolder | None = None
     one_time: bool = False  # from a ply file, which has export coordinates
+    notes: tuple[str, ...] = ()  # on parts of the file that are not used
 
     @cached_property
     def model(self) -> Model:
@@ -108,7 +109,7 @@ def open_scene(path: Path) -> MovingScene:
 
 
 def _from_ply(path: Path) -> MovingScene:
-    gaussians = read_gaussians(path)
+    gaussians, notes = read_gaussians_noted(path)
     camera = facing_camera(gaussians.position, SIDE)
     distance = float(camera.translation[2] + np.median(gaussians.position[2]))
     model = with_settings(STILL, harmonics_degree=round(len(gaussians.harmonics) ** 0.5) - 1)
@@ -117,7 +118,9 @@ def _from_ply(path: Path) -> MovingScene:
         unit="scene units", largest_depth=2 * distance, static_camera=True, names=[path.stem], times=[0.0],
         train_index=[0], test_index=[0], cameras=recorded([camera]),
     )  # fmt: skip
-    return MovingScene(record, Model(gaussians, spectral_from(model, np.zeros(1)), config, 0), one_time=True)
+    return MovingScene(
+        record, Model(gaussians, spectral_from(model, np.zeros(1)), config, 0), one_time=True, notes=tuple(notes)
+    )
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:

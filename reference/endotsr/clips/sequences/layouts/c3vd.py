@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.opencv.stereo import Maps, remapped
-from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matrix, inverse_pose
+from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matrix, inverse_pose, rows_of_motion
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
-from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 
@@ -72,8 +71,9 @@ def read_poses(path: Path) -> list[CameraPose | None]:
             continue
         if stored.size != 16 or not np.isfinite(stored).all():
             raise InputError(f"{path}: line {number}: allowed: 16 finite numbers")
-        rows: FloatArray = stored.reshape(4, 4).T
-        found.append(inverse_pose(checked_rotation(rows[:3, :3], f"{path}: line {number}"), rows[:3, 3]))
+        where = f"{path}: line {number}"
+        turn, shift = rows_of_motion(stored.reshape(4, 4).T, where)
+        found.append(inverse_pose(checked_rotation(turn, where), shift))
     return found
 
 

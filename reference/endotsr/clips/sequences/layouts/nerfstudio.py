@@ -16,6 +16,7 @@ from endotsr.clips.sequences.camera import (
     Intrinsics,
     checked_intrinsics,
     pose_of,
+    rows_of_motion,
     scene_factor,
     shared_intrinsics,
 )
@@ -24,12 +25,12 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.point_files import read_cloud
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.json import Keys, integer, listed, number, read_json
 from endotsr.untrusted.names import relative_path
 from endotsr.untrusted.yaml import matrix
@@ -116,20 +117,6 @@ def read_intrinsics(data: Keys, frame: Keys, size: tuple[int, int], where: str) 
     return checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, bent if any(bent) else ()), where)
 
 
-def read_points(path: Path) -> FloatArray:
-    """Points (n, 3) of an ASCII PLY file with first columns x y z. Raises InputError."""
-    head, mark, body = read_bytes(path, LARGEST_FILE).decode("ascii", "replace").partition("end_header\n")
-    if not mark or "format ascii" not in head:
-        raise InputError(f"{path}: use a PLY file in ASCII, as nerfstudio writes it")
-    try:
-        rows = np.array([line.split()[:3] for line in body.splitlines() if line.strip()], np.float64)
-    except ValueError:
-        rows = np.zeros((0, 0))
-    if rows.ndim != 2 or rows.shape[1] != 3 or not np.isfinite(rows).all():
-        raise InputError(f"{path}: use lines of numbers that begin with x y z")
-    return rows
-
-
 def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     """The file as a clip. Raises InputError naming the frame and the key."""
     file = path if path.is_file() else next((path / name for name in FILES if (path / name).is_file()), path / FILES[0])
@@ -204,9 +191,13 @@ def _times(entries: list[Keys], rate: float | None, file: Path, notes: list[str]
 def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray | None:
     """The points (n, 3) that the file names, with a note; None without."""
     path = _named(folder, data.get("ply_file_path"), f"{file}: ply_file_path")
-    if path is None or not path.is_file():
+    if path is None:
         return None
-    cloud = read_points(path)
+    if not path.is_file():
+        notes.append(f"ply_file_path: {path.name} is not there: no points")
+        return None
+    cloud, unused = read_cloud(path)
+    notes += unused
     notes.append(f"{len(cloud)} points: the file does not state their visibility")
     return cloud
 
@@ -229,8 +220,8 @@ def _picture(folder: Path, name: Any, where: str) -> Path:
 
 def _pose(entry: Keys, options: SourceOptions, factor: float, where: str) -> CameraPose:
     where += ": transform_matrix"
-    stored = matrix(entry.get("transform_matrix"), where, (4, 4), (3, 4))
-    return pose_of(stored[:3, :3], stored[:3, 3] * factor, options.direction, options.axes or "opengl", where)
+    turn, shift = rows_of_motion(matrix(entry.get("transform_matrix"), where, (4, 4), (3, 4)), where)
+    return pose_of(turn, shift * factor, options.direction, options.axes or "opengl", where)
 
 
 LAYOUT = Layout(

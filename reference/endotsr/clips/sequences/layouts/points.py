@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.camera import ARBITRARY, checked_rotation, intrinsics_of_matrix
+from endotsr.clips.sequences.camera import ARBITRARY, checked_rotation, intrinsics_of_matrix, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import frame_numbers, list_pictures
 from endotsr.clips.sequences.layouts import Layout
@@ -56,8 +56,9 @@ def describe_points(path: Path, options: SourceOptions) -> Clip:
     width, height = size_of(frames)
     where = path / CAMERAS
     poses: list[CameraPose | None] = [
-        CameraPose(checked_rotation(matrix[:3, :3], f"{where}: w2c: frame {i}"), matrix[:3, 3].astype(np.float64))
+        CameraPose(checked_rotation(turn, f"{where}: w2c: frame {i}"), shift)
         for i, matrix in enumerate(found["w2c"].astype(np.float64))
+        for turn, shift in [rows_of_motion(matrix, f"{where}: w2c: frame {i}")]
     ]
     mask = options.masks or path / "mask.png"
     if options.masks is not None and not mask.is_file():

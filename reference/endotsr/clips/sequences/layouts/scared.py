@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.camera import checked_rotation
+from endotsr.clips.sequences.camera import checked_rotation, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
@@ -66,8 +66,8 @@ def _poses(path: Path, count: int) -> list[CameraPose | None] | None:
         where = f"{path / FOLDER / name}: camera-pose"
         data = parsed(content, where)
         stored = matrix(data.get("camera-pose") if isinstance(data, dict) else None, where, (4, 4))
-        rotation, translation = checked_rotation(stored[:3, :3], where), stored[:3, 3]
-        found.append(CameraPose(rotation, translation))
+        rotation, translation = rows_of_motion(stored, where)
+        found.append(CameraPose(checked_rotation(rotation, where), translation))
     return found + [None] * (count - len(found))
 
 
