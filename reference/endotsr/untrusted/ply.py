@@ -56,9 +56,9 @@ def _vertices(content: bytes) -> Vertices:
     if len(set(names)) < len(names) or not names:
         raise ValueError("no vertex property, or two with the same name")
     kind = np.dtype([(name, FORMS[form] + TYPES[stored]) for name, stored in properties])
-    least = count * (2 * len(names) if form == "ascii" else kind.itemsize) - (form == "ascii")
-    if len(body) < least:
-        raise ValueError(f"{count} vertices need at least {least} bytes, {len(body)} bytes found")
+    width = 2 * len(names) if form == "ascii" else kind.itemsize
+    if len(body) < count * width - (form == "ascii"):
+        raise ValueError(f"{count} vertices of {width} bytes expected, {len(body)} bytes found")
     if form != "ascii":
         return Vertices(np.frombuffer(body, kind, count=count), [other[0] for other in others])
     return Vertices(_from_text(body, kind, count), [other[0] for other in others])
@@ -90,7 +90,7 @@ def _header(content: bytes) -> tuple[str, list[tuple[str, int, list[tuple[str, s
     for line in lines:
         if line[:1] == ["element"]:
             if len(line) != 3 or not line[2].isdecimal():
-                raise ValueError("an element without a name and a count")
+                raise ValueError("an element is not a name with a count")
             elements.append((line[1], int(line[2]), []))
         elif line[:1] == ["property"]:
             if len(line) < 3 or not elements:

@@ -54,7 +54,7 @@ def pictures(folder: Path, inner: str) -> None:
             folder / "masks" / f"{i:03d}.png", np.where(rng.random((HEIGHT, WIDTH)) < 0.5, 0, 255).astype(np.uint8)
         )
         write_png(folder / "planes" / f"{i:03d}.png", rng.integers(1, 999, (HEIGHT, WIDTH)).astype(np.uint16))
-    head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n"
+    head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
     (folder / "cloud.ply").write_text(head + "1 2 3\n")
 
 

@@ -8,8 +8,9 @@ import pytest
 from PIL import Image
 
 from endonerf_writer import write_endonerf
-from endotsr.clips.opencv.pictures import other_profile, read_picture
+from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.picture_fields import colours_differ
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
@@ -140,8 +141,8 @@ def test_a_colour_profile_other_than_srgb_is_named(ending, tmp_path):
     srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     for profile, named in ((None, False), (srgb, False), (b"Display P3" * 20, True)):
         how = {"icc_profile": profile} if profile else {}
-        assert other_profile(written(tmp_path, saved(COLOUR, ending, **how), ending)) is named
-    assert not other_profile(tmp_path / "missing.png") and not other_profile(written(tmp_path, b"", "webp"))
+        assert colours_differ(written(tmp_path, saved(COLOUR, ending, **how), ending)) is named
+    assert not colours_differ(tmp_path / "missing.png") and not colours_differ(written(tmp_path, b"", "webp"))
 
 
 @pytest.mark.parametrize("ending", ["tiff", "bmp", "webp"])

@@ -126,7 +126,11 @@ def test_nerfstudio_points_stand_for_depth(tmp_path, capsys):
     made.nerfstudio(tmp_path / "raw", with_depth=False, ply_file_path="sparse_pc.ply")
     x, y = np.meshgrid(np.linspace(-0.04, 0.04, 9), np.linspace(-0.03, 0.03, 9))
     rows = "\n".join(f"{a} {b} 0.06 9 9 9" for a, b in zip(x.ravel(), y.ravel()))
-    head = "ply\nformat ascii 1.0\nelement vertex 81\nproperty float x\nend_header\n"
+    head = (
+        "ply\nformat ascii 1.0\nelement vertex 81\nproperty float x\nproperty float y\nproperty float z\n"
+        + "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+        + "end_header\n"
+    )
     (tmp_path / "raw/sparse_pc.ply").write_text(head + rows)
     plane = prepared(tmp_path).depth(0)
     np.testing.assert_allclose(plane[plane > 0], 0.06, atol=1e-4)

@@ -179,7 +179,10 @@ def test_a_ply_file_that_is_cut_short_or_odd_is_refused(tmp_path):
         (content.replace(b"float opacity", b"float opacitx"), "property opacity is missing"),
         (content.replace(b"float rot_1", b"float rot_0"), "two with the same name"),
         (content.replace(b"property float f_rest_44\n", b""), "44 f_rest columns"),
-        (content.replace(b"binary_little_endian", b"ascii"), "not a binary little-endian PLY file"),
+        (content.replace(b"binary_little_endian", b"ascii"), "80 lines of 62 numbers expected"),
+        (content.replace(b"binary_little_endian", b"binary"), "not a PLY file in one of the forms ascii"),
+        (content.replace(b"float scale_2", b"float scale_x"), "flat Gaussians"),
+        (content.replace(b"float nx", b"float trbf_centre"), "trbf_centre: the Gaussians of this file move"),
     ):
         (tmp_path / "b.ply").write_bytes(changed)
         with pytest.raises(InputError) as refused:

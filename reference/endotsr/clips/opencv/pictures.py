@@ -16,6 +16,7 @@ import numpy as np
 
 from endotsr.clips.opencv import decoded, opaque, read_png, write_encoded
 from endotsr.clips.opencv.library import cv2_library
+from endotsr.clips.opencv.picture_marks import picture_marks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
@@ -35,7 +36,6 @@ STARTS = {  # extension -> file type, and its first bytes
     ".exr": ("EXR", (b"v/1\x01",)),
 }
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
-GAMMA = 1 / 2.2  # of sRGB, as stated in a PNG
 ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 277, 339  # tags
 FLOATING_POINT = 3  # of TIFF_FORMAT
@@ -51,7 +51,9 @@ def read_picture(path: Path) -> Array:
     """
     ending = Path(path).suffix.lower()
     if ending == ".png":
-        return read_png(path)
+        pixels = read_png(path)
+        _check_turn(picture_marks(path).get("Orientation") or 1, path)
+        return pixels
     if ending not in STARTS:
         raise InputError(f"{path}: no picture by its name; allowed: {', '.join((*PICTURE_ENDINGS, *EXR_ENDINGS))}")
     data = read_bytes(Path(path), LARGEST_FILE)
@@ -88,25 +90,14 @@ def read_points(path: Path) -> Array | None:
     return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
 
 
-def other_profile(path: Path) -> bool:
-    """Whether a picture states a colour profile (ICC) or a gamma (PNG) other than sRGB.
-
-    False for an unreadable file.
-    """
-    kind = "PNG" if path.suffix.lower() == ".png" else STARTS.get(path.suffix.lower(), ("", ()))[0]
-    if kind not in PLUGINS:
-        return False
+def no_data(path: Path) -> float | None:
+    """The number that means no value in a TIFF, as GDAL states it; None without one."""
+    if Path(path).suffix.lower() not in TIFF_ENDINGS:
+        return None
     try:
-        data = read_bytes(path, LARGEST_FILE)
-        if kind == "WebP":
-            _check_size(_webp_size(data), path)
-        with _plugin(kind)(io.BytesIO(data)) as picture:
-            profile, stated = picture.info.get("icc_profile") or b"", picture.info
-    except Exception:  # reading the pixels reports the fault
-        return False
-    if not profile and "srgb" not in stated and abs(stated.get("gamma", GAMMA) - GAMMA) > GAMMA / 10:
-        return True
-    return bool(profile) and not any("sRGB".encode(code) in profile for code in ("ascii", "utf-16-be"))
+        return float(str(picture_marks(path).get("GDAL_NODATA", "")).strip("\0 "))
+    except ValueError:
+        return None
 
 
 def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
@@ -145,14 +136,17 @@ def _plugin(kind: str) -> Any:
 
 
 def _check_one_upright(picture: Any, path: Path) -> None:
-    turn = picture.getexif().get(ORIENTATION, 1)
+    _check_turn(picture.getexif().get(ORIENTATION, 1), path)
+    if getattr(picture, "n_frames", 1) != 1:
+        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture per file")
+
+
+def _check_turn(turn: int, path: Path) -> None:
     if turn not in (0, 1):
         raise InputError(
             f"{path}: its EXIF data rotate the picture (orientation {turn}), but a calibration may not;"
             " allowed: pictures stored in the orientation in which they are shown"
         )
-    if getattr(picture, "n_frames", 1) != 1:
-        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture per file")
 
 
 def _check_size(size: tuple[int, int], path: Path) -> None:

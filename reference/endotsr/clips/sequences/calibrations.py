@@ -17,7 +17,7 @@ from endotsr.untrusted.json import read_json
 from endotsr.untrusted.storage import read_storage
 from endotsr.untrusted.yaml import read_yaml
 
-FORMATS = (*SLAM, *GENERAL)  # in the order in which they are tried
+FORMATS = (GENERAL[0], *SLAM, *GENERAL[1:])  # in the order in which they are tried
 
 
 def read_calibration(path: Path) -> StoredCalibration:

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, write_png
-from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture, read_points
+from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, no_data, read_picture, read_points
 from endotsr.clips.sequences.clip import grey_plane
+from endotsr.clips.sequences.depth_stacks import array_of, plane_of_stack
 from endotsr.clips.sequences.masks import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -18,7 +19,7 @@ from endotsr.untrusted.files import read_bytes
 CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
 LEAST_DEPTH_FRACTION = 0.05  # of a frame; the median of fewer pixels may be an outlier
-DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
+DEPTH_ENDINGS = (".png", ".npy", ".npz", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
 DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
@@ -30,14 +31,21 @@ def read_plane(path: Path) -> NDArray:
 
     Raises:  InputError naming the file and the reason.
     """
+    plane = plane_of_stack(path)
+    if plane is not None:
+        return plane
     ending = Path(path).suffix.lower()
     if ending not in DEPTH_ENDINGS:
         raise InputError(f"{path}: no depth by its name; allowed: {', '.join(DEPTH_ENDINGS)}")
     points = read_points(path)
     if points is not None:
         return np.ascontiguousarray(points[:, :, 2])
-    array = read_npy(path) if ending == ".npy" else read_pfm(path) if ending == ".pfm" else read_picture(path)
-    plane = grey_plane(array, path) if ending not in (".npy", ".pfm") else np.squeeze(array)
+    readers = {".npy": read_npy, ".npz": array_of, ".pfm": read_pfm}
+    array = readers.get(ending, read_picture)(path)
+    plane = np.squeeze(array) if ending in readers else grey_plane(array, path)
+    hole = no_data(path)
+    if hole is not None:
+        plane = np.where(plane == hole, 0, plane)
     if plane.ndim != 2:
         raise InputError(f"{path}: array of shape {array.shape}; allowed: one plane (height, width)")
     return plane

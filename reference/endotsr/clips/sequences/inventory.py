@@ -1,4 +1,4 @@
-"""What becomes of every field of a file: used, refused by name, or harmless. A field that is not listed is noted.
+"""What becomes of every field of a file: used, refused by name, told, or harmless. A field that is not listed is noted.
 
 A reader of a format has an `Inventory` beside it. `noted` applies it to the names in a file.
 """
@@ -20,28 +20,38 @@ class Inventory(NamedTuple):
     refused: Mapping[str, str] = {}  # names -> what they would change, and the remedy
     harmless: Mapping[str, str] = {}  # names -> why they change nothing
     neutral: Mapping[str, tuple[object, ...]] = {}  # values with which a refused field changes nothing
+    told: Mapping[str, str] = {}  # names -> what a note says, because the field is not applied
 
     def reason(self, use: Mapping[str, str], name: str) -> str | None:
-        """The text on a name in one of the three groups; None if it is not there."""
+        """The text on a name in one of the groups; None if it is not there."""
         return next((text for names, text in use.items() if any(fnmatchcase(name, n) for n in names.split())), None)
 
     def noted(self, fields: Mapping[str, object] | Iterable[str], where: object) -> list[str]:
-        """Notes on the fields of a file that are not listed.
+        """Notes on the fields of a file that are not applied or not listed.
 
         fields   names, with their values if these decide
 
         Raises:  InputError naming a refused field.
         """
         values = fields if isinstance(fields, Mapping) else {}
-        unknown = []
+        unknown, told = [], []
         for name in map(str, fields):
             why = self.reason(self.refused, name)
             if why is not None and not (name in values and self._changes_nothing(name, values[name])):
                 raise InputError(f"{where}: {name} = {shown(values[name])}: {why}" if name in values else
                                  f"{where}: {name}: {why}")  # fmt: skip
-            if why is None and self.reason(self.used, name) is None and self.reason(self.harmless, name) is None:
+            said = self.reason(self.told, name)
+            if said is not None and not (name in values and self._changes_nothing(name, values[name])):
+                told.append(f"{where}: {plain_line(name)[:60]}: {said}")
+            if (
+                said is why is None
+                and self.reason(self.used, name) is None
+                and self.reason(self.harmless, name) is None
+            ):
                 unknown.append(plain_line(name)[:60])
-        return [f"{where}: not used, because unknown here: {shortened(sorted(set(unknown)))}"] if unknown else []
+        if unknown:
+            told.append(f"{where}: not used, because unknown here: {shortened(sorted(set(unknown)))}")
+        return told
 
     def _changes_nothing(self, name: str, value: object) -> bool:
         """Whether a refused field has a neutral value: nothing, zero, false, empty or one that is listed."""

@@ -16,6 +16,7 @@ from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
+from endotsr.clips.sequences.depth_stacks import stack_planes
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.pairing import Pairing, every_frame
@@ -99,7 +100,7 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
 def from_files(folder: Path, source: Path, kind: Kind, scale: float, pairing: Pairing = "auto") -> MadeDepth:
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
     clip = describe_prepared(folder)
-    files, note = every_frame(clip, list_pictures(source, DEPTH_ENDINGS), pairing)
+    files, note = every_frame(clip, stack_planes(source) or list_pictures(source, DEPTH_ENDINGS), pairing)
     intrinsics, baseline = clip.intrinsics, clip.baseline
     assert intrinsics is not None
     frames = (
@@ -128,11 +129,23 @@ def depth_of_values(
             raise InputError(f"{where}: disparity needs the baseline: [camera] baseline is 0 in sequence.toml")
         if (numbers <= 0).all():
             numbers = -numbers
+        _refuse_wide(numbers, values.shape[1], where)
         focal = intrinsics.fx * values.shape[1] / intrinsics.width
         numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
     depth = nearest_pixels(np.maximum(numbers, 0.0), intrinsics.width, intrinsics.height, where).astype(np.float32)
     depth[~np.isfinite(depth)] = 0.0
     return depth
+
+
+def _refuse_wide(disparity: NDArray, width: int, where: object) -> None:
+    """Raises InputError for disparities that are wider than the picture, such as those that are stored times 256."""
+    found = disparity[disparity > 0]
+    middle = float(np.median(found)) if found.size else 0.0
+    if middle > width:
+        raise InputError(
+            f"{where}: the median disparity is {middle:g} pixels, and the picture is {width} pixels wide; disparities"
+            f" times 256 (16-bit PNG of KITTI and others): --unit-scale {1 / 256}"
+        )
 
 
 def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:
@@ -157,7 +170,7 @@ def from_relative(
         raise InputError(
             f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
-    files, note = every_frame(clip, list_pictures(source, DEPTH_ENDINGS), pairing)
+    files, note = every_frame(clip, stack_planes(source) or list_pictures(source, DEPTH_ENDINGS), pairing)
     made = relative_depth(clip, source, files, align, farthest, trusted)
     return made._replace(note=note)
 

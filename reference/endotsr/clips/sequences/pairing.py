@@ -43,7 +43,8 @@ def paired(
     count = frames if isinstance(frames, int) else len(frames)
     if len(files) == 1:
         return Paired([files[0]] * count)
-    if pairing == "order":
+    in_one_file = files[0].parent.is_file()  # planes of one array, which have an order and no names
+    if pairing == "order" or (pairing == "auto" and in_one_file and len(files) == count):
         return _in_order(count, files)
     found = {"number": _by_number(frames, files)}
     if source_names is not None:

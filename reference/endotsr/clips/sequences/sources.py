@@ -15,6 +15,7 @@ from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, scene_factor
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.clips.sequences.depth_stacks import stack_planes
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
 from endotsr.clips.sequences.pairing import paired
@@ -152,7 +153,8 @@ def stated_depth(
     if options.depth is None:
         return None
     scale = options.depth_scale * scene_factor(options.depth_unit)
-    both = paired(frames, files_of(options.depth, DEPTH_ENDINGS), options.pairing, source_names)
+    planes = stack_planes(options.depth)
+    both = paired(frames, planes or files_of(options.depth, DEPTH_ENDINGS), options.pairing, source_names)
     depth = depth_of(both.files, scale)
     return replace(depth, unit=options.depth_unit, stated=options.depth, trusted=options.trust_depth, paired=both.note)
 

@@ -66,7 +66,7 @@ def stored_poses(path: Path) -> Stored:
     sizes = {len(row) for _, row in lines}
     if len(sizes) > 1:
         raise InputError(f"{path}: lines of {' and '.join(map(str, sorted(sizes)))} numbers; {ALLOWED}")
-    if sizes & {12, 16}:
+    if sizes & {12, 16} and {len(head)} != sizes:
         found = [Row(k, *rows_of_motion(np.array(row).reshape(-1, 4), where), where)
                  for k, (where, row) in enumerate(lines)]  # fmt: skip
         return Stored(found, False, [])
@@ -120,7 +120,7 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
         if not row and not found and _named_columns(line):
             head = _named_columns(line)
             continue
-        if (len(row) not in COLUMNS and len(row) != len(head)) or not np.isfinite(row).all():
+        if not row or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
             raise InputError(f"{where}: {ALLOWED}")
         found.append((where, row))
     return found, head

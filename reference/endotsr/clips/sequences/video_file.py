@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.clocks import Clock, clock_of
+from endotsr.clips.sequences.video_marks import container_notes
+from endotsr.clips.sequences.view_marks import ViewMarks, view_marks
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS, open_regular
 from endotsr.untrusted.names import plain_line
@@ -50,6 +52,7 @@ class VideoFacts(NamedTuple):
     codec: str
     pixel_shape: float  # width / height of a pixel
     remarks: tuple[str, ...] = ()  # further remarks, in words
+    views: ViewMarks = ViewMarks()
 
     @property
     def times(self) -> NDArray[np.float64] | None:
@@ -92,7 +95,8 @@ def video_facts(path: Path) -> VideoFacts:
         _refuse_wide_range(first[0], path)
         width, height, turn = first[0].width, first[0].height, round(first[0].rotation) % 360
         interlaced = any(frame.interlaced_frame for frame in first)
-        remarks = _remarks(first[0], len(container.streams.video))
+        remarks = (*container_notes(path), *_remarks(first[0], len(container.streams.video)))
+        views = view_marks(first[0], path)
     packets = _packets(path)
     if len(packets) < stated:
         raise InputError(
@@ -105,7 +109,7 @@ def video_facts(path: Path) -> VideoFacts:
     if turn % 90:
         raise InputError(f"{path}: the file states a rotation of {turn} degrees; allowed: 0, 90, 180 and 270")
     clock = clock_of(stamps, rate if np.isfinite(rate) and rate > 0 else None)
-    return VideoFacts(width, height, len(stamps), clock, turn, interlaced, codec, shape, remarks)
+    return VideoFacts(width, height, len(stamps), clock, turn, interlaced, codec, shape, remarks, views)
 
 
 def _remarks(frame: Any, streams: int) -> tuple[str, ...]:

@@ -114,7 +114,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     if not clip.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
     run.findings += (
-        profile_findings(clip.images[0]) + gap_findings(clip.images) + time_findings(clip.times, str(clip.where))
+        profile_findings(clip.images) + gap_findings(clip.images) + time_findings(clip.times, str(clip.where))
     )
     size = _read_frames(clip, run)
     facts: dict[str, Any] = {"frames": len(clip.images)}

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv.pictures import other_profile
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.clips.sequences.files import frame_numbers, shortened
+from endotsr.clips.sequences.picture_fields import colours_differ
 
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
@@ -126,9 +126,11 @@ def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding
     return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
 
 
-def profile_findings(file: Path) -> list[Finding]:
-    """A note on a picture with a colour profile (ICC) other than sRGB; one file represents the clip."""
-    return [finding("colour-profile", file, "states a colour profile other than sRGB")] if other_profile(file) else []
+def profile_findings(files: list[Path]) -> list[Finding]:
+    """A note on pictures with a colour profile, a gamma or primaries other than those of sRGB."""
+    found = [file for file in files if colours_differ(file)]
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return [finding("colour-profile", file, f"states a colour profile other than sRGB{more}") for file in found[:1]]
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:

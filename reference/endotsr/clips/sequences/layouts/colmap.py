@@ -16,6 +16,7 @@ from endotsr.clips.sequences.colmap_model import ModelImage, read_model
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.pictures import PAIRS
+from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import pictures_from_files, stated_masks
 from endotsr.errors import InputError
@@ -38,7 +39,7 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
     files, images = [files[i] for i in order], [registered[i] for i in order]
     notes.insert(0, f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points")
     intrinsics = shared_intrinsics([model.cameras[image.camera] for image in images], folder, notes)
-    notes += unregistered(files) + [found.line for found in gap_findings(files)]
+    notes += picture_notes(files) + unregistered(files) + [found.line for found in gap_findings(files)]
     empty = np.zeros((0, 3))
 
     def points(i: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from pathlib import Path
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.poses import (
     POSE_FILES,
     RowConvention,
@@ -55,6 +56,9 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
     size = folder.size = _size(folder) or (None if rows is None else (int(rows[0, 9]), int(rows[0, 4])))
     convention = RowConvention(options.axes or "opengl", options.direction, options.trajectory_unit or "mm")
     found = None if rows is None or size is None else cameras_of_rows(rows, *size, where, convention)
+    notes = [AXES_TAKEN] if found is not None and found.poses is not None and options.axes is None else []
+    if options.settings is None:
+        notes += picture_notes(folder.images) + _other_poses(path, where)
     clip = Clip(
         layout="endonerf",
         where=path,
@@ -67,12 +71,18 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
         unit="mm",
         baseline=options.baseline,
         rate=options.rate,
-        notes=[AXES_TAKEN] if found is not None and found.poses is not None and options.axes is None else [],
+        notes=notes,
         stated_in=where,
         faults=folder.faults,
         **({} if found is None else found._asdict()),
     )
     return with_stated(clip, options)
+
+
+def _other_poses(path: Path, where: Path) -> list[str]:
+    """A note on a second pose file."""
+    others = [name for name in POSE_FILES if (path / name).exists() and path / name != where]
+    return [f"{where.name} is read; not read: {', '.join(others)}"] if others else []
 
 
 def _size(folder: FolderReader) -> tuple[int, int] | None:

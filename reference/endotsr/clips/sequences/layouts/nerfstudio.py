@@ -25,6 +25,7 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.point_files import read_cloud
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
@@ -140,7 +141,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     factor = scene_factor(unit)
     depth = depth_of(planes, DEPTH_STEP * factor) if any(planes) else None
     cloud = None if depth is not None else _cloud(folder, data, file, notes)
-    notes += [found.line for found in gap_findings(files)]
+    notes += picture_notes(files) + [found.line for found in gap_findings(files)]
     if beside := [name for name in OTHERS if file.name == FILES[1] and (folder / name).is_file()]:
         notes.append(f"{file.name} is read; not read: {', '.join(beside)}")
     return Clip(

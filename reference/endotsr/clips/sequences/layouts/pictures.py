@@ -9,10 +9,11 @@ import re
 from pathlib import Path
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.checks.frames import gap_findings, profile_findings
+from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import check_pairing, frame_numbers
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
+from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     files_of,
@@ -95,6 +96,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
     width, height = halves(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
+    gaps = [found.line for found in gap_findings(left)]
     poses, notes = stated_poses(options, len(left), options.rate, numbers=_numbers(left))
     return Clip(
         layout="pictures",
@@ -109,7 +111,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         baseline=camera.baseline,
         poses=poses,
         rate=options.rate,
-        notes=[found.line for found in profile_findings(left[0]) + gap_findings(left)] + [*camera.notes, *notes],
+        notes=[*picture_notes([*left, *right]), *gaps, *camera.notes, *notes],
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
+from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     depth_of,
@@ -63,7 +64,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     times, files = read_list(path / LIST)
     width, height = size_of(files)
     intrinsics = stated_camera(options, width, height, path).intrinsics
-    notes = []
+    notes = picture_notes(files)
     if intrinsics is None and (width, height) == (640, 480):
         intrinsics = Intrinsics(*DEFAULT, width, height)
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")

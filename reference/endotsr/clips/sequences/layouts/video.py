@@ -24,6 +24,7 @@ from endotsr.clips.sequences.sources import (
     unit_of,
 )
 from endotsr.clips.sequences.video_file import VideoFacts, is_video, video_facts, video_pictures
+from endotsr.clips.sequences.view_marks import chosen_views
 from endotsr.errors import InputError
 
 SAME_RATE = 0.01  # relative difference of the frame rates of two videos of a pair
@@ -47,13 +48,13 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
-    stereo = "none" if options.stereo == "auto" else options.stereo
+    stereo, right_first, views = chosen_views(facts.views, "none" if right else options.stereo, path)
     width, height = halves(across, down, stereo)
     if right is not None:
         _check_right(facts, video_facts(right), path, right)
     rate, times = _clock(facts, options, path)
     camera = stated_camera(options, width, height, path)
-    notes = _notes(facts, rate, path) + _turn_notes(facts, quarters, options, path)
+    notes = _notes(facts, rate, path) + views + _turn_notes(facts, quarters, options, path)
     poses, note = stated_poses(options, facts.count, rate, times)
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
@@ -61,7 +62,8 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         for i, picture, other in zip(wanted, video_pictures(path, wanted), others):
             turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
             if other is None:
-                yield split_pair(turned, stereo, f"{path}: picture {i}")
+                pair = split_pair(turned, stereo, f"{path}: picture {i}")
+                yield PicturePair(pair.right, pair.left) if right_first and pair.right is not None else pair
             else:
                 yield PicturePair(turned, np.ascontiguousarray(np.rot90(other, quarters)))
 
@@ -110,6 +112,8 @@ def _clock(facts: VideoFacts, options: SourceOptions, path: Path) -> tuple[float
 
 def _turn_notes(facts: VideoFacts, quarters: int, options: SourceOptions, path: Path) -> list[str]:
     """The note on a stated rotation, or on --orientation without one."""
+    if facts.views.mirrored:
+        return [f"{path.name} states mirrored pictures: used as stored; intrinsics, masks and depth refer to these"]
     if facts.turn:
         done = f"rotated by {facts.turn} degrees counter-clockwise" if quarters else "used as stored"
         return [f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth refer to these"]
@@ -120,6 +124,11 @@ def _turn_notes(facts: VideoFacts, quarters: int, options: SourceOptions, path: 
 
 def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int:
     """Counter-clockwise quarter turns to apply. Raises InputError for a stated rotation without --orientation."""
+    if facts.views.mirrored and options.orientation != "stored":
+        raise InputError(
+            f"{path}: the file states that its pictures are shown mirrored; allowed: --orientation stored (as the"
+            " sensor wrote them), or a file that stores them as they are to be read"
+        )
     if facts.turn and options.orientation is None:
         raise InputError(
             f"{path}: the file states that its pictures are shown rotated by {facts.turn} degrees counter-clockwise;"

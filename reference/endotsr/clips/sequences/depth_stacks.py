@@ -1,0 +1,60 @@
+"""Depth of a whole clip in one file: an .npz or .npy array (n, H, W), as networks for videos write it.
+
+A plane of such a file has the name `FILE/000003`, so that planes are listed, paired and read like files.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.untrusted.arrays import RefusedArray, open_npz, read_npy
+
+ENDINGS = (".npz", ".npy")
+LARGEST_FILE = 1 << 34  # bytes
+ONE = "allowed: one array of real numbers, (frames, height, width) for a clip or (height, width) for a frame"
+
+
+def stack_planes(path: Path) -> list[Path] | None:
+    """The names of the planes of a file that holds those of a clip; None for any other path. Raises InputError."""
+    if path.suffix.lower() not in ENDINGS or not path.is_file():
+        return None
+    array = array_of(path)
+    return [path / f"{k:06d}" for k in range(len(array))] if array.ndim == 3 else None
+
+
+def plane_of_stack(path: Path) -> NDArray | None:
+    """The plane (H, W) with a name of `stack_planes`; None for any other path. Raises InputError."""
+    file = path.parent
+    if file.suffix.lower() not in ENDINGS or not file.is_file():
+        return None
+    return array_of(file)[int(path.name)]
+
+
+def array_of(path: Path) -> NDArray:
+    """The array of an .npz or .npy file, (n, H, W) or (H, W); axes of length 1 are dropped.
+
+    Raises:  InputError for a file without exactly one such array.
+    """
+    status = path.stat()
+    return _array(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=1)
+def _array(path: Path, changed: int, size: int) -> NDArray:
+    if path.suffix.lower() == ".npy":
+        arrays = {path.name: read_npy(path, LARGEST_FILE)}
+    else:
+        try:
+            with open_npz(path, LARGEST_FILE, compressed=True) as file:
+                arrays = {name: file.read(name) for name in file.names}
+        except RefusedArray as error:
+            raise InputError(f"{path}: {error}; {ONE}") from None
+    planes = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "fiu"}
+    planes = {name: array for name, array in planes.items() if array.ndim in (2, 3) and min(array.shape) > 3}
+    if len(planes) != 1:
+        held = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "nothing"
+        raise InputError(f"{path}: holds {held}; {ONE}")
+    return next(iter(planes.values()))

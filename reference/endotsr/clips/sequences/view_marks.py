@@ -1,0 +1,66 @@
+"""Marks on a decoded picture of a video: a stereo pair, a mirror image, a sphere. FFmpeg hands them over.
+
+They come from the container (Matroska's StereoMode, st3d and the matrix of MP4) or from the coded pictures (frame
+packing of H.264 and H.265). In: the first picture. Out: a `ViewMarks`.
+"""
+
+import struct
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from endotsr.errors import InputError
+
+Stereo = Literal["none", "side_by_side", "stacked"]
+# Numbers of FFmpeg for the arrangement of a pair.
+ARRANGED: dict[int, Stereo] = {1: "side_by_side", 2: "stacked"}
+OTHERS = {3: "alternating pictures", 4: "a checkerboard", 5: "side by side in a quincunx", 6: "alternating rows",
+          7: "alternating columns"}  # fmt: skip
+RIGHT_FIRST = 1  # flag
+SPLIT = "use a file with both views side by side or stacked, or with one; --stereo none reads the pictures as one view"
+
+
+class ViewMarks(NamedTuple):
+    """What a video states about the views in its pictures."""
+
+    stereo: Stereo = "none"
+    right_first: bool = False  # the right view is on the left or on top
+    other: str = ""  # an arrangement that cannot be separated, in words
+    mirrored: bool = False  # players show the mirror image of the stored picture
+
+
+def view_marks(frame: Any, path: Path) -> ViewMarks:
+    """The marks of a picture. Raises InputError for the picture of a sphere."""
+    found, data = ViewMarks(), {}
+    for k in range(len(frame.side_data)):
+        data[frame.side_data[k].type.name] = bytes(frame.side_data[k])
+    if "SPHERICAL" in data:
+        raise InputError(f"{path}: states that its pictures are those of a sphere: use a perspective video")
+    if len(pair := data.get("STEREO3D", b"")) >= 8:
+        kind, flags = struct.unpack_from("=ii", pair)
+        found = ViewMarks(ARRANGED.get(kind, "none"), bool(flags & RIGHT_FIRST), OTHERS.get(kind, ""))
+    if len(turn := data.get("DISPLAYMATRIX", b"")) >= 20:
+        a, b, _, c, d = struct.unpack_from("=5i", turn)
+        found = found._replace(mirrored=a * d - b * c < 0)
+    return found
+
+
+def chosen_views(marks: ViewMarks, stated: str, path: Path) -> tuple[Stereo, bool, list[str]]:
+    """How the pictures are divided, whether the right view comes first, and notes.
+
+    stated   --stereo: auto follows the mark
+
+    Raises:  InputError for a marked arrangement that cannot be separated, unless a way is stated.
+    """
+    if stated == "auto":
+        if marks.other:
+            raise InputError(f"{path}: states that its pictures are stereo pairs in {marks.other}; {SPLIT}")
+        if marks.stereo == "none":
+            return "none", False, []
+        order = ", the right view first" if marks.right_first else ""
+        words = f"{path.name} states stereo pairs {marks.stereo.replace('_', ' ')}{order}: read as such"
+        return marks.stereo, marks.right_first, [f"{words}; --stereo none reads one view"]
+    chosen: Stereo = stated  # type: ignore[assignment]
+    if chosen != marks.stereo and (marks.stereo != "none" or marks.other):
+        said = marks.other or marks.stereo.replace("_", " ")
+        return chosen, False, [f"{path.name} states stereo pairs, {said}: --stereo {stated} overrides it"]
+    return chosen, marks.right_first and chosen == marks.stereo, []
