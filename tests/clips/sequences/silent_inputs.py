@@ -3,16 +3,22 @@
 import shutil
 import struct
 import sys
+import zlib
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from input_kinds import Row, calibrated, centred, public
-from left_inputs import colmap, squared, true_poses, with_poses
+from input_kinds import Row, calibrated, centred, close, depth_is_true, folder_of, prepare, public, video
+from left_inputs import MOVED, colmap, moving, squared, true_poses, with_poses
 from made_videos import pictures
 from odd_inputs import two_folders, with_trajectory
+from test_stated_depth import recording as with_depth
+from test_stated_depth import true_depth
 
+from endotsr.clips.opencv import write_png
+from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 K = [100.0, 0, 63.5, 0, 101, 47.5, 0, 0, 1]
@@ -201,4 +207,233 @@ CALIBRATIONS = [
     Row("calibration, sensor.yaml of EuRoC", calibrated("a.yaml", lambda: EUROC), "told", "half a pixel", centred),
     Row("calibration, calib.txt of KITTI", kitti_pair, "told", "P0 and P1 are read", with_baseline(4.0)),
 ]  # fmt: skip
-SILENT_ROWS = [*POSES, *MODELS, *CALIBRATIONS]
+
+
+def chunk(kind: bytes, content: bytes):
+    """Every picture with one more chunk of PNG."""
+
+    def change(folder: Path) -> None:
+        for file in (folder / "clip").iterdir():
+            data = file.read_bytes()
+            made = struct.pack(">I", len(content)) + kind + content
+            file.write_bytes(data[:33] + made + struct.pack(">I", zlib.crc32(made[4:])) + data[33:])
+
+    return folder_of(pictures(4), change=change)
+
+
+def beside_model(*files: Path) -> None:
+    for file in files:
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("1")
+
+
+def public_endonerf(*names: str):
+    """A simulated EndoNeRF folder without masks, with further files."""
+
+    def make(folder: Path) -> list[str]:
+        moving(folder)
+        raw = folder / "clip"
+        for name in ("masks", "gt_masks"):
+            shutil.rmtree(raw / name, ignore_errors=True)
+        for name in names:
+            if name.endswith(".npy"):
+                shutil.copy(raw / "poses_bounds.npy", raw / name)
+            else:
+                beside_model(raw / name)
+        return prepare("clip", camera=())(folder)
+
+    return make
+
+
+def turned_exif() -> bytes:
+    from PIL import Image
+
+    made = Image.Exif()
+    made[0x0112] = 6
+    return made.tobytes()[6:]
+
+
+def two_in_a_jpeg(folder: Path) -> None:
+    """As stereo cameras and telephones write them."""
+    from PIL import Image
+
+    for file in sorted((folder / "clip").iterdir()):
+        opened = Image.open(file).convert("RGB")
+        opened.save(file.with_suffix(".jpg"), format="MPO", save_all=True, append_images=[opened], quality=95)
+        file.unlink()
+
+
+def adobe_rgb(folder: Path) -> None:
+    from PIL import Image
+
+    for file in sorted((folder / "clip").iterdir()):
+        made = Image.Exif()
+        made.get_ifd(0x8769)[0xA001] = 65535
+        Image.open(file).convert("RGB").save(file.with_suffix(".jpg"), exif=made, quality=95)
+        file.unlink()
+
+
+def beside(*names: str):
+    """Folders and files beside left/ and right/."""
+
+    def make(folder: Path) -> list[str]:
+        words = two_folders(pictures(), pictures())(folder)
+        for name in names:
+            (folder / "clip" / name).parent.mkdir(exist_ok=True)
+            (folder / "clip" / name).write_text("1")
+        return words
+
+    return make
+
+
+def of_another_kind(folder: Path) -> None:
+    for k in range(5):
+        (folder / f"clip/{12 + k:04d}.jp2").write_bytes(b"jp2")
+
+
+def in_one_file(name: str, ending: str):
+    """Depth of a whole clip, or of each frame, as arrays."""
+
+    def make(folder: Path) -> list[str]:
+        words = with_depth(folder, true_depth, "d", "npy")
+        planes = {file.stem: np.load(file) for file in sorted((folder / "d").iterdir())}
+        if name == "clip":
+            stack = np.stack(list(planes.values()))
+            np.savez(folder / f"clip{ending}", depths=stack) if ending == ".npz" else np.save(
+                folder / "clip.npy", stack
+            )
+            return [str(folder / f"clip{ending}") if word == str(folder / "d") else word for word in words]
+        for stem, plane in planes.items():
+            np.savez_compressed(folder / f"d/{stem}.npz", depth=plane)
+            (folder / f"d/{stem}.npy").unlink()
+        return words
+
+    return make
+
+
+def with_no_data(folder: Path) -> list[str]:
+    """Depth in TIFF whose tag states the number without a meaning."""
+    from PIL import Image
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    words = with_depth(folder, true_depth, "d", "npy")
+    for file in sorted((folder / "d").iterdir()):
+        tags = ImageFileDirectory_v2()
+        tags[42113], tags.tagtype[42113] = "77", 2
+        plane = np.load(file).astype(np.float32)
+        plane[:20, :30] = 77
+        Image.fromarray(plane).save(file.with_suffix(".tif"), tiffinfo=tags)
+        file.unlink()
+    return words
+
+
+def corner_is_empty(folder: Path) -> bool:
+    from endotsr.clips.opencv import read_png
+
+    seen = read_png(folder / "o/depth/000002.png")
+    return bool((seen[:19, :29] == 0).all() and (seen > 0).mean() > 0.9)
+
+
+def disparity(times: float, *words: str):
+    """Disparities of a clip as 16-bit PNG."""
+
+    def make(folder: Path) -> list[str]:
+        import test_relative_depth as one
+
+        where, given = one.clip(folder, lambda i: 1800 / true_depth(i))
+        stored, file = where / "sequence.toml", read_sequence_file(where)
+        stored.write_text(stored.read_text().replace("baseline = 0.0", "baseline = 4.0"))
+        for k, one_file in enumerate(sorted(given.iterdir())):
+            pixels = file.camera.fx * 4.0 / true_depth(k)
+            write_png(one_file.with_suffix(".png"), np.rint(pixels * times).astype(np.uint16))
+            one_file.unlink()
+        return ["depth", str(where), "--given", str(given), "--kind", "disparity", *words]
+
+    return make
+
+
+def depth_of_disparity(folder: Path) -> bool:
+    found = describe(next(folder.glob("*/sequence.toml")).parent).depth
+    return found is not None and np.abs(found(2) - true_depth(2)).max() < 1
+
+
+def marked_video(name: str, mark: str, *words: str, frames=None, swapped: bool = False, **how):
+    """A video whose coded pictures (H.264) state a stereo pair."""
+    return video(name, frames, *words, options={"x264-params": mark, "qp": "8"}, **how)
+
+
+def mirrored(path: Path) -> None:
+    """The matrix of the track of an MP4 mirrors the pictures."""
+    data = bytearray(path.read_bytes())
+    place = data.index(b"tkhd") + 44
+    data[place : place + 4] = struct.pack(">i", -65536)
+    path.write_bytes(data)
+
+
+def cropped(path: Path) -> None:
+    """PixelCropRight in the place of DisplayWidth in a Matroska file."""
+    path.write_bytes(path.read_bytes().replace(b"\x54\xb0", b"\x54\xdd", 1))
+
+
+def sides(left, right):
+    return lambda folder: all(
+        np.abs(pair.left.astype(int) - one).mean() < 12 and np.abs(pair.right.astype(int) - other).mean() < 12
+        for i, (one, other) in enumerate(zip(left, right, strict=True))
+        for pair in [next(describe(folder / "o").pictures([i]))]
+    )
+
+
+SIDE_BY_SIDE = [np.hstack([a, b]) for a, b in zip(pictures(), MOVED)]
+STACKED = [np.vstack([a, b]) for a, b in zip(pictures(), MOVED)]
+BASELINE = ("--baseline", "4")
+PICTURES = [
+    Row("pictures, PNG turned by EXIF", chunk(b"eXIf", turned_exif()), "refused", "orientation 6"),
+    Row("pictures, PNG of a stereo pair", chunk(b"sTER", b"\1"), "told", "--stereo side_by_side"),
+    Row("pictures, PNG of high dynamic range", chunk(b"cICP", bytes([9, 16, 0, 1])), "refused", "high dynamic range"),
+    Row("pictures, PNG with other primaries", chunk(b"cHRM", struct.pack(">8I", 31270, 32900, 64000, 33000, 21000,
+        71000, 15000, 6000)), "told", "a colour profile other than sRGB"),
+    Row("pictures, PNG with the primaries of sRGB", chunk(b"cHRM", struct.pack(">8I", 31270, 32900, 64000, 33000, 30000,
+        60000, 15000, 6000)), "right", "", close(pictures(4), 0.01)),
+    Row("pictures, PNG with oblong pixels", chunk(b"pHYs", struct.pack(">IIB", 2, 1, 0)), "told", "not square"),
+    Row("pictures, PNG with a chunk that is not known", chunk(b"neWc", b"1"), "told", "unknown here: neWc"),
+    Row("pictures, several in a JPEG", folder_of(pictures(4), change=two_in_a_jpeg), "told", "MPF: further pictures"),
+    Row("pictures, Adobe RGB by EXIF", folder_of(pictures(4), change=adobe_rgb), "told", "profile other than sRGB"),
+    Row("pictures beside masks, depth, times and a calibration", beside("masks/0.png", "depth/0.png", "times.txt",
+        "calib.yaml"), "told", "not read: calib.yaml, depth/, masks/, times.txt; see --masks, --depth, --calibration"),
+    Row("pictures, others of a kind that is not read", folder_of(pictures(), change=of_another_kind), "told",
+        "not read: 5 files .jp2"),
+    Row("COLMAP, masks beside it", colmap(change=lambda raw: beside_model(raw / "masks/frame0000.png")), "told",
+        "not read: masks/; see --masks"),
+    Row("COLMAP, rigs and frames of its new versions", colmap(change=lambda raw: beside_model(
+        raw / "sparse/0/rigs.txt", raw / "sparse/0/frames.txt")), "right", ""),
+    Row("EndoNeRF, masks in gt_masks alone", public_endonerf("gt_masks/0.png"), "told", "not read: gt_masks/"),
+    Row("EndoNeRF, a second pose file", public_endonerf("pose_bounds.npy"), "told", "not read: pose_bounds.npy"),
+    Row("nerfstudio, depth and masks that the file does not name",
+        public("nerfstudio", with_depth=False, change=lambda raw: beside_model(raw / "sam/0.png")), "told",
+        "not read: depth/, sam/"),
+]  # fmt: skip
+DEPTHS = [
+    Row("depth, one npz for the clip", in_one_file("clip", ".npz"), "told", "clip.npz: --pairing order", depth_is_true),
+    Row("depth, one npy for the clip", in_one_file("clip", ".npy"), "told", "clip.npy: --pairing order", depth_is_true),
+    Row("depth, one npz for each frame", in_one_file("frames", ".npz"), "right", "", depth_is_true),
+    Row("depth, TIFF with a number that means none", with_no_data, "right", "", corner_is_empty),
+    Row("disparity times 256", disparity(256), "refused", "--unit-scale 0.00390625"),
+    Row("disparity times 256, --unit-scale", disparity(256, "--unit-scale", "0.00390625"), "right", "",
+        depth_of_disparity),
+]  # fmt: skip
+MARKED = [
+    Row("video, side by side by a mark of H.264", marked_video("a.mp4", "frame-packing=3", *BASELINE,
+        frames=SIDE_BY_SIDE), "told", "states stereo pairs side by side: read as such", sides(pictures(), MOVED)),
+    Row("video, stacked by a mark of H.264", marked_video("a.mkv", "frame-packing=4", *BASELINE, frames=STACKED),
+        "told", "states stereo pairs stacked: read as such", sides(pictures(), MOVED)),
+    Row("video, a mark of a pair, --stereo none", marked_video("a.mp4", "frame-packing=3", "--stereo", "none",
+        frames=SIDE_BY_SIDE), "told", "--stereo none overrides it"),
+    Row("video, a mark of alternating pictures", marked_video("a.mp4", "frame-packing=5"), "refused",
+        "stereo pairs in alternating pictures"),
+    Row("video, mirrored", video("a.mp4", change=mirrored), "refused", "are shown mirrored"),
+    Row("video, mirrored, --orientation stored", video("a.mp4", None, "--orientation", "stored", change=mirrored),
+        "told", "states mirrored pictures: used as stored", close(pictures())),
+    Row("video, a crop of Matroska", video("a.mkv", shape=Fraction(16, 15), change=cropped), "refused",
+        "PixelCropRight = "),
+]  # fmt: skip
+SILENT_ROWS = [*POSES, *MODELS, *CALIBRATIONS, *PICTURES, *DEPTHS, *MARKED]

@@ -95,6 +95,7 @@ class Clip:
     size_said: str = "the first image has"  # source of the size in `intrinsics`, for messages
     faults: list[Finding] = field(default_factory=list)  # missing or unusable parts
     pose_faults: dict[int, str] = field(default_factory=dict)  # why a frame has no pose
+    read_here: tuple[str, ...] = ()  # further names in the folder that were read, in lower case
 
     @property
     def count(self) -> int:

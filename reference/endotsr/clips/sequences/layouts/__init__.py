@@ -15,6 +15,7 @@ from typing import NamedTuple
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.unread import unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
@@ -35,6 +36,7 @@ class Layout(NamedTuple):
     describe: Callable[[Path, SourceOptions], Clip]
     takes: tuple[str, ...] = ()  # the STATEMENTS that it reads; the others are refused
     direct: bool = False  # training reads it directly; other layouts need `endotsr prepare`
+    reads: tuple[str, ...] = ()  # patterns of names in its folder, in lower case, that it reads or that say nothing
 
 
 @cache
@@ -75,6 +77,7 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
     if clip.pose_faults and len(clip.pose_faults) == clip.count:
         raise InputError(next(iter(clip.pose_faults.values())))
     said = [*clip.notes, *clip.pose_faults.values()]
+    said += unread(path, (*layout.reads, *clip.read_here), options, layout.takes)
     if options.calibration is not None:
         said.append(f"{options.calibration.name}: {HALF_A_PIXEL}")
     return replace(clip, notes=said)

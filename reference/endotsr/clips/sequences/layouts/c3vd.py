@@ -123,4 +123,13 @@ LAYOUT = Layout(
     rank=2,
     recognises=recognises,
     describe=describe_c3vd,
+    reads=(
+        "*_color.png",
+        "*_depth.tif*",
+        "pose.txt",
+        "*_normals.tif*",
+        "*_flow.tif*",
+        "*_occlusion.png",
+        "coverage_mesh.obj",
+    ),
 )

@@ -79,4 +79,7 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_colmap,
     takes=("masks",),
-)
+    reads=("images*", "input", "sparse", "colmap", "dense", "distorted", "stereo", "cameras.*", "images.*",
+           "points3d.*", "rigs.*", "frames.*", "project.ini", "*.db", "run-colmap-*", "transforms*.json", "left",
+           "right"),
+)  # fmt: skip

@@ -105,5 +105,6 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_common,
     direct=True,
+    reads=("*",),
     takes=("masks", "depth"),
 )

@@ -100,5 +100,6 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_endonerf,
     direct=True,
+    reads=("images", "images_right", "depth", "masks", "pose?_bounds.npy", "pose_bounds.npy", "images_*", "truth*"),
     takes=("baseline", "masks", "depth"),
 )

@@ -65,4 +65,11 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_hamlyn,
     takes=("masks", "depth", "baseline"),
+    reads=(
+        "intrinsics.txt",
+        "color",
+        "image01",
+        "image02",
+        "depth*",
+    ),
 )

@@ -40,6 +40,7 @@ FILES = ("transforms.json", "transforms_train.json")
 OTHERS = ("transforms_test.json", "transforms_val.json")
 LARGEST_FILE = 1 << 28  # bytes
 DEPTH_STEP = 1e-3  # units of the matrices per step of the stored depth
+PATHS = ("file_path", "mask_path", "depth_file_path")
 INTRINSICS = ("fl_x", "fl_y", "cx", "cy")
 MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
 CAMERA = {
@@ -157,6 +158,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         poses=[_pose(entry, options, factor, f"{file}: frame {i}") for i, entry in enumerate(entries)],
         rate=options.rate,
         times=None if times is None else np.sort(times).astype(np.float64),
+        read_here=_places(entries, data),
         notes=[f"{file.name}: {len(files)} frames, unit of lengths {'unknown' if unit == ARBITRARY else unit}", *notes],
     )
 
@@ -203,6 +205,13 @@ def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray
     return cloud
 
 
+def _places(entries: list[Keys], data: Keys) -> tuple[str, ...]:
+    """The first part of every path in the file."""
+    names = [data.get("ply_file_path"), *(entry.get(key) for entry in entries for key in PATHS)]
+    paths = {str(name).replace("\\", "/").removeprefix("./") for name in names if name is not None}
+    return tuple({path.split("/")[0].lower() for path in paths} | {f"{path.lower()}.*" for path in paths})
+
+
 def _named(folder: Path, name: Any, where: str) -> Path | None:
     """The file of this name, which may be written with the separators of another system."""
     return None if name is None else folder / relative_path(str(name).replace("\\", "/").removeprefix("./"), where)
@@ -232,4 +241,5 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_nerfstudio,
     takes=("masks",),
+    reads=("transforms*.json", "images_*", "masks_*", "depths_*", "colmap", "sparse", "*.db", "base_cam.json"),
 )

@@ -111,6 +111,10 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         baseline=camera.baseline,
         poses=poses,
         rate=options.rate,
+        read_here=tuple(
+            {file.parent.name.lower() for file in [*left, *right] if file.parent != path}
+            | {file.name.lower() for file in [*left, *right] if file.parent == path}
+        ),
         notes=[*picture_notes([*left, *right]), *gaps, *camera.notes, *notes],
     )
 
@@ -122,4 +126,5 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_pictures,
     takes=tuple(name for name in STATEMENTS if name != "orientation"),
+    reads=(),
 )

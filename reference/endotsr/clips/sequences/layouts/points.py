@@ -86,4 +86,9 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_points,
     takes=("masks",),
+    reads=(
+        "images",
+        "cameras_points.npz",
+        "mask.png",
+    ),
 )

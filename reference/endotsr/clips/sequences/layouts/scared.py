@@ -99,4 +99,8 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_scared,
     takes=("calibration", "trajectory", "masks"),
+    reads=(
+        "data",
+        "endoscope_calibration.yaml",
+    ),
 )

@@ -77,4 +77,12 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_servct,
     takes=("masks", "depth"),
+    reads=(
+        "left_rectified",
+        "right_rectified",
+        "rectified_calibration",
+        "*depth*",
+        "ground_truth*",
+        "reference*",
+    ),
 )

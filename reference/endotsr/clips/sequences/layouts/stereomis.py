@@ -68,4 +68,11 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_stereomis,
     takes=("stereo", "calibration", "trajectory", "masks", "depth", "orientation"),
+    reads=(
+        "stereocalibration.ini",
+        "*.mp4",
+        "groundtruth.txt",
+        "masks",
+        "video_frames",
+    ),
 )

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
@@ -27,7 +29,13 @@ from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.names import relative_path
 
-LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
+LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
+TRAJECTORIES = (
+    "groundtruth.txt",
+    "CameraTrajectory.txt",
+    "KeyFrameTrajectory.txt",
+)  # the last two: ORB-SLAM
+SETTINGS = ".fx:"  # in the settings of ORB-SLAM
 STEP = 1000.0 / 5000.0  # mm per step of the stored depth
 LONGEST = 0.02  # seconds between a picture and its depth or pose
 DEFAULT = (525.0, 525.0, 320.0, 240.0)  # the intrinsics recommended by the authors of the layout, 640x480
@@ -64,7 +72,11 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     times, files = read_list(path / LIST)
     width, height = size_of(files)
     intrinsics = stated_camera(options, width, height, path).intrinsics
-    notes = picture_notes(files)
+    notes, given = picture_notes(files), [path / name for name in TRAJECTORIES if (path / name).is_file()]
+    settings = next((file for file in sorted(path.glob("*.yaml")) if SETTINGS in read_text(file)), None)
+    if intrinsics is None and settings is not None:
+        intrinsics = calibrated(settings, width, height).intrinsics
+        notes.append(f"intrinsics of {settings.name}: {HALF_A_PIXEL}")
     if intrinsics is None and (width, height) == (640, 480):
         intrinsics = Intrinsics(*DEFAULT, width, height)
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")
@@ -75,9 +87,11 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
         depth = depth_of(paired, STEP)
     poses: list[CameraPose | None] | None = None
-    where = options.trajectory or path / TRAJECTORY
-    if where.is_file():
-        poses = poses_at(read_trajectory(where, options.trajectory_unit or "m", options.direction), times, LONGEST)
+    where = options.trajectory or next(iter(given), None)
+    if where is not None:
+        found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
+        poses = poses_at(found, times, LONGEST)
+        notes.append(f"poses of {where.name}" + "".join(f"; not read: {file.name}" for file in given if file != where))
     steps = np.diff(times)
     return Clip(
         layout="tum",
@@ -91,6 +105,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         poses=poses,
         rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
         times=times if steps.size and (steps > 0).all() else None,
+        read_here=tuple(file.name.lower() for file in [*given, *([settings] if settings else [])]),
         notes=notes,
     )
 
@@ -101,5 +116,6 @@ LAYOUT = Layout(
     rank=3,
     recognises=recognises,
     describe=describe_tum,
-    takes=("camera", "distortion", "trajectory", "masks", "depth"),
+    takes=("camera", "distortion", "calibration", "trajectory", "masks", "depth"),
+    reads=("rgb.txt", "rgb", "depth.txt", "depth", "accelerometer.txt", "associat*.txt"),
 )

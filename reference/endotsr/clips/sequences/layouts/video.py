@@ -155,5 +155,11 @@ def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
 
 
 LAYOUT = Layout(
-    name="video", about="a video file", rank=5, recognises=recognises, describe=describe_video, takes=STATEMENTS
+    name="video",
+    about="a video file",
+    rank=5,
+    recognises=recognises,
+    describe=describe_video,
+    takes=STATEMENTS,
+    reads=("*",),
 )
