@@ -1,7 +1,7 @@
 """Fields of picture files beside their pixels: chunks of PNG and WebP, segments of JPEG, tags of TIFF and EXIF.
 
-In: a path. Out: the fields as names with their values, as an inventory of the format reads them. Only the header of a
-file is parsed; a file that cannot be parsed has no marks, and the reader of its pixels reports the fault.
+In: a path. Out: the fields as names with their values, as an inventory of the format reads them. A damaged file has
+none: the reader of its pixels reports the fault.
 """
 
 import io

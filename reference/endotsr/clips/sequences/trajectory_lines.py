@@ -38,7 +38,7 @@ FIELDS = Inventory(
 USED = ("tx", "ty", "tz", "qx", "qy", "qz", "qw")
 
 
-class Row(NamedTuple):
+class StoredPose(NamedTuple):
     """A pose as it is stored."""
 
     stamp: float
@@ -47,15 +47,15 @@ class Row(NamedTuple):
     where: str
 
 
-class Stored(NamedTuple):
+class StoredPoses(NamedTuple):
     """The poses of a file."""
 
-    rows: list[Row]
+    rows: list[StoredPose]
     stamped: bool  # False: the stamps count from 0
     notes: list[str]
 
 
-def stored_poses(path: Path) -> Stored:
+def stored_poses(path: Path) -> StoredPoses:
     """The poses of a file. Raises InputError naming the line and the reason."""
     if path.suffix.lower() == ".npy":
         lines, head = _array_lines(path), []
@@ -67,17 +67,19 @@ def stored_poses(path: Path) -> Stored:
     if len(sizes) > 1:
         raise InputError(f"{path}: lines of {' and '.join(map(str, sorted(sizes)))} numbers; {ALLOWED}")
     if sizes & {12, 16} and {len(head)} != sizes:
-        found = [Row(k, *rows_of_motion(np.array(row).reshape(-1, 4), where), where)
+        found = [StoredPose(k, *rows_of_motion(np.array(row).reshape(-1, 4), where), where)
                  for k, (where, row) in enumerate(lines)]  # fmt: skip
-        return Stored(found, False, [])
+        return StoredPoses(found, False, [])
     names, notes = _columns_of(path, head, sizes.pop())
     place = [names.index(name) for name in USED]
     stamp = names.index("stamp") if "stamp" in names else None
     found = []
     for k, (where, row) in enumerate(lines):
         position, quaternion = np.array([row[i] for i in place[:3]]), [row[i] for i in place[3:]]
-        found.append(Row(float(k) if stamp is None else row[stamp], _rotation(quaternion, where), position, where))
-    return Stored(found, stamp is not None, notes)
+        found.append(
+            StoredPose(float(k) if stamp is None else row[stamp], _rotation(quaternion, where), position, where)
+        )
+    return StoredPoses(found, stamp is not None, notes)
 
 
 def _columns_of(path: Path, head: list[str], size: int) -> tuple[list[str], list[str]]:

@@ -87,7 +87,7 @@ STSD, SAMPLE_ENTRY, FULL_BOX = 16, 86, 12  # bytes before the inner boxes
 VIDEO_HANDLER = b"vide"
 
 
-class Field(NamedTuple):
+class Box(NamedTuple):
     """A box or an element."""
 
     name: str
@@ -120,7 +120,7 @@ def _mp4_fields(file: BufferedReader, length: int) -> dict[str, object]:
     return found
 
 
-def _all_boxes(file: BufferedReader, box: Field, depth: int) -> Iterator[Field]:
+def _all_boxes(file: BufferedReader, box: Box, depth: int) -> Iterator[Box]:
     """The box, and the boxes in it."""
     yield box
     if depth > DEEPEST:
@@ -136,7 +136,7 @@ def _all_boxes(file: BufferedReader, box: Field, depth: int) -> Iterator[Field]:
             yield from _all_boxes(file, inner, depth + 1)
 
 
-def _boxes(file: BufferedReader, start: int, end: int) -> Iterator[Field]:
+def _boxes(file: BufferedReader, start: int, end: int) -> Iterator[Box]:
     """The boxes between two places of the file, as far as they are whole."""
     while start + 8 <= end:
         file.seek(start)
@@ -147,11 +147,11 @@ def _boxes(file: BufferedReader, start: int, end: int) -> Iterator[Field]:
         size = end - start if size == 0 else size
         if size < skipped or start + size > end or not name.isprintable():
             return
-        yield Field(name, start + skipped, start + size)
+        yield Box(name, start + skipped, start + size)
         start += size
 
 
-def _crop(file: BufferedReader, entry: Field) -> object:
+def _crop(file: BufferedReader, entry: Box) -> object:
     """Width and height of the clean aperture of a sample entry; False without one, or if it is the whole picture."""
     box = next((box for box in _boxes(file, entry.start + SAMPLE_ENTRY - 8, entry.end) if box.name == "clap"), None)
     if box is None:
@@ -168,7 +168,7 @@ def _parts(data: bytes, size: int) -> list[bytes]:
     return [data[k : k + size] for k in range(0, len(data), size)]
 
 
-def _content(file: BufferedReader, field: Field) -> bytes:
+def _content(file: BufferedReader, field: Box) -> bytes:
     file.seek(field.start)
     return file.read(min(field.end - field.start, LARGEST_HEADER))
 
@@ -183,7 +183,7 @@ def _matroska_fields(file: BufferedReader, length: int) -> dict[str, object]:
     return found
 
 
-def _elements(file: BufferedReader, start: int, end: int, inside: tuple[str, ...]) -> Iterator[Field]:
+def _elements(file: BufferedReader, start: int, end: int, inside: tuple[str, ...]) -> Iterator[Box]:
     """The elements of the video tracks between two places."""
     while start < end and len(inside) < DEEPEST:
         number, at = _variable(file, start, keep=True)
@@ -195,7 +195,7 @@ def _elements(file: BufferedReader, start: int, end: int, inside: tuple[str, ...
         if name.isupper() and not name.startswith("CRC"):
             yield from _elements(file, content, stop, (*inside, name))
         elif "VIDEO" in inside or name == "ContentEncryption":
-            yield Field(name, content, stop)
+            yield Box(name, content, stop)
         start = stop
 
 
