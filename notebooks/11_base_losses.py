@@ -191,8 +191,9 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 #
 # ## Smoothness
 #
-# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$ (an edge map of Canny, {doc}`/references`). The
-# two total variations keep depth and colour flat under the instrument, where nothing is observed.
+# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. They are Canny's edges ({doc}`/references`) of the
+# rendered depth, clipped to 0 to 255 and rounded down to whole scene units, with the thresholds 20 and 200. The two total
+# variations keep depth and colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}
@@ -280,6 +281,8 @@ for depth in (90.0, 0.9 * D_prior.max(), np.nan):
 step = D_hat + 80 * (np.arange(W) > 20)  # a fold, which is an edge
 E = canny_edges(step)
 assert E.any()
+assert np.array_equal(E, canny_edges(np.floor(step))), "whole scene units"
+assert not canny_edges(step + 255).any(), "clipped to 255"
 L_smooth, saved_smooth = smoothness_forward(step, I_hat, M, E, 30.0)
 smooth_text, smooth_text_saved = smoothness_definition.smoothness_forward(
     step, I_hat, M, E, 30.0
