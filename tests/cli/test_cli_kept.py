@@ -14,6 +14,7 @@ def home(tmp_path, monkeypatch):
         (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / "kernel.nbc").write_bytes(bytes(2_000_000))
     monkeypatch.setattr(kept, "user_cache_dir", lambda _: str(tmp_path))
+    monkeypatch.setattr(kept, "flow_folder", lambda: tmp_path / "flows")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "other"))
     return tmp_path
 
@@ -27,6 +28,15 @@ def test_what_is_kept_is_shown_and_removed(home, capsys):
     assert not list((home / "kernels").iterdir()) and (home / "other" / "kernel.nbc").exists()
     assert main(["--cache"]) == 0
     assert "of 0 versions of this package, 0 MB" in capsys.readouterr().out
+
+
+def test_the_flows_of_clips_are_shown_and_removed(home, capsys):
+    (home / "flows").mkdir()
+    (home / "flows" / "clip.npy").write_bytes(bytes(3_000_000))
+    line = f"{home / 'flows'}: flows of 1 clips, 3 MB"
+    assert main(["--cache"]) == 0 and f"{line}\n" in capsys.readouterr().out
+    assert main(["--cache", "clear"]) == 0 and f"{line}; removed\n" in capsys.readouterr().out
+    assert not (home / "flows").exists()
 
 
 def test_another_word_is_refused(home, capsys):

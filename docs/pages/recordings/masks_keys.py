@@ -19,6 +19,7 @@ import numpy as np
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences import carry_masks as carry
 from endotsr.clips.sequences.clip import Picture
+from endotsr.clips.sequences.clip_flows import motion_of
 from endotsr.clips.sequences.drawing import even_frames, instruments_of, plausible_drafts
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.make_masks import left_pictures
@@ -72,7 +73,7 @@ def quality(thin: list[BoolArray], wide: list[BoolArray], truth: list[BoolArray]
 
 def curves(pictures: list[Picture], truth: list[BoolArray]) -> dict[str, Any]:
     """Quality by number of keys, for both ways to choose them; and the number at which the proposals stop."""
-    motion, count = carry.motion_of(pictures), len(pictures)
+    motion, count = motion_of(pictures), len(pictures)
 
     def at(frames: list[int], known: carry.Gaps) -> dict[str, float]:
         keys = {k: truth[k] for k in frames}
@@ -97,7 +98,7 @@ def drafts(pictures: list[Picture], truth: list[BoolArray] | None) -> dict[str, 
     """Frames with a draft by colour, those that the page offers, and those that are worse than an empty mask."""
     colour = instruments_of(propose_masks(pictures))
     marked = [i for i, plane in enumerate(colour) if plane.any()]
-    offered = plausible_drafts(carry.motion_of(pictures), colour) if colour else set()
+    offered = plausible_drafts(motion_of(pictures), colour) if colour else set()
     true = truth or [np.zeros(picture.shape[:2], bool) for picture in pictures]
     worse = {i for i in marked if np.count_nonzero(colour[i] ^ true[i]) >= np.count_nonzero(true[i])}
     return {"frames": len(pictures), "marked": len(marked), "worse": len(worse), "offered": len(offered),

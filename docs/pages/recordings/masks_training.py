@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 import endotsr
-from endotsr.clips.sequences.carry_masks import carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import carry_masks
+from endotsr.clips.sequences.clip_flows import motion_of
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.results.evaluation.metrics import psnr_tissue

@@ -11,7 +11,8 @@ from common_folder import written
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import grown, read_png, write_png
-from endotsr.clips.sequences.carry_masks import LEAST_GAIN, ClipFlows, carried_once, carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carried_once, carry_masks
+from endotsr.clips.sequences.clip_flows import ClipFlows, motion_of
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.config import with_settings

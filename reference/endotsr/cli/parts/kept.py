@@ -1,7 +1,7 @@
 """`endotsr --cache`: show or remove the package's files outside run folders.
 
-These are the compiled kernels: one folder per state of their sources and version of Numba. Older folders are never
-read again. A folder in NUMBA_CACHE_DIR is shown but never removed.
+These are the compiled kernels, one folder per state of their sources and version of Numba, and the flows of clips whose
+masks are drawn. Older folders of kernels are never read again. A folder in NUMBA_CACHE_DIR is shown but never removed.
 """
 
 import os
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_dir
 
+from endotsr.clips.sequences.clip_flows import flow_folder
 from endotsr.errors import InputError
 from endotsr.untrusted.names import plain_line
 
@@ -25,21 +26,24 @@ def kept(words: list[str]) -> list[str]:
     """
     if words not in ([], [CLEAR]):
         raise InputError(f"--cache {' '.join(words)!r} is not allowed; allowed: --cache alone, or --cache {CLEAR}")
-    folder, other = Path(user_cache_dir("endotsr")) / "kernels", os.environ.get("NUMBA_CACHE_DIR")
+    folder, other, flows = Path(user_cache_dir("endotsr")) / "kernels", os.environ.get("NUMBA_CACHE_DIR"), flow_folder()
     versions = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
-    size = sum(map(_bytes, versions)) / 1e6
-    found = f"{plain_line(str(folder))}: compiled kernels of {len(versions)} versions of this package, {size:.0f} MB"
-    lines = [found]
-    if other:
-        lines.append(f"{plain_line(other)}: compiled kernels, {_bytes(Path(other)) / 1e6:.0f} MB (NUMBA_CACHE_DIR)")
+    lines = [_line(folder, f"compiled kernels of {len(versions)} versions of this package", versions)]
+    if flows.is_dir():
+        lines.append(_line(flows, f"flows of {len(list(flows.glob('*.npy')))} clips", [flows]))
+        versions.append(flows)
     if words:
         try:
             for version in versions:
                 shutil.rmtree(version)
         except OSError as error:
             raise InputError(f"{error.filename}: cannot be removed: {error.strerror or error}") from None
-        lines[0] += "; removed"
-    return lines
+        lines = [f"{line}; removed" for line in lines]
+    return [*lines, f"{_line(Path(other), 'compiled kernels', [Path(other)])} (NUMBA_CACHE_DIR)"] if other else lines
+
+
+def _line(place: Path, what: str, folders: list[Path]) -> str:
+    return f"{plain_line(str(place))}: {what}, {sum(map(_bytes, folders)) / 1e6:.0f} MB"
 
 
 def _bytes(folder: Path) -> int:

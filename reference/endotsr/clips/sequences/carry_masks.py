@@ -28,14 +28,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import dense_flow, gaussian_blur, grown, warp_mask
-from endotsr.clips.sequences.clip import Picture
+from endotsr.clips.opencv import gaussian_blur, grown, warp_mask
+from endotsr.clips.sequences.clip_flows import ClipFlows
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.untrusted.files import in_threads
 
 EDGE = 6.0  # px: distance from the inside of the instrument within which its own flow replaces the dense one
 INSIDE = 2  # px by which the inside is smaller than the mask
 SPREAD = 4.0  # px, standard deviation of the average of the flow inside
+REACH = 24  # px, at least EDGE and the half width of the average, 4 SPREAD
 LEAST_PIXELS = 50  # a smaller inside has no flow of its own
 LEAST_AGREEMENT = 0.5  # of the two sides; a guess: no frame of the two EndoNeRF clips is below, at 20 frames a key
 LEAST_GAIN = 0.02  # of the mean agreement of all frames, that another key must promise
@@ -65,20 +67,6 @@ class Gap(NamedTuple):
 Gaps = dict[tuple[int, int], Gap]  # (key before or -1, key after or number of frames) -> its frames
 
 
-class ClipFlows(NamedTuple):
-    """Dense flows between neighbouring frames, (2, H, W) px each."""
-
-    forward: list[FloatArray]  # frame i -> frame i + 1
-    backward: list[FloatArray]  # frame i + 1 -> frame i
-
-
-def motion_of(pictures: Sequence[Picture]) -> ClipFlows:
-    """The flows of a clip, pictures (H, W, 3) uint8 in time order; the expensive part, which no key changes."""
-    planes = [np.ascontiguousarray(picture.transpose(2, 0, 1)) for picture in pictures]
-    pairs = list(pairwise(planes))
-    return ClipFlows([dense_flow(a, b) for a, b in pairs], [dense_flow(b, a) for a, b in pairs])
-
-
 def carry_masks(
     motion: ClipFlows, keys: Mapping[int, BoolArray], margin: int = 0, known: Gaps | None = None
 ) -> Carried:
@@ -98,9 +86,9 @@ def carry_masks(
     _check_keys(keys, count, motion)
     masks, agreement, lost = [], [], []
     ends = [-1, *sorted(keys), count]
+    missing = [gap for gap in pairwise(ends) if gap not in gaps]
+    in_threads(lambda i: gaps.update({missing[i]: _gap(motion, keys, *missing[i])}), len(missing))
     for before, after in pairwise(ends):
-        if (before, after) not in gaps:
-            gaps[before, after] = _gap(motion, keys, before, after)
         gap = gaps[before, after]
         masks += [_excluded(blend, margin) for blend in gap.blend]
         agreement += gap.agreement
@@ -137,7 +125,7 @@ def _check_keys(keys: Mapping[int, BoolArray], count: int, motion: ClipFlows) ->
             raise InputError(f"masks: key {frame} is {mask.shape[1]}x{mask.shape[0]}, the pictures {width}x{height}")
 
 
-def _carried(mask: BoolArray, to_last: list[FloatArray], frames: range, lag: int) -> list[FloatArray]:
+def _carried(mask: BoolArray, to_last: Sequence[FloatArray], frames: range, lag: int) -> list[FloatArray]:
     """Soft masks of the frames on the way from a key.
 
     to_last   flows between neighbouring frames, from the one that comes later on the way to the earlier one
@@ -153,13 +141,24 @@ def _carried(mask: BoolArray, to_last: list[FloatArray], frames: range, lag: int
 def carried_once(mask: FloatArray, flow: FloatArray) -> FloatArray:
     """A soft mask (H, W) at the next frame; flow (2, H, W) px from that frame to the one of the mask."""
     moved = warp_mask(mask, flow)
-    inside = ~grown(moved <= 0.5, INSIDE)
+    place = _around(moved > 0.5)
+    inside = ~grown(moved[place] <= 0.5, INSIDE)
     if np.count_nonzero(inside) < LEAST_PIXELS:
         return moved
     weight = gaussian_blur(inside.astype(np.float32), SPREAD) + np.float32(1e-4)
-    own = np.stack([gaussian_blur(axis * inside, SPREAD) / weight for axis in flow])
-    edge = grown(inside, EDGE) & ~inside
-    return np.where(edge, warp_mask(mask, np.where(edge, own, flow)), moved)
+    edge, flow = grown(inside, EDGE) & ~inside, flow.copy()
+    for axis in flow:
+        part = axis[place]
+        part[edge] = (gaussian_blur(part * inside, SPREAD) / weight)[edge]
+    moved[place][edge] = warp_mask(mask, flow)[place][edge]
+    return moved
+
+
+def _around(mask: BoolArray) -> tuple[slice, slice]:
+    """Rows and columns of the pixels whose flow may change; nothing outside of them depends on the instrument."""
+    found = [np.flatnonzero(mask.any(axis=1 - axis)) for axis in (0, 1)]
+    rows, columns = (slice(max(0, at[0] - REACH), at[-1] + REACH + 1) if at.size else slice(0) for at in found)
+    return rows, columns
 
 
 def _levels(blend: FloatArray | BoolArray) -> NDArray[np.uint8]:

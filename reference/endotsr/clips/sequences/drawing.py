@@ -12,15 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.opencv import sample_bilinear
-from endotsr.clips.sequences.carry_masks import (
-    LEAST_AGREEMENT,
-    ClipFlows,
-    carried_once,
-    carry_masks,
-    motion_of,
-    overlap_of,
-)
+from endotsr.clips.sequences.carry_masks import LEAST_AGREEMENT, carried_once, carry_masks, overlap_of
 from endotsr.clips.sequences.clip import Clip, Picture
+from endotsr.clips.sequences.clip_flows import ClipFlows, motion_of
 from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
 from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, Origin, shapes_of
 from endotsr.clips.sequences.propose_masks import Proposal

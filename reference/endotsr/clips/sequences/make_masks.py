@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, read_png, write_png
-from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carry_masks, motion_of
+from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carry_masks
 from endotsr.clips.sequences.clip import Clip, Picture
+from endotsr.clips.sequences.clip_flows import motion_of
 from endotsr.clips.sequences.drawing import DrawnClip, drawing_of
 from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
 from endotsr.clips.sequences.files import shortened
