@@ -1,7 +1,7 @@
 """`endotsr --cache`: show or remove the package's files outside run folders.
 
 These are the compiled kernels, one folder per state of their sources and version of Numba, and the flows of clips whose
-masks are drawn. Older folders of kernels are never read again. A folder in NUMBA_CACHE_DIR is shown but never removed.
+masks are drawn. Older folders of kernels are not read again. A folder in NUMBA_CACHE_DIR is shown but never removed.
 """
 
 import os
