@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import dense_flow
+from endotsr.clips.opencv.library import cv2_library
 from endotsr.clips.sequences.clip import Picture
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import in_threads
@@ -82,9 +83,7 @@ def _computed(pictures: Sequence[Picture]) -> NDArray[np.int16]:
 
 def _fingerprint(pictures: Sequence[Picture]) -> str:
     """SHA-256 (hex) of the pictures and of all that decides their flows besides them."""
-    import cv2
-
-    found = hashlib.sha256(f"{cv2.__version__} {STEPS} {[picture.shape for picture in pictures]}".encode())
+    found = hashlib.sha256(f"{cv2_library().__version__} {STEPS} {[picture.shape for picture in pictures]}".encode())
     for picture in pictures:
         found.update(np.ascontiguousarray(picture).data)
     return found.hexdigest()
