@@ -23,7 +23,7 @@ FAMILIES = (
     "reading", "dictionary", "appearance", "motion", "matern", "laplacian", "calibration", "deformation", "adam",
     "masked_l1", "masked_ssim", "depth", "smoothness", "exposure", "pose", "registration", "covariance", "projection",
     "harmonics", "composite", "composite_limits", "render", "schedule", "density", "initialisation", "scene",
-    "objective", "training", "other_settings", "extremes", "narrow",
+    "objective", "training", "other_settings", "extremes", "narrow", "wide", "switches",
 )  # fmt: skip
 
 

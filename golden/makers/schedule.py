@@ -25,7 +25,7 @@ def _short_run() -> Config:
     )
 
 
-def _spec(case: str, config: Config, iterations: tuple[int, ...], title: str, flags: tuple[str, ...]) -> Spec:
+def schedule_spec(case: str, config: Config, iterations: tuple[int, ...], title: str, flags: tuple[str, ...]) -> Spec:
     inputs = {"iteration": given(np.array(iterations), ", ".join(map(str, iterations)), "iteration")}
     return Spec("schedule", case, "schedule", title, flags, {"config": written(config)}, inputs)
 
@@ -37,8 +37,8 @@ def cases() -> list[Spec]:
              "rates_one_step_late", "laplacian_ramp_late",
              "statistics_from_start")  # fmt: skip
     return [
-        _spec("paper", Config(), MILESTONES, "Milestones of preset paper, with the iterations before and after", flags),
-        _spec("shared_decay", _short_run(), tuple(range(1, 21)),
+        schedule_spec("paper", Config(), MILESTONES, "Milestones of preset paper, with the iterations before and after", flags),
+        schedule_spec("shared_decay", _short_run(), tuple(range(1, 21)),
               "A short run: no restart of the residual rates, a slower position",
               ("residual_rates_restarted", "position_weights_same_rate",
                "densify_from_start", "densify_until_the_end")),
