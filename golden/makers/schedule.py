@@ -37,7 +37,8 @@ def cases() -> list[Spec]:
              "rates_one_step_late", "laplacian_ramp_late",
              "statistics_from_start")  # fmt: skip
     return [
-        schedule_spec("paper", Config(), MILESTONES, "Milestones of preset paper, with the iterations before and after", flags),
+        schedule_spec("paper", Config(), MILESTONES,
+                      "Milestones of preset paper, with the iterations before and after", flags),
         schedule_spec("shared_decay", _short_run(), tuple(range(1, 21)),
               "A short run: no restart of the residual rates, a slower position",
               ("residual_rates_restarted", "position_weights_same_rate",

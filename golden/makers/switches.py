@@ -21,7 +21,7 @@ BOTH, FULL = "residuals_need_both", "room_below_0"
 
 
 def _rates() -> list[Spec]:
-    """A alone with rates above 1 and no ramp; S alone, activated at the last iteration, so that its decay has no length."""
+    """A alone with rates above 1 and a ramp without length; S alone, active in the last iteration."""
     colour = Config(
         model=ModelConfig(spectral_motion=False, harmonics_degree=1),
         loss=LossConfig(lambda_lap=30.0, laplacian_from=3, laplacian_full=3, smoothness_from=2, smoothness_weight=2.0),
@@ -41,8 +41,8 @@ def _rates() -> list[Spec]:
         training=TrainingConfig(iterations=6, residual_activation=5, harmonics_interval=1),
     )
     return [
-        schedule_spec("appearance_alone", colour, tuple(range(1, 9)), "A without S, rates above 1, a ramp without length",
-                      (BOTH,)),
+        schedule_spec("appearance_alone", colour, tuple(range(1, 9)),
+                      "A without S, rates above 1, a ramp without length", (BOTH,)),
         schedule_spec("motion_alone", motion, tuple(range(1, 7)),
                       "S without A, activated for one iteration; an annealing without length", (BOTH,)),
     ]  # fmt: skip
@@ -66,8 +66,8 @@ def _scene() -> Spec:
         del inputs[name]
     for name in ("harmonics", "opacity_logit"):  # last in the list of inputs
         inputs[name] = inputs.pop(name)
-    settings = {"t": 0.9140625, "model": model_settings(beta=2.5)}
-    title = "Offsets and residuals beyond 1 near the end of the clip: nothing is clamped"
+    settings = {"t": 0.9140625, "model": model_settings(beta=2.5, frequency_max=6.0)}
+    title = "Offsets and residuals beyond 1 near the end of the clip; the sine of 6 cycles is dead"
     return Spec("scene", "wide", "scene", title, (), settings, inputs)
 
 
