@@ -12,6 +12,7 @@ from endotsr.definition.covariance import Shape
 from endotsr.definition.projection import Camera, projection_forward
 from endotsr.method.splatting.settings import PAPER
 from makers.clock import omegas, stamps, train_index
+from makers.composite import tile_case
 from makers.density import density_spec
 from makers.images import tool_mask
 from makers.initialisation import LENS as SMALL_LENS
@@ -23,7 +24,8 @@ from makers.settings import written_initialisation
 from makers.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
 
 OPERATIONS = (
-    "dictionary", "atoms", "appearance", "deformation", "masked_ssim", "laplacian", "pose", "registration", "render",
+    "dictionary", "atoms", "appearance", "deformation", "masked_ssim", "laplacian", "pose", "registration", "harmonics",
+    "composite", "render",
     "density", "initialisation",
 )  # fmt: skip
 
@@ -33,11 +35,12 @@ def _time() -> list[Spec]:
     late, slow, far, bent = (Seeds(*name.split("/")) for name in ("dictionary/after_the_end", "atoms/threshold",
                              "appearance/overflow", "deformation/after_the_end"))  # fmt: skip
     omega = given([3.75e-7, 8.25e-7, 2.5], "3.75e-7, 8.25e-7, 5/2", "cycles per sequence")
+    given_phi = late.uniform("d_phi", -3.0, 3.0, 10)
     size = np.array([-400.0, -100.0, 0.5, 200.0])
     shape = (10, 2, 3)
     return [
         Spec("dictionary", "after_the_end", "dictionary", "A time after 1: it is not clamped", ("time_clamped",), {},
-             {"t": scalar(1.71875), "omega": omegas(5), "d_phi": late.uniform("d_phi", -3.0, 3.0, 10)}),
+             {"t": scalar(1.71875), "omega": omegas(5), "d_phi": changed(given_phi, ..., -given_phi.array, "negated")}),
         Spec("atoms", "threshold", "atoms", "Sines with an RMS just below and just above the limit of a dead atom",
              ("dead_at_1e-5",), {},
              {"times": stamps(24), "train_index": train_index(24), "omega": omega,
@@ -109,7 +112,7 @@ def _boxes() -> Spec:
     """Discs whose box ends 0.2 px before and after the outermost pixel centre of each side, and between two centres."""
     width, height, z = LENS["width"], LENS["height"], 4.0 + 0.125 * np.arange(9)
     sides = [(0, -1, 0.0), (0, 1, width), (1, -1, 0.0), (1, 1, height)]
-    opacity, scale = [0.4, 0.7], [-1.5, -2.0]
+    opacity, scale = [0.4, 0.7], [-2.0, -1.5]
     where = np.array([[8.0] * 9, [7.0] * 9])
     for k, (axis, side, edge) in enumerate(sides):
         for j, inside in enumerate((0.7, 0.3)):
@@ -125,7 +128,7 @@ def _boxes() -> Spec:
     inputs |= {
         "residual": seeds.uniform("residual", -0.2, 0.2, 3, 9),
         "position": given(place, "boxes that end 0.2 px before or after the outermost pixel centres", "scene unit"),
-        "log_scale": given(np.stack([log_scale] * 3), "-3/2 for even and -2 for odd n, that of 8 is -7"),
+        "log_scale": given(np.stack([log_scale] * 3), "-2 for even and -3/2 for odd n, that of 8 is -7"),
         "opacity_logit": logit_of(opacity * 4 + [0.0045]),
     }
     title = "Boxes that end just before and just after the outermost pixel centres of each side"
@@ -155,7 +158,12 @@ def _density() -> Spec:
             "translations": moved._replace(unit="scene unit"),
             "visible": changed(inputs["visible"], ..., seen, "3, 4, 5 in view 0 only"),
             "d_mean2d": changed(inputs["d_mean2d"], ..., still, "Gaussian 9: 0"),
-            "log_scale": changed(scale, ..., scale.array + 1.5, "plus 3/2"),
+            "log_scale": changed(
+                changed(scale, ..., scale.array + 1.5, "plus 3/2"),
+                (slice(None), 8),
+                [0.7, 0.0, 0.0],
+                "8 is (0.7, 0, 0)",
+            ),
             "opacity_logit": changed(faint, ..., faint.array + 0.75, "plus 3/4"),
         }
 
@@ -165,7 +173,7 @@ def _density() -> Spec:
 
 
 def _shallow() -> Spec:
-    """Depths below 1 in steps of 1/64, some not finite or negative; a difference of exactly 1/16 is no motion."""
+    """Depths below 1 in steps of 1/64, some 0 or negative; a difference of exactly 1/16 is no motion."""
     seeds = Seeds("initialisation", "shallow")
     inputs = frames(seeds, 4, [0, 1, 3])
     shape = inputs["prior_depths"].array.shape
@@ -175,7 +183,8 @@ def _shallow() -> Spec:
     depth = given(0.25 + (common + step) / 64, f"1/4 + (a + 2 b) / 64, a = floor of uniform(0, 32) seed "
                   f"{seeds.seed('common')}, b = floor of uniform(-4, 5) seed {seeds.seed('move')}, 0 in frame 0",
                   "scene unit")  # fmt: skip
-    depth = changed(depth, (slice(None), 0, slice(0, 4)), [np.nan, np.inf, -0.5, 0.0], "row 0 begins NaN, inf, -1/2, 0")
+    depth = changed(depth, (slice(None), 0, slice(0, 2)), [-0.5, 0.0], "row 0 begins -1/2, 0")
+    depth = changed(depth, (slice(None), 3), 1 / 32, "row 3 is 1/32")
     depth = changed(depth, (0, 3), 0.0, "row 3 of frame 0 is 0")
     turned = pose()["rotation_matrix"].array
     turns = np.stack([np.linalg.matrix_power(turned, k) for k in range(4)])
@@ -183,11 +192,44 @@ def _shallow() -> Spec:
     drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=0.0625)
     model = msgspec.to_builtins(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.125))
     settings = {"camera": SMALL_LENS, "initialisation": written_initialisation(drawn), "model": model}
-    title = "Depths below 1, some not finite; frames with different poses; a change of just the threshold"
+    title = "Depths below 1; frames with different poses; a change of just the threshold"
     return Spec("initialisation", "shallow", "initialisation", title, ("points_left_in_camera",), settings, inputs,
                 ("prior_depths",))  # fmt: skip
 
 
+def _pair() -> Spec:
+    """Two points: each has one neighbour."""
+    inputs = frames(Seeds("initialisation", "two_points"), 1, [0])
+    alone = np.zeros(inputs["masks"].array.shape, bool)
+    alone[0, 1, 1] = alone[0, 3, 4] = True
+    inputs["masks"] = given(alone, "True at (1, 1) and (3, 4) only")
+    inputs["prior_depths"] = changed(inputs["prior_depths"], (0, [1, 3], [1, 4]), [44.0, 47.0], "44 and 47 there")
+    drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=5.0)
+    model = msgspec.to_builtins(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.125))
+    settings = {"camera": SMALL_LENS, "initialisation": written_initialisation(drawn), "model": model}
+    return Spec("initialisation", "two_points", "initialisation", "Two points: the one neighbour of each", (), settings,
+                inputs)  # fmt: skip
+
+
+def _bands() -> Spec:
+    """Directions along the axes, and coefficients of bands that the degree does not use."""
+    seeds = Seeds("harmonics", "unused_bands")
+    away = np.concatenate([np.eye(3), -np.eye(3)], axis=1) * [2.0, 3.0, 0.5, 4.0, 0.25, 8.0]
+    inputs = {
+        "harmonics": seeds.uniform("harmonics", -2.0, 3.0, 16, 3, 6),
+        "residual": seeds.uniform("residual", -3.0, 3.0, 3, 6),
+        "position": given(away + 0.5, "(1/2, 1/2, 1/2) plus 2 x, 3 y, z / 2, -4 x, -y / 4, -8 z", "scene unit"),
+        "centre": given([0.5, 0.5, 0.5], "1/2", "scene unit"),
+        "d_colour": seeds.uniform("d_colour", -30.0, 30.0, 3, 6),
+    }
+    title = "Degree 2 of sixteen coefficients: the others have gradient 0; directions along the axes"
+    return Spec("harmonics", "unused_bands", "harmonics", title, (), {"degree": 2}, inputs)
+
+
 def cases() -> list[Spec]:
     """In the order of the method."""
-    return [*_time(), *_losses(), _turn(), _edges(), _boxes(), _density(), _shallow()]
+    wide = "A disc of 9 px whose tiles begin where its alpha is still above the cutoff"
+    before = tile_case(
+        "tile_before", wide, ("tiles_unbounded",), [44.6, 20.0, 30.0], [8.2, 7.4, 10.0], [81.0, 9.0, 4.0]
+    )
+    return [*_time(), *_losses(), _turn(), _edges(), _bands(), before, _boxes(), _density(), _shallow(), _pair()]

@@ -16,12 +16,12 @@ from endotsr.port.judge.format import Case
 from endotsr.port.search.requests import leaves, value_at, with_value
 
 APART = 1e-9  # of the scale of an output
-PER_CASE = 24
+PER_CASE = 10
 SIGNED = {"rotation_vector", "t", "d_loss", "d_ssim", "d_penalty", "parameter"}
 KEPT = {"times", "train_index", "frame_order", "iteration", "images", "masks", "visible"}
 FIXED = {"preset", "levels", "threads", "precision", "width", "height", "iterations", "bases", "frequencies"}
 SEEN = {"beta1", "beta2", "final_factor", "annealed_factor", "alpha_max", "ssim_weight", "interval", "harmonics_interval",
-        "support", "growth", "initial_width", "prune_opacity"}  # other values are refused or have no meaning
+        "support", "growth", "initial_width", "prune_opacity", "low_pass"}  # other values are refused or have no meaning
 UNIT = {"observed"}  # colours of a frame
 
 
