@@ -108,7 +108,7 @@ def test_mistakes_are_listed_and_written(tmp_path, capsys):
     said = capsys.readouterr().out.splitlines()
     assert said == [f"{port.flag}: {port.title} ({port.wrong})" for port in WRONG_PORTS.values()]
     assert make.main(["wrong", "l1_over_all_pixels", str(tmp_path / "out")]) == 0
-    assert capsys.readouterr().out.startswith("golden: 6 cases answered wrongly in ")
+    assert capsys.readouterr().out.startswith("golden: 7 cases answered wrongly in ")
     assert (tmp_path / "out" / "motion" / "generic" / "translation.npy").is_file()
     for words in (["no_such_flag", str(tmp_path)], ["l1_over_all_pixels"]):
         with pytest.raises(SystemExit, match="give the FLAG of a mistake"):
