@@ -189,7 +189,7 @@ def _steps() -> Spec:
     settings = {"rate": 2.5, "beta1": 0.5, "beta2": 0.75, "epsilon": 1e-15}
     inputs = {"parameter": seeds.uniform("parameter", -9.0, 9.0, 2, 3),
               "gradients": seeds.uniform("gradients", -30.0, 30.0, 3, 2, 3)}  # fmt: skip
-    return _case("adam", inputs, **settings)
+    return Spec("adam", CASE, "adam", TITLE, (), settings, inputs)
 
 
 def cases() -> list[Spec]:
