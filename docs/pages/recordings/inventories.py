@@ -13,21 +13,33 @@ from endotsr.cli.parts.relations import Needs, shown
 from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts.nerfstudio import FIELDS, FRAME_FIELDS
+from endotsr.clips.sequences.picture_fields import JPEG, PNG, TIFF, WEBP
+from endotsr.clips.sequences.point_files import CLOUD
+from endotsr.clips.sequences.pose_fields import COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF
+from endotsr.clips.sequences.slam_calibrations import EUROC, ORB
+from endotsr.clips.sequences.trajectory_lines import FIELDS as TRAJECTORY
+from endotsr.clips.sequences.video_marks import MATROSKA, MP4
+from endotsr.results.export.ply import GAUSSIAN
 from endotsr.results.report.tables import markdown
 from pages.store.marks import write_marked
 
 PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
-INVENTORIES = (FIELDS, FRAME_FIELDS, KALIBR, ROS, OPENCV, INI)
+INVENTORIES = (
+    FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, INI, ORB,
+    EUROC, PNG, JPEG, WEBP, TIFF, MP4, MATROSKA, CLOUD, GAUSSIAN,
+)  # fmt: skip
+USES = {"used": "used", "refused": "refused", "told": "named in a note", "harmless": "harmless"}
 COMMANDS = ("prepare", "depth", "render", "export")  # of `train`, most related options are settings
 
 
 def fields(inventories: tuple[Inventory, ...] = INVENTORIES) -> str:
-    """Every listed field of every format: used, refused or harmless."""
+    """Every listed field of every format: used, refused, named in a note or harmless."""
     rows = []
     for inventory in inventories:
-        for use in ("used", "refused", "harmless"):
+        for use, words in USES.items():
             for names, text in getattr(inventory, use).items():
-                rows.append([inventory.about, _code(names.split()), use, text.replace("|", "/")])
+                shown = [name.rstrip("_") for name in names.split()]
+                rows.append([inventory.about, _code(shown), words, text.replace("|", "/")])
     return markdown(("Format", "Field", "Use", "Meaning or reason"), rows)
 
 

@@ -19,6 +19,7 @@ from endotsr.clips.sequences.layouts import describe, nerfstudio
 WIDTH, HEIGHT, FRAMES = 32, 24, 3
 K = [[30.0, 0, 15.0], [0, 31.0, 11.0], [0, 0, 1]]
 Keys = dict[str, Any]
+NO_KEYS: Keys = {}
 
 
 class Format(NamedTuple):
@@ -30,6 +31,7 @@ class Format(NamedTuple):
     read: Callable[[Path], object]  # what the reader makes of the folder; equal for equal results
     changed: Keys  # name of a used field -> another value; None: the field is left out
     refused: Keys  # name of a refused field -> a value that is refused
+    told: Keys = NO_KEYS  # name of a field that is not applied -> a value that a note tells
 
 
 def result(clip: Clip) -> object:

@@ -1,11 +1,15 @@
 """Every field of a format is used, refused by name, harmless with a reason, or noted as unknown."""
 
 import pytest
-from field_inputs import FORMATS, Format
+from field_inputs import FORMATS as NAMED
+from field_inputs import Format
+from file_formats import FILES
+from video_formats import REPEATED, TRACKS
 
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.errors import InputError
 
+FORMATS = NAMED | FILES | TRACKS
 USED = [(name, field) for name, found in FORMATS.items() for field in found.changed]
 REFUSED = [(name, field) for name, found in FORMATS.items() for field in found.refused]
 
@@ -32,12 +36,27 @@ def test_a_used_field_changes_the_result(name, field, tmp_path):
     assert matters(FORMATS[name], field, tmp_path)
 
 
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_format_is_read_alike_twice(name, tmp_path):
+    """Otherwise every field would seem to change the result."""
+    found = FORMATS[name]
+    assert outcome(found, tmp_path / "a", found.base) == outcome(found, tmp_path / "b", found.base)
+
+
 @pytest.mark.parametrize(("name", "field"), REFUSED)
 def test_a_refused_field_is_refused_by_name(name, field, tmp_path):
     found = FORMATS[name]
     assert isinstance(outcome(found, tmp_path / "a", found.base), tuple)
     said = outcome(found, tmp_path / "b", found.base | {field: found.refused[field]})
     assert isinstance(said, str) and field in said and found.inventory.reason(found.inventory.refused, field) in said
+
+
+@pytest.mark.parametrize(("name", "field"), [(name, field) for name, found in FILES.items() for field in found.told])
+def test_a_field_that_is_not_applied_is_told(name, field, tmp_path):
+    found = FILES[name]
+    said = outcome(found, tmp_path / "a", found.base | {field: found.told[field]})
+    text = found.inventory.reason(found.inventory.told, field)
+    assert isinstance(said, tuple) and any(f"{field}: {text}" in note for note in said[1]), said
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -47,7 +66,7 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
     patterns = [word for names in found.inventory.used for word in names.split()]
     tried = {*found.changed, *found.base}
     spelled = {"nerfstudio frame": {"camera_angle_x", "camera_angle_y"}, "ros": ALIASES, "ros echo": ALIASES,
-               "opencv": OTHER_NAMES}.get(name, set())  # fmt: skip
+               "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, **REPEATED}.get(name, set())  # fmt: skip
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
         known = pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried)
@@ -56,6 +75,10 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
 
 ALIASES = {"image_width", "width", "image_height", "height", "camera_matrix", "K", "k", "distortion_coefficients", "D",
            "d", "rectification_matrix", "R", "r", "projection_matrix", "P", "p"}  # fmt: skip
+# Read by libtiff without a statement of this package; GDAL_NODATA is one of the inputs tried.
+BY_LIBTIFF = {"ColorMap", "SampleFormat", "FillOrder", "TileWidth", "TileLength", "TileOffsets", "TileByteCounts",
+              "YCbCrSubSampling", "YCbCrPositioning", "YCbCrCoefficients", "ReferenceBlackWhite", "JPEGTables",
+              "T4Options", "T6Options", "GrayResponseUnit", "GrayResponseCurve", "GDAL_NODATA"}  # fmt: skip
 OTHER_NAMES = {"camera_matrix", "Camera_Matrix", "K", "cameraMatrix", "distortion_coefficients",
                "Distortion_Coefficients", "D", "distCoeffs", "K1", "K2", "cameraMatrix1", "cameraMatrix2",
                "distCoeffs1", "distCoeffs2", "image_Width", "image_Height", "width", "height"}  # fmt: skip
@@ -80,9 +103,28 @@ def test_a_calibration_with_a_new_field_says_so(name, tmp_path):
     assert any("unknown here: thin_prism" in note for note in calibrated(file, 32, 24).notes)
 
 
+@pytest.mark.parametrize(("name", "old"), [("mp4", "btrt"), ("mkv", "DisplayHeight")])
+def test_a_video_with_a_new_field_says_so(name, old, tmp_path):
+    """Another name is not known; DisplayHeight becomes an element of the same length."""
+    found = FORMATS[name]
+    new = "abcd" if name == "mp4" else None
+    assert "unknown here" in str(outcome(found, tmp_path / "a", found.base | {"field": (old, new)}))
+
+
 @pytest.mark.parametrize(
     ("name", "field"),
-    [("nerfstudio", "k1"), ("nerfstudio frame", "time"), ("kalibr", "T_cn_cnm1"), ("opencv", "D2"), ("ini", "T_0")],
+    [
+        ("nerfstudio", "k1"),
+        ("nerfstudio frame", "time"),
+        ("kalibr", "T_cn_cnm1"),
+        ("opencv", "D2"),
+        ("ini", "T_0"),
+        ("colmap image binary", "TX"),
+        ("llff", "R"),
+        ("png", "PLTE"),
+        ("gaussians", "rot_1"),
+        ("mp4", "elst"),
+    ],
 )
 def test_a_reader_that_drops_a_field_is_found(name, field, tmp_path):
     """The proof of a used field fails for a reader that does not look at it."""

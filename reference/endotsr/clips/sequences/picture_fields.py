@@ -19,7 +19,7 @@ PNG = Inventory(
     used={
         "IHDR PLTE IDAT IEND": PIXELS,
         "tRNS": "transparent pixels, which are refused",
-        "acTL fcTL fdAT": "an animation; more than one picture is refused",
+        "acTL": "an animation; more than one picture is refused",
         "eXIf": "orientation and colour space of EXIF, see there",
         "sRGB": "the colours are sRGB; takes precedence over gAMA and cHRM",
     },
@@ -35,6 +35,7 @@ PNG = Inventory(
     harmless={
         "tEXt zTXt iTXt tIME dSIG caNv vpAg iDOT": TEXT,
         "oFFs pCAL sCAL": PRINT,
+        "fcTL fdAT": "of an animation, whose pictures acTL counts",
         "sBIT bKGD hIST sPLT gIFg gIFx gIFt mDCV cLLI mDCv cLLi": DISPLAY,
     },
 )
@@ -42,7 +43,6 @@ JPEG = Inventory(
     "the segments of JPEG",
     used={
         "SOF": PIXELS,
-        "APP0": "JFIF: the pixels are YCbCr",
         "Adobe": "transformation of the colours: RGB, YCbCr, CMYK",
         "Exif": "orientation and colour space of EXIF, see there",
     },
@@ -51,7 +51,7 @@ JPEG = Inventory(
         "ICC_PROFILE ColorSpace": COLOURS,
         "MPF": "further pictures in the file are not read, such as the second view of a stereo camera",
     },
-    harmless={"APP? APP1?": "data of a program or a camera, such as XMP", "COM": TEXT},
+    harmless={"APP0": PRINT, "APP? APP1?": "data of a program or a camera, such as XMP", "COM": TEXT},
 )
 WEBP = Inventory(
     "the chunks of WebP",
@@ -79,7 +79,7 @@ TIFF = Inventory(
     refused={"Orientation": UPRIGHT},
     told={
         "ICCProfile WhitePoint PrimaryChromaticities TransferFunction": COLOURS,
-        "SubIFD SubIFDs": "further pictures in the file are not read",
+        "SubIFDs": "further pictures in the file are not read",
         "GDAL_METADATA": "a scale or an offset of the values is not read: --depth-scale",
     },
     harmless={

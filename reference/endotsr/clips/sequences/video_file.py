@@ -83,6 +83,7 @@ def video_facts(path: Path) -> VideoFacts:
 
     Raises:  InputError for a file that is not a decodable video, and for high dynamic range.
     """
+    noted = container_notes(path)
     with _opened(path) as (container, stream):
         codec, context = stream.codec_context.name, stream.codec_context
         shape = float(stream.sample_aspect_ratio or 1) or 1.0
@@ -95,7 +96,7 @@ def video_facts(path: Path) -> VideoFacts:
         _refuse_wide_range(first[0], path)
         width, height, turn = first[0].width, first[0].height, round(first[0].rotation) % 360
         interlaced = any(frame.interlaced_frame for frame in first)
-        remarks = (*container_notes(path), *_remarks(first[0], len(container.streams.video)))
+        remarks = (*noted, *_remarks(first[0], len(container.streams.video)))
         views = view_marks(first[0], path)
     packets = _packets(path)
     if len(packets) < stated:
