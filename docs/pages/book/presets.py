@@ -7,31 +7,19 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.results.report.tables import markdown
-from pages.book import running_clip
+from pages.book import readme_presets, running_clip
 from pages.full_size.text import LABELS, PREDICTIONS
 from pages.store.marks import read_json, write_marked
 
 DOCS = Path(__file__).parents[2]
 PAGE, MINUTES = DOCS / "guides" / "which_preset.md", DOCS / "results" / "minutes.json"
 FULL_SIZE = DOCS / "results" / "full_size" / "runs.json"
-ORDER = ("quick", "paper", "sharp")
 COMMAND = "docs/pages/book/presets.py"
 
 
 def recorded() -> str:
-    """Time, memory and quality of each preset on the recorded clip."""
-    stored = read_json(MINUTES, COMMAND)
-    rows = []
-    for name in ORDER:
-        run = stored["rows"][name][0]
-        minutes, gigabytes = run["seconds"] / 60, run["peak_memory_bytes"] / 1e9
-        quality = (f"{run['psnr_full']:.2f}", f"{run['lpips']:.4f}")
-        rows.append([f"`{name}`", f"{minutes:.1f}", f"{gigabytes:.1f}", str(run["gaussians"]), *quality])
-    about = stored["rows"]["quick"][0]
-    head = ("Preset", "Minutes", "GB", "Gaussians", "PSNR full, dB", "LPIPS")
-    clip = stored["clip"]
-    of_clip = f"`{clip['name']}`, {clip['frames']} frames of {clip['size']}, every eighth held out; one seed"
-    return f"{markdown(head, rows)}\n\n{of_clip}, {about['threads']} threads of {about['processor']}, {about['date']}."
+    """Time, memory and quality of each preset on the recorded clip: the table of README.md with the sizes."""
+    return readme_presets.table(read_json(MINUTES, COMMAND), (*readme_presets.SIZES, *readme_presets.MEASURED))
 
 
 def simulated() -> str:

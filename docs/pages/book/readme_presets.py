@@ -16,18 +16,18 @@ from pages.store.marks import read_json, write_marked
 DOCS = Path(__file__).parents[2]
 PAGE, RECORD = DOCS.parent / "README.md", DOCS / "results" / "minutes.json"
 WHOLE, START = DOCS / "results" / "waiting.json", DOCS / "results" / "bench_start.json"
-HEADS = ("Preset", "Training, minutes", "PSNR full, dB", "LPIPS [0,1]", "Seeds")
-MEASURED = (("psnr_full", 2), ("lpips", 4))  # metric, digits
+MEASURED = (("PSNR full, dB", "psnr_full", 1.0, 2), ("LPIPS [0,1]", "lpips", 1.0, 4))  # head, key, unit, digits
+SIZES = (("GB", "peak_memory_bytes", 1e9, 1), ("Gaussians", "gaussians", 1.0, 0))
 
 
-def table(found: dict[str, Any]) -> str:
-    """One row per preset, the fastest first, with the machine."""
+def table(found: dict[str, Any], columns: tuple[tuple[str, str, float, int], ...] = MEASURED) -> str:
+    """One row per preset, the fastest first, means over the seeds; then the clip and the machine."""
     rows = sorted((mean(run["seconds"] for run in runs), name, runs) for name, runs in found["rows"].items())
     cells = [
         [
             f"`{name}`",
             f"{seconds / 60:.1f}",
-            *(f"{mean(run[k] for run in of):.{d}f}" for k, d in MEASURED),
+            *(f"{mean(run[key] for run in of) / unit:.{digits}f}" for _, key, unit, digits in columns),
             str(len(of)),
         ]
         for seconds, name, of in rows
@@ -41,7 +41,8 @@ def table(found: dict[str, Any]) -> str:
         f"{' or '.join(map(str, threads))} threads of {', '.join(machines)}, {max(run['date'] for run in runs)}. The "
         "time is that of the iterations; it holds for this class of machine."
     )
-    return f"{markdown(HEADS, cells)}\n\n{about}"
+    heads = ("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds")
+    return f"{markdown(heads, cells)}\n\n{about}"
 
 
 def whole(rows: list[dict[str, Any]], start: dict[str, Any]) -> str:
