@@ -13,7 +13,8 @@ from pages.claims.parts import planned_hours, protocols, tables
 from pages.claims.power import least_size, pairs_needed, power
 from pages.claims.protocols import MOVED, gain_of_the_right_eye, ours, right_eye
 from pages.claims.rules import increment_verdict, largest_verdict, level_verdict, no_change_verdict
-from pages.claims.verdicts import HEADS, NOT_YET, STEPS, WHOLE, lead, student, verdicts, verdicts_of_both
+from pages.claims.verdicts import HEADS, NOT_YET, STEPS, WHOLE, lead, verdicts, verdicts_of_both
+from pages.store.intervals import student
 from pages.store.marks import replaced
 from pages.store.published import MEANS_ON_TISSUE
 from scipy import stats

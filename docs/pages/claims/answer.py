@@ -14,8 +14,8 @@ import numpy as np
 
 from pages.claims.estimates import Estimate, contrast, runs_of
 from pages.claims.rules import seeds_of
-from pages.claims.verdicts import CLIPS, FULL, STEPS, WHOLE, student
-from pages.store.intervals import shown
+from pages.claims.verdicts import CLIPS, FULL, STEPS, WHOLE
+from pages.store.intervals import shown, student
 from pages.store.marks import read_json
 from pages.store.published import MATCHED_PSNR, PUBLISHED
 

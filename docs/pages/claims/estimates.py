@@ -18,11 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from endotsr.studies.sweeps.ablation import FIXED, RunPair, estimate
+from pages.store.intervals import LEVEL, Interval, student
 
 Record = Any  # content of a file of docs/results
 SPLIT = "every_eighth"
-CONFIDENCE = 0.95
-Interval = tuple[float, float] | None
 
 
 class Estimate(NamedTuple):
@@ -60,18 +59,9 @@ def contrast(found: Record | None, terms: Mapping[str, int], metric: str) -> Est
         return None
     values = tuple(float(sum(c * runs[name][seed] for name, c in terms.items())) for seed in seeds)
     return Estimate(
-        values, float(np.mean(values)), float(np.median(values)), _paired(values),
+        values, float(np.mean(values)), float(np.median(values)), student(values)[1],
         _common(values, terms, spread(found, metric, any(FIXED in name for name in terms))),
     )  # fmt: skip
-
-
-def _paired(values: tuple[float, ...]) -> Interval:
-    from scipy import stats
-
-    if len(values) < 2:
-        return None
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1) * stats.sem(values))
-    return float(np.mean(values)) - half, float(np.mean(values)) + half
 
 
 def _common(values: tuple[float, ...], terms: Mapping[str, int], of: Spread | None) -> Interval:
@@ -80,7 +70,7 @@ def _common(values: tuple[float, ...], terms: Mapping[str, int], of: Spread | No
     if of is None:
         return None
     error = of.deviation * np.sqrt(sum(c * c for c in terms.values()) / len(values))
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, of.freedom) * error)
+    half = float(stats.t.ppf((1 + LEVEL) / 2, of.freedom) * error)
     return float(np.mean(values)) - half, float(np.mean(values)) + half
 
 

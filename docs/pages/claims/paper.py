@@ -16,7 +16,8 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pages.claims.verdicts import CLIPS, HEADS, student
+from pages.claims.verdicts import CLIPS, HEADS
+from pages.store.intervals import student
 from pages.store.marks import read_json, write_marked
 from pages.store.published import BY_NAME, PUBLISHED, SEVEN_OTHERS, SURGICALGS
 

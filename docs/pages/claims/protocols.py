@@ -17,8 +17,8 @@ from endotsr.studies.sweeps.execute import FINISHED
 from pages.claims.estimates import SPLIT, Estimate, contrast
 from pages.claims.power import least_size
 from pages.claims.rules import LEAST_PAIRS, few, without_published
-from pages.claims.verdicts import CLIPS, FULL, METRICS, between, student
-from pages.store.intervals import interval
+from pages.claims.verdicts import CLIPS, FULL, METRICS, between
+from pages.store.intervals import interval, student
 
 Record = Any  # content of a file of docs/results
 WHOLE = next(c for c in COMPARISONS if c.claim == "all three")  # the whole method against the base

@@ -6,7 +6,7 @@ for all values that round to it, and a published range is met if I meets it. A c
 within HUNDREDTH of 0. A level is reproduced if I contains a value that rounds to the published one.
 """
 
-from pages.claims.estimates import Interval
+from pages.store.intervals import Interval
 
 HUNDREDTH = 0.01  # dB
 LEAST_PAIRS = 3  # with fewer, no verdict

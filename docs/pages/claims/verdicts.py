@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from endotsr.results.report.tables import markdown
 from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS, Contrast
-from pages.claims.estimates import Estimate, Interval, averaged, contrast, runs_of
+from pages.claims.estimates import Estimate, averaged, contrast, runs_of
 from pages.claims.rules import (
     increment_verdict,
     largest_verdict,
@@ -20,7 +20,7 @@ from pages.claims.rules import (
     seeds_of,
     unless_few,
 )
-from pages.store.intervals import interval
+from pages.store.intervals import Interval, student
 from pages.store.published import MATCHED_LPIPS, MATCHED_PSNR, PRIOR, PUBLISHED
 
 NOT_YET = "Not measured yet."
@@ -90,12 +90,6 @@ def verdicts_of_both(found: Mapping[str, Record | None]) -> str:
     steps = [c for c in COMPARISONS if BOTH in c.published]
     rows = [_increment_row(records, c, metric, BOTH) for c in steps for metric in _metrics(c)]
     return markdown(HEADS, rows + [_largest_row(records, metric) for metric in COMPARED])
-
-
-def student(values: list[float]) -> tuple[float, Interval]:
-    """Mean and 95 % interval (Student) of values of several seeds; no interval for one."""
-    mean, half = interval(values)
-    return mean, None if len(values) < 2 else (mean - half, mean + half)
 
 
 def _metrics(of: Contrast) -> list[str]:

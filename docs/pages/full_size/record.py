@@ -14,11 +14,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
 
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
 from pages.full_size.interpolation import LEFT_OUT, frames_text
+from pages.store.intervals import interval
 from pages.store.published import PUBLISHED
 
 FOLDER = Path(__file__).parents[2] / "results"
@@ -110,10 +110,8 @@ def cell(values: list[dict], key: str, form: str) -> str:
     numbers = [row[key] for row in values if row.get(key) is not None]
     if not numbers:
         return "-"
-    if len(numbers) < 2:
-        return form.format(numbers[0])
-    half = stats.t.ppf(0.975, len(numbers) - 1) * np.std(numbers, ddof=1) / np.sqrt(len(numbers))
-    return f"{form.format(np.mean(numbers))} ± {form.format(half)}"
+    mean, half = interval(numbers)
+    return form.format(mean) + (f" ± {form.format(half)}" if len(numbers) > 1 else "")
 
 
 def table(records: dict[str, dict]) -> str:

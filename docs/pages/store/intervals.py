@@ -4,6 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+LEVEL = 0.95  # of every interval
+Interval = tuple[float, float] | None
+
 
 def interval(values: Sequence[float]) -> tuple[float, float]:
     """Mean and half width of its 95 % interval (t distribution); nan for one value."""
@@ -12,7 +15,13 @@ def interval(values: Sequence[float]) -> tuple[float, float]:
     n = len(values)
     if n < 2:
         return float(np.mean(values)), float("nan")
-    return float(np.mean(values)), float(stats.t.ppf(0.975, n - 1) * stats.sem(values))
+    return float(np.mean(values)), float(stats.t.ppf((1 + LEVEL) / 2, n - 1) * stats.sem(values))
+
+
+def student(values: Sequence[float]) -> tuple[float, Interval]:
+    """Mean and limits of its interval; no limits for one value."""
+    mean, half = interval(values)
+    return mean, None if len(values) < 2 else (mean - half, mean + half)
 
 
 def shown(values: Sequence[float], digits: int, sign: str = "") -> str:
