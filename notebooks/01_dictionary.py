@@ -232,9 +232,9 @@ offset = np.sqrt((both[0].mean(axis=0) ** 2).mean()) / both[0].std(axis=0).mean(
 assert 0.07 < offset < 0.15, "about a tenth"
 
 # %% [markdown]
-# On raw atoms the mean colour moves by about a third of a level on average. That is little: over the 55 training stamps the
-# mean of an atom is about a tenth of its deviation. On normalised atoms the argument of the $\tanh$ has mean 0, so the shift that remains comes from the
-# $\tanh$. The next section has the case in which the scale matters most.
+# On raw atoms the mean colour moves by about a third of a level on average. That is little: over the 55 training stamps
+# the mean of an atom is about a tenth of its deviation. On normalised atoms the argument of the $\tanh$ has mean 0, so
+# the shift that remains comes from the $\tanh$. The next section has the case in which the scale matters most.
 #
 # ## The dead atom
 #

@@ -191,9 +191,9 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 #
 # ## Smoothness
 #
-# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. They are Canny's edges ({doc}`/references`) of the
-# rendered depth, clipped to 0 to 255 and rounded down to whole scene units, with the thresholds 20 and 200. The two total
-# variations keep depth and colour flat under the instrument, where nothing is observed.
+# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. They are Canny's edges ({doc}`/references`) of
+# the rendered depth, clipped to 0 to 255 and rounded down to whole scene units, with the thresholds 20 and 200. The two
+# total variations keep depth and colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}
