@@ -283,8 +283,8 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 #
 # **(13.7) Prune, then choose.** A Gaussian with $o_i<o_{\mathrm{min}}$ is removed, with its moments; $N$ stay. A
 # candidate is one that stays and has $\bar g_i\ge g_{\mathrm{thr}}$. Each candidate adds one Gaussian, so there is room
-# for $M-N$ of them. If there are more, those with the largest $\bar g_i$ remain; of equal ones, those with the lower index. (The presets
-# with a budget replace threshold and room by (20.1).)
+# for $M-N$ of them. If there are more, those with the largest $\bar g_i$ remain; of equal ones, those with the lower
+# index. (The presets with a budget replace threshold and room by (20.1).)
 #
 # **(13.8) Clone or split.** A candidate whose largest semi-axis is at most $p\,e=0.1$ scene units is small for its region:
 # an exact copy is added, at the same place. A larger candidate is replaced by two children:
