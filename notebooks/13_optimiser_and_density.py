@@ -275,8 +275,9 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 #
 # Each iteration before 4000 adds its one view to both sums. A Gaussian is *visible* in a view if it is in front of the
 # near plane and the box around its support, the ellipse with $\alpha\ge\alpha_{\mathrm{cut}}$, contains the centre of a
-# pixel. A Gaussian that no view has shown has $\bar g_i=0$. In these units the threshold $g_{\mathrm{thr}}$ does not depend
-# on the size of the image.
+# pixel. A Gaussian that no view has shown has $\bar g_i=0$. Why not leave the gradient per pixel? The losses are means over
+# pixels, so an image of twice the size has about half the gradient per pixel and about the same $\bar g_i$. One threshold
+# serves all sizes.
 #
 # The rule runs at the iterations that are multiples of 100, after 500 and before 4000. It reads and writes the stored
 # parameters after the step of Adam, not the deformed ones. Afterwards both sums of all Gaussians are 0.
@@ -395,6 +396,33 @@ assert (d.gradient_threshold, d.prune_opacity, d.extent, d.dense_fraction, d.max
     *(2e-4, 0.005, 10),
     *(0.01, 400_000),
 ), "the table"
+
+
+def screen_gradients(size):
+    """Norms in normalised device coordinates and per pixel, for one smooth gradient image of a mean over pixels."""
+    large = Camera(
+        np.eye(3),
+        np.zeros(3),
+        40.0 * size,
+        40.0 * size,
+        32.0 * size,
+        24.0 * size,
+        64 * size,
+        48 * size,
+    )
+    out, saved = render_forward(scene, large, EXACT, degree=0)
+    v, u = np.mgrid[0 : large.height, 0 : large.width] + 0.5
+    wave = np.cos(5 * u / large.width) * np.sin(4 * v / large.height + 1)
+    back = np.broadcast_to(wave / out.colour.size, out.colour.shape).copy()
+    g_u, g_v = render_reverse(back, 0 * out.depth, None, saved).d_mean2d
+    return np.hypot(large.width / 2 * g_u, large.height / 2 * g_v), np.hypot(g_u, g_v)
+
+
+(unit, per_pixel), (unit_2, per_pixel_2) = screen_gradients(4), screen_gradients(8)
+print(f"twice the size: {np.median(unit_2 / unit):.2f} in these units, ", end="")
+print(f"{np.median(per_pixel_2 / per_pixel):.2f} per pixel")
+np.testing.assert_allclose(np.median(unit_2 / unit), 1, atol=0.1)
+np.testing.assert_allclose(np.median(per_pixel_2 / per_pixel), 0.5, atol=0.05)
 rule = DensityConfig(gradient_threshold=float(np.quantile(steep, 0.6)))
 extent, p = 10.0, rule.dense_fraction
 after = densify(gaussians, statistics, rule, np.random.default_rng(5), extent)
