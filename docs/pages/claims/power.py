@@ -71,14 +71,6 @@ def kind_of(claim: str) -> str:
     return AT_FIXED if FIXED in claim.replace(",", "") else FREE
 
 
-def least_difference(found: Record | None, claim: str, metric: str = "psnr_full") -> float | None:
-    """The smallest true difference that the pairs of a claim distinguish from 0; None without pairs."""
-    rows = [] if found is None else [r for r in found["increments"] if (r["claim"], r["metric"]) == (claim, metric)]
-    if not rows or rows[0]["pairs"] < 2:
-        return None
-    return least_size(rows[0]["pairs"]) * spread(found or {}, metric, kind_of(claim))
-
-
 def sentences(found: Record | None) -> str:
     """The smallest difference that the seeds resolve, and the seeds needed for the published gains."""
     if found is None or not found["increments"]:
