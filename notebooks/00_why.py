@@ -98,7 +98,7 @@ plt.show()
 # The objective is a weighted sum of losses. L and the Matérn prior of S are terms of it; A and S change the render. Each
 # $\mathcal L$ and $\mathcal S$ is a number for one render and one frame, the other factors are weights, $i$ is the
 # iteration, and a bracket $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise. {doc}`14_full_sequence` has the
-# table of all symbols.
+# table of these terms and weights.
 #
 # $$
 # \begin{aligned}

@@ -136,8 +136,8 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # %% [markdown]
 # ## The coarse start
 #
-# Two numbers decide when the start at half size ends: $e$, the mean error of the
-# renders at half size, and $d$, the mean magnitude of the finest Laplacian band of the frames.
+# Two numbers decide when the start at half size ends: $e$, the mean error of the renders at half size, and $d$, the mean
+# magnitude of the finest Laplacian band of the frames.
 #
 # | Symbol | Meaning |
 # |---|---|
