@@ -2,6 +2,7 @@
 
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -52,6 +53,8 @@ class RunOptions(_Reported):
 
     port: str = ""
     """the command, with {requests} and {outputs} for the folders; called without a shell"""
+    runs: int = 1
+    """call the port so many times; a level is complete if each run is within tolerance (level 4 at most)"""
     timeout: float = 600.0
     """time limit of a call, seconds"""
     keep: Annotated[Path | None, Option("DIR")] = None
@@ -134,13 +137,15 @@ def _run(words: list[str]) -> int:
     from endotsr.port.judge.badge import write_proof
     from endotsr.port.judge.call import called
     from endotsr.port.judge.certificate import port_of
+    from endotsr.port.judge.runs import called_often
     from endotsr.port.judge.store import golden_folder, read_golden
 
     options = parse(RunOptions, words, "golden run")
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
         asked = {"level": options.level, "only": options.only, "timeout": options.timeout, "profile": options.profile}
-        report, outputs = called(golden, options.port, options.keep or Path(scratch), options.precision, **asked)
+        call = called if options.runs == 1 else partial(called_often, runs=options.runs)
+        report, outputs = call(golden, options.port, options.keep or Path(scratch), options.precision, **asked)
         code = _report(report, golden, outputs, options)
     if options.certificate or options.badge:
         reason = write_proof(golden, report, port_of(options.port, options.name), options.certificate, options.badge)

@@ -15,6 +15,7 @@ from endotsr.port.judge.certificate import port_of, read_certificate
 from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.profiles import PROFILES
 from endotsr.port.judge.report import as_html, as_json, as_table
+from endotsr.port.judge.runs import called_often
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
 from endotsr.port.judge.verdict import Report, judge
 from endotsr.port.judge.verify import summary, verified
@@ -36,6 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("--golden", type=Path, metavar="DIR", help="folder or archive of the vectors")
     for command in (run, check):
         command.add_argument("--timeout", type=float, default=600.0, help="time limit of a call, seconds")
+    run.add_argument("--runs", type=int, default=1, help="so many calls, each within tolerance (level 4 at most)")
     run.add_argument("--keep", type=Path, metavar="DIR", help="keep requests and outputs in this folder")
     judged = commands.add_parser("judge", help="judge a folder of outputs")
     judged.add_argument("outdir", type=Path, metavar="OUTDIR")
@@ -56,7 +58,10 @@ def _judged(golden: Golden, options: argparse.Namespace, scratch: Path) -> tuple
     asked = {"level": options.level, "only": options.only, "profile": options.profile}
     if options.command == "run":
         root = options.keep or scratch
-        return called(golden, options.port, root, options.precision, timeout=options.timeout, **asked)
+        asked["timeout"] = options.timeout
+        if options.runs != 1:
+            return called_often(golden, options.port, root, options.precision, runs=options.runs, **asked)
+        return called(golden, options.port, root, options.precision, **asked)
     for folder in filter(None, (options.outdir, options.again)):
         if not folder.is_dir():
             raise InputError(f"{folder}: not a folder")

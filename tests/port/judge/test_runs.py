@@ -1,0 +1,86 @@
+"""Several runs of a port: each within tolerance, and what differs between them; a wrong run is found in any place."""
+
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from endotsr.errors import InputError
+from endotsr.port.judge.__main__ import main
+from endotsr.port.judge.runs import Spread, called_often, lines
+from endotsr.port.judge.store import golden_folder, read_golden
+
+# The answer to `motion`, whose translation is off by SIZES[run] of itself; the run is counted in a file.
+RACING = """
+import pathlib, sys
+sys.path.insert(0, {folder!r})
+import numpy as np
+import three_functions  # answers when it is imported
+count = pathlib.Path({count!r})
+run = int(count.read_text() or 0) if count.is_file() else 0
+count.write_text(str(run + 1))
+for path in pathlib.Path(sys.argv[2]).glob("motion/*/translation.npy"):
+    np.save(path, np.load(path) * (1 + {sizes}[run % len({sizes})]))
+"""
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(golden_folder())
+
+
+def racing(folder, sizes):
+    """The command of a port with these deviations of its runs."""
+    program = folder / "port.py"
+    there = str(Path(__file__).parents[1] / "delivery")
+    program.write_text(RACING.format(folder=there, count=str(folder / "count"), sizes=sizes))
+    return f"{shlex.quote(sys.executable)} {shlex.quote(str(program))} {{requests}} {{outputs}}"
+
+
+def called(golden, folder, sizes, runs=3, **more):
+    port = racing(folder, sizes)
+    return called_often(golden, port, folder / "kept", "float32", runs=runs, level=2, only="motion", **more)[0]
+
+
+def test_runs_within_tolerance_pass_and_their_spread_is_said(golden, tmp_path):
+    report = called(golden, tmp_path, [0.0, 1e-7, -1e-7])
+    assert report.accepted
+    (said,) = report.notes
+    assert said.startswith("every output is within its tolerance in each of 3 runs; ")
+    assert "outputs have other bits in another run, 0.0" in said and "(motion/" in said
+    assert called(golden, tmp_path, [0.0]).notes == [
+        "every output is within its tolerance in each of 3 runs; all runs have the same bits"
+    ]
+
+
+@pytest.mark.parametrize("sizes", [[0.0, 0.0, 1e-3], [1e-3, 0.0, 0.0]])
+def test_one_wrong_run_of_three_refuses_the_port(golden, tmp_path, sizes):
+    report = called(golden, tmp_path, sizes)
+    assert not report.accepted and report.first_wrong == "motion"
+    assert f"1 of 3 runs are wrong ({sizes.index(1e-3) + 1})" in report.notes[-1]
+
+
+def test_a_run_that_fails_takes_the_claim(golden, tmp_path):
+    report = called(golden, tmp_path, "[0.0, None]", runs=2)
+    assert report.failures == ["run 2: the port ended with code 1"] and "2 runs are wrong (2)" in report.notes[-1]
+
+
+def test_what_cannot_be_asked_is_refused(golden, tmp_path):
+    with pytest.raises(InputError, match="--runs 1; allowed: 2 to 1000"):
+        called(golden, tmp_path, [0.0], runs=1)
+    with pytest.raises(InputError, match="level 5 asks for the same bits"):
+        called_often(golden, "p {requests} {outputs}", tmp_path, "float32", runs=2, level=5)
+
+
+def test_the_program_of_the_judge_has_the_option(tmp_path, capsys):
+    words = ["run", "--port", racing(tmp_path, [0.0, 1e-3]), "--runs", "2", "--level", "2", "--only", "motion"]
+    assert main(words) == 1
+    assert "1 of 2 runs are wrong (2)" in capsys.readouterr().out
+
+
+def test_a_decision_that_differs_is_said_as_such():
+    spread = Spread(frozenset({"density/full/count"}), float("inf"), "density/full/count")
+    assert lines(4, [], spread)[0].endswith(
+        "1 outputs have other bits in another run, a decision differs (density/full/count)"
+    )
