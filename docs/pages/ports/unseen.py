@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "guides" / "port.md"
 FILE = ROOT / "tests" / "port" / "unseen" / "by_hand" / "record.json"
 BLIND = ROOT / "docs" / "results" / "blind_mistakes.json"
+CHANGED = ROOT / "docs" / "results" / "golden_mutants.json"
 MADE_BY = "python tests/port/unseen/by_hand/measure.py --record now"
 
 
@@ -29,7 +30,20 @@ def fragments(runs: dict[str, Any]) -> dict[str, str]:
     rows = [(what, *(_share(runs[name]["rates"][what]) for name in names)) for what in last["rates"]]
     table = markdown(("Of mistakes that are on no list", *(titles[name] for name in names)), rows)
     note = f"Version {last['golden']}, {last['rates']['refused'][1]} mistakes, float64 ({machine(last)})."
-    return {"rates": f"{table}\n\n{note}", "blind": blind_table(read_json(BLIND, "tests/port/blind.py"))}
+    changed = read_json(CHANGED, "python tests/port/mutants/survey.py by_hand --apart")
+    return {
+        "rates": f"{table}\n\n{note}",
+        "blind": blind_table(read_json(BLIND, "tests/port/blind.py")),
+        "changed": changed_table(changed),
+    }
+
+
+def changed_table(found: dict[str, Any]) -> str:
+    """The share of the wrong versions of the port by hand that the vectors before and after refuse."""
+    of = found["observable"]
+    cells = [f"{count} of {of}: {100 * count / of:.1f} %" for count in found["refused"].values()]
+    heads = ("Wrong versions of a port in NumPy", *(f"refused by {one}" for one in found["vectors"].values()))
+    return markdown(heads, [(f"each in one place ({found['date']}, float64)", *cells)])
 
 
 def blind_table(found: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from endotsr.errors import InputError
 from endotsr.port.judge.__main__ import main
-from endotsr.port.judge.runs import Spread, called_often, lines
+from endotsr.port.judge.runs import RunDifference, called_often, lines
 from endotsr.port.judge.store import golden_folder, read_golden
 
 # The answer to `motion`, whose translation is off by SIZES[run] of itself; the run is counted in a file.
@@ -80,7 +80,7 @@ def test_the_program_of_the_judge_has_the_option(tmp_path, capsys):
 
 
 def test_a_decision_that_differs_is_said_as_such():
-    spread = Spread(frozenset({"density/full/count"}), float("inf"), "density/full/count")
+    spread = RunDifference(frozenset({"density/full/count"}), float("inf"), "density/full/count")
     assert lines(4, [], spread)[0].endswith(
         "1 outputs have other bits in another run, a decision differs (density/full/count)"
     )

@@ -24,7 +24,7 @@ MOST_RUNS = 1000
 BITS = 5  # the level that asks for equal bits
 
 
-class Spread(NamedTuple):
+class RunDifference(NamedTuple):
     """Outputs whose bits differ between two runs."""
 
     outputs: frozenset[str]  # case/output
@@ -47,7 +47,7 @@ def called_often(
         raise InputError("--runs: level 5 asks for the same bits; give --level 4 or less")
     level = min(asked_of(golden, only, profile, level)[1], BITS - 1)
     worst, first = called(golden, port, root, precision, level=level, only=only, timeout=timeout, profile=profile)
-    seconds, spread, wrong = worst.seconds, Spread(frozenset(), 0.0, ""), [] if _good(worst) else [1]
+    seconds, spread, wrong = worst.seconds, RunDifference(frozenset(), 0.0, ""), [] if _good(worst) else [1]
     second = root / KEPT[2]
     for number in range(2, runs + 1):
         shutil.rmtree(second, ignore_errors=True)
@@ -71,12 +71,12 @@ def _right(report: Report) -> int:
     return sum(o.status == "passed" for case in report.cases for o in case.outputs)
 
 
-def _joined(one: Spread, other: Spread) -> Spread:
+def _joined(one: RunDifference, other: RunDifference) -> RunDifference:
     further = max(one, other, key=lambda spread: spread.most)
-    return Spread(one.outputs | other.outputs, further.most, further.where)
+    return RunDifference(one.outputs | other.outputs, further.most, further.where)
 
 
-def spread_of(golden: Golden, first: Path, second: Path, precision: Precision, level: int) -> Spread:
+def spread_of(golden: Golden, first: Path, second: Path, precision: Precision, level: int) -> RunDifference:
     """What differs between two folders of outputs; an output that is missing in one is left to the verdicts."""
     changed, most, where = set(), 0.0, ""
     for case in (one for one in golden.cases if one.level <= level):
@@ -92,7 +92,7 @@ def spread_of(golden: Golden, first: Path, second: Path, precision: Precision, l
             apart = _apart(pair[0], pair[1], expected, kind) / tolerance if tolerance else np.inf
             if apart >= most:
                 most, where = apart, f"{case.name}/{name}"
-    return Spread(frozenset(changed), most, where)
+    return RunDifference(frozenset(changed), most, where)
 
 
 def _apart(one: NDArray, other: NDArray, expected: NDArray, kind: str) -> float:
@@ -112,7 +112,7 @@ def _array(folder: Path, case: Case, name: str) -> NDArray | None:
         return None
 
 
-def lines(runs: int, wrong: list[int], spread: Spread) -> list[str]:
+def lines(runs: int, wrong: list[int], spread: RunDifference) -> list[str]:
     """What the runs have in common, for the report."""
     if wrong:
         some = ", ".join(map(str, wrong[:10])) + (" and others" if len(wrong) > 10 else "")
