@@ -53,6 +53,7 @@ GENERATED = {  # program -> its parts by name
     "claims.paper": PARTS,
     "effects": lambda about: about.fragments(about.read()),
     "full_size": lambda about: import_module("pages.full_size.text").fragments(read_json(about.FILE, about.COMMAND)),
+    "full_size.depth_outliers": PARTS,
     "full_size.interpolation": of_record("table"),
     "full_size.sweeps": partial(whole, "fragments"),
     "full_size.targets": of_record("table"),

@@ -46,6 +46,8 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "blend.cutting": Figure("interpolation.json", f"{CUTTING}.two_neighbours.psnr_tissue", "{:.2f}"),
     "flow_tissue.cutting": Figure("interpolation.json", f"{CUTTING}.flow_interpolation_tissue.psnr_tissue", "{:.2f}"),
     "sharp.cutting": Figure("cutting_sharp_seed?.json", "held_out.mean.psnr_tissue", "{:.2f}"),
+    "sharp.cutting.lpips": Figure("cutting_sharp_seed?.json", "held_out.mean.lpips", "{:.4f}"),
+    "flow.cutting.lpips": Figure("cutting_sharp_seed?.json", "baselines.flow_interpolation.mean.lpips", "{:.4f}"),
     "paper.below_blend": Formula(sub, ("blend.tissue", "paper.tissue"), "{:.1f}"),
     "sharp.paths": Figure("levers.json", "scenes.demo.`sharp`.*.scene_units", "{:.2f}"),
     "paper.paths": Figure("levers.json", "scenes.demo.`paper`.*.scene_units", "{:.2f}"),
