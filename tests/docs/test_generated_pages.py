@@ -61,6 +61,7 @@ GENERATED = {  # program -> its parts by name
     "ports.unseen": fragments_of_record,
     "recordings.any_clip": of_record(ways="table"),
     "recordings.hand_held": lambda about: about.tables(read_json(about.FILE, "")),
+    "recordings.inputs_tried": of_record("table"),
     "recordings.inventories": lambda about: {"fields": about.fields(), "options": about.options()},
     "recordings.masks": of_record(iou="table"),
     "recordings.masks_training": of_record("table"),

@@ -14,7 +14,7 @@ from endotsr import __version__
 from endotsr.cli.parts.commands import COMMANDS, FORMER
 from endotsr.cli.parts.output import redirected, split_output
 from endotsr.errors import CalibrationError, InputError
-from endotsr.training.runs.stopping import signals_stop
+from endotsr.training.runs.stopping import INTERRUPTED, signals_stop
 from endotsr.untrusted.names import plain_line
 
 OTHER_PROGRAMS = "close other programs"
@@ -57,7 +57,7 @@ def _main(words: list[str]) -> int:
         return leaving.code if isinstance(leaving.code, int) else 0
     except KeyboardInterrupt as interrupt:
         print(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except OSError as error:
         if _is_closed_pipe(error):  # for example `endotsr ... | head`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

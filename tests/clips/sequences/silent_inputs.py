@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from input_kinds import Row, calibrated, centred, close, depth_is_true, folder_of, prepare, public, video
+from input_kinds import MATRIX, Row, calibrated, centred, close, depth_is_true, folder_of, prepare, public, video
 from left_inputs import MOVED, colmap, moving, squared, true_poses, with_poses
 from made_videos import pictures
 from odd_inputs import two_folders, with_trajectory
@@ -84,6 +84,10 @@ def transposed(found: np.ndarray) -> np.ndarray:
 
 def at_25_hz(make):
     return lambda folder: [*make(folder), "--source-rate", "25"]
+
+
+def backwards(make):
+    return lambda folder: [*make(folder), "--trajectory-direction", "world_to_camera"]
 
 
 def without_lines_of_points(raw: Path) -> None:
@@ -165,6 +169,8 @@ POSES = [
         "w x y z by the head line", true_poses),
     Row("trajectory in nanoseconds, two poses a frame",
         at_25_hz(with_poses("t.txt", twice_as_often, np.savetxt)), "told", "stamps are nanoseconds", true_poses),
+    Row("trajectory, the wrong direction", backwards(with_poses("t.npy", squared, np.save)), "refused",
+        "another reading explains the pictures"),
     Row("trajectory, transposed 4x4 matrices", with_poses("t.npy", transposed, np.save), "refused",
         "is the matrix transposed?"),
     Row("trajectory, a head line with another number of columns",
@@ -197,6 +203,11 @@ CALIBRATIONS = [
         calibrated("a.yaml", lambda: ROS_ECHO.format(seq=1) + ROS_ECHO.format(seq=2)), "told", "half a pixel", centred),
     Row("calibration, rostopic echo of two cameras", calibrated("a.yaml", lambda: ROS_ECHO.format(seq=1)
         + ROS_ECHO.format(seq=2).replace("101.0", "103.0")), "refused", "2 documents that differ"),
+    Row("calibration, rostopic echo, fisheye",
+        calibrated("a.yaml", lambda: ROS_ECHO.format(seq=1).replace("plumb_bob", "equidistant")), "refused",
+        "distortion_model 'equidistant'"),
+    Row("calibration, with --distortion", calibrated("K.txt", lambda: MATRIX, "--distortion", "0.1", "0", "0", "0"),
+        "refused", "a calibration file states intrinsics and distortion"),
     Row("calibration, K and D with 4 coefficients", calibrated("a.yaml", lambda: FISHEYE), "told",
         "read as k1 k2 p1 p2"),
     Row("calibration, settings of ORB-SLAM", calibrated("a.yaml", lambda: ORB.format("PinHole", 0.0)), "told",

@@ -57,6 +57,18 @@ def test_the_page_follows_the_run(pages, tmp_path):
     assert float(number[1]) > float(re.search(r"<b>([\d.]+)<small>dB", pages[1])[1]), "the frame was learned"
 
 
+def test_a_stop_before_the_first_iteration_renders_nothing(pages, monkeypatch, tmp_path, capsys):
+    """A render would compile the kernels after the stop, which takes a minute."""
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", stopped)
+    monkeypatch.setattr(live_page, "render_at", pytest.fail)
+    assert main(train_words(tmp_path / "run", "--no-evaluate")) == 130
+    assert "<b>interrupted</b>" in pages[-1] and "<img" not in pages[-1]
+
+
 def test_the_page_leads_to_the_report_once_there_is_one(quiet_run):
     _, before, after = quiet_run
     assert "report.html" not in before and 'content="0; url=report.html"' in after

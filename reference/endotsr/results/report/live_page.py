@@ -62,9 +62,13 @@ class LivePage:
             self._write("running", left())
 
     def close(self) -> None:
-        """The training has ended; write the page with the status of run.json."""
+        """The training has ended; write the page with the status of run.json.
+
+        Without a render if it was stopped before the first one, which would compile the kernels.
+        """
         with contextlib.suppress(OSError, InputError):
-            self._write(str(self._folder.record().get("status")), None)
+            status = str(self._folder.record().get("status"))
+            self._write(status, None, picture=bool(self._psnr.x) or status == "finished")
 
     def _write(self, status: str, left: str | None, picture: bool = True) -> None:
         began = time.monotonic()

@@ -9,12 +9,16 @@ Inside `finishing`, the first signal is only recorded, for PATIENCE seconds. Use
 
 import _thread
 import contextlib
+import os
 import signal
+import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 PATIENCE = 0.7  # seconds after the first signal within which work inside `finishing` must end
+INTERRUPTED = 130  # exit code, 128 + SIGINT as in a shell
+LONGEST_WAIT = 2.0  # seconds after a signal until `leaving_at_once` ends the process
 
 _asked = threading.Event()
 _finishing: list[threading.Timer] = []  # the timers of the open `finishing` blocks, started by the first signal
@@ -70,3 +74,37 @@ def finishing() -> Iterator[None]:
 def stop_asked() -> bool:
     """Whether a signal has arrived in the present block of `signals_stop`."""
     return _asked.is_set()
+
+
+@contextlib.contextmanager
+def leaving_at_once(last_words: Callable[[], object], code: int) -> Iterator[None]:
+    """In the block, a signal ends the process after LONGEST_WAIT even while compiled code, such as LLVM, runs.
+
+    Python runs its handlers between two instructions of the main thread, of which LLVM executes none for a minute.
+    Here a thread waits for the number that the operating system's handler writes. Use it for work that leaves nothing
+    behind; threads other than the main one run the block as it is.
+
+    last_words   is called before the end
+    code         exit code
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    written, read = socket.socketpair()
+    written.setblocking(False)
+    over = threading.Event()
+
+    def watch() -> None:
+        numbers = read.recv(1)
+        if numbers and numbers[0] in SIGNALS and not over.wait(LONGEST_WAIT):
+            last_words()
+            os._exit(code)
+
+    before = signal.set_wakeup_fd(written.fileno(), warn_on_full_buffer=False)
+    threading.Thread(target=watch, name="endotsr-stop", daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+        signal.set_wakeup_fd(before)
+        written.close()  # ends the thread

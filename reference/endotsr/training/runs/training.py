@@ -2,7 +2,7 @@
 
 In: a sequence, settings, and an observer called at every iteration. Out: the run folder with log, checkpoints and
 run.json. After a signal, the current iteration is completed and a checkpoint is written; the error message explains how
-to continue. This module prints nothing itself.
+to continue. This module prints nothing itself but the line of a stop during the compilation.
 
 A checkpoint is written at least every `training.checkpoint_every` iterations, and whenever `LARGEST_LOSS` of the
 training time (between `FEWEST_SECONDS` and `MOST_SECONDS`) has passed since the last one. A kill therefore costs at
@@ -12,6 +12,7 @@ time. Results do not depend on when checkpoints are written.
 
 import contextlib
 import shutil
+import sys
 import time
 from typing import TYPE_CHECKING, Protocol
 
@@ -24,7 +25,7 @@ from endotsr.training.runs.folder import RunFolder, create_run
 from endotsr.training.runs.log import RunLog
 from endotsr.training.runs.machine import now, peak_memory_bytes
 from endotsr.training.runs.records import ExtendedEntry, ResumedEntry, RunRecord
-from endotsr.training.runs.stopping import finishing, stop_asked
+from endotsr.training.runs.stopping import INTERRUPTED, finishing, leaving_at_once, stop_asked
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
@@ -133,7 +134,8 @@ def train_run(
     observer.begin(state)
     try:
         with finishing():
-            compile_ahead(config, observer.say)
+            with leaving_at_once(lambda: recorder.leave(state), INTERRUPTED):
+                compile_ahead(config, observer.say)
             last = train(
                 state, sequence, config, recorder.on_iteration, recorder.on_checkpoint, on_message=observer.say
             )
@@ -217,6 +219,12 @@ class _Recorder:
         if isinstance(error, OSError):
             return RunStopped(f"{os_error_line(error, self._folder.path)}; {self._advice()}")
         return error
+
+    def leave(self, state: "TrainingState") -> None:
+        """Mark the run as interrupted, and say so, before the process ends during the compilation."""
+        with contextlib.suppress(OSError):
+            said = self.stop(KeyboardInterrupt(), state)
+            print(f"\nendotsr: interrupted: {said}", file=sys.stderr, flush=True)
 
     def _dumped(self, error: Diverged, state: "TrainingState") -> BaseException:
         """The error, with the path of the saved state in its message."""
