@@ -9,7 +9,21 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from input_kinds import MATRIX, Row, calibrated, centred, close, depth_is_true, folder_of, prepare, public, video
+import raw_sources
+from input_kinds import (
+    MATRIX,
+    Row,
+    calibrated,
+    centred,
+    close,
+    depth_is_true,
+    files,
+    folder_of,
+    prepare,
+    public,
+    timed,
+    video,
+)
 from left_inputs import MOVED, colmap, moving, squared, true_poses, with_poses
 from made_videos import pictures
 from odd_inputs import two_folders, with_trajectory
@@ -255,6 +269,31 @@ def public_endonerf(*names: str):
     return make
 
 
+def named_by_seconds(folder: Path) -> list[str]:
+    files(folder, "clip", pictures(4))
+    for k, file in enumerate(sorted((folder / "clip").iterdir())):
+        file.rename(file.with_name(f"{1305031102 + k * k / 10:.6f}.png"))
+    return prepare("clip")(folder)
+
+
+def few_points(raw: Path) -> None:
+    file = raw / "sparse/0/points3D.txt"
+    file.write_text("\n".join(file.read_text().splitlines()[:-3]) + "\n")
+
+
+def one_more_picture(raw: Path) -> None:
+    shutil.copy(raw / "images/frame_00000.png", raw / "images/frame_00099.png")
+
+
+def of_orb_slam(folder: Path) -> list[str]:
+    """A TUM folder as ORB-SLAM leaves it: its trajectory and its settings, no true one."""
+    raw_sources.tum(folder / "raw")
+    (folder / "raw/groundtruth.txt").rename(folder / "raw/CameraTrajectory.txt")
+    lens = "Camera.fx: 60\nCamera.fy: 60\nCamera.cx: 31.5\nCamera.cy: 23.5\nDepthMapFactor: 5000\n"
+    (folder / "raw/TUM1.yaml").write_text("%YAML:1.0\nCamera.type: PinHole\n" + lens)
+    return prepare("raw", camera=())(folder)
+
+
 def turned_exif() -> bytes:
     from PIL import Image
 
@@ -412,6 +451,12 @@ PICTURES = [
         "calib.yaml"), "told", "not read: calib.yaml, depth/, masks/, times.txt; see --masks, --depth, --calibration"),
     Row("pictures, others of a kind that is not read", folder_of(pictures(), change=of_another_kind), "told",
         "not read: 5 files .jp2"),
+    Row("pictures named by their seconds", named_by_seconds, "told", "read as seconds", timed([0, 100, 400, 900])),
+    Row("COLMAP, points that points3D lacks", colmap(change=few_points), "told", "are not in points3D"),
+    Row("nerfstudio, pictures that the file does not list", public("nerfstudio", change=one_more_picture), "told",
+        "not listed in transforms.json and are left out"),
+    Row("TUM, trajectory and settings of ORB-SLAM", of_orb_slam, "told", "poses of CameraTrajectory.txt",
+        lambda folder: np.isclose(read_sequence_file(folder / "o").camera.cx, 32)),
     Row("COLMAP, masks beside it", colmap(change=lambda raw: beside_model(raw / "masks/frame0000.png")), "told",
         "not read: masks/; see --masks"),
     Row("COLMAP, rigs and frames of its new versions", colmap(change=lambda raw: beside_model(
@@ -443,6 +488,8 @@ MARKED = [
     Row("video, mirrored", video("a.mp4", change=mirrored), "refused", "are shown mirrored"),
     Row("video, mirrored, --orientation stored", video("a.mp4", None, "--orientation", "stored", change=mirrored),
         "told", "states mirrored pictures: used as stored", close(pictures())),
+    Row("video, AVI with pictures that refer to later ones", video("a.avi", pictures(20), options={"bf": "2"}), "told",
+        "evenly spaced, 25 a second", lambda folder: np.isclose(read_sequence_file(folder / "o").frame_rate, 25)),
     Row("video, a crop of Matroska", video("a.mkv", change=cropped), "refused",
         "PixelCropRight = "),
 ]  # fmt: skip

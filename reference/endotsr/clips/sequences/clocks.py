@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+REORDERED = 0.1  # fraction of steps that go back, above which the stamps are in the order of decoding
 JUMP = 10.0  # usual steps between two pictures that count as a jump, if it is LEAST seconds or more
 LEAST = 1.0
 
@@ -33,6 +34,9 @@ def clock_of(stamps: NDArray[np.float64], stated: float | None) -> Clock:
     steps = np.diff(stamps)
     if not (steps > 0).any():
         return Clock(None, stated)
+    if (steps < 0).mean() > REORDERED:  # AVI states no times; pictures that refer to later ones are stored after them
+        rate = 1 / float(np.median(np.diff(np.unique(stamps))))
+        return Clock(None, rate, f"states no times of display: frames count as evenly spaced, {rate:g} a second")
     usual = float(np.median(steps[steps > 0]))
     if (steps <= 0).any():
         at = int(np.flatnonzero(steps <= 0)[0])

@@ -100,7 +100,7 @@ def files_of_model(path: Path, folder: Path, names: list[str]) -> list[Path]:
     return [place / name for name in inner]
 
 
-def unregistered(files: list[Path]) -> list[str]:
+def unregistered(files: list[Path], where: str = "registered in this model") -> list[str]:
     """A note on the pictures beside the registered ones that no pose belongs to."""
     known, beside = set(files), []
     for folder in sorted({file.parent for file in files}):
@@ -108,4 +108,4 @@ def unregistered(files: list[Path]) -> list[str]:
                    if file.suffix.lower() in PICTURE_ENDINGS and file not in known and file.name[0] != "."]  # fmt: skip
     if not beside:
         return []
-    return [f"{len(beside)} pictures are not registered in this model and are left out: {shortened(beside)}"]
+    return [f"{len(beside)} pictures are not {where} and are left out: {shortened(beside)}"]

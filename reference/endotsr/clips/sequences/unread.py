@@ -43,7 +43,8 @@ def unread(path: Path, reads: tuple[str, ...], options: SourceOptions, takes: tu
         left.append(entry)
     if not left:
         return []
-    hints = [f"--{option}" for option, patterns in OPTIONS.items() if option in (*takes, "right")
+    taken = (*takes, "right") if "stereo" in takes else takes
+    hints = [f"--{option}" for option, patterns in OPTIONS.items() if option in taken
              and any(fnmatchcase(entry.name.lower(), pattern) for pattern in patterns for entry in left)]  # fmt: skip
     return [f"{path.name}: not read: {shortened(_named(left))}" + (f"; see {', '.join(hints)}" if hints else "")]
 

@@ -40,7 +40,11 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
     notes.insert(0, f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points")
     intrinsics = shared_intrinsics([model.cameras[image.camera] for image in images], folder, notes)
     notes += picture_notes(files) + unregistered(files) + [found.line for found in gap_findings(files)]
-    empty = np.zeros((0, 3))
+    empty, named = np.zeros((0, 3)), {key for image in images for key in image.points.tolist()}
+    if lost := len(named - set(model.points)):
+        notes.append(
+            f"{folder.name}: {lost} of {len(named)} points of the pictures are not in points3D: no depth there"
+        )
 
     def points(i: int) -> np.ndarray:
         seen = [model.points[key] for key in images[i].points.tolist() if key in model.points]

@@ -22,6 +22,7 @@ from endotsr.clips.sequences.camera import (
 )
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.colmap_folders import unregistered
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
@@ -142,7 +143,11 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     factor = scene_factor(unit)
     depth = depth_of(planes, DEPTH_STEP * factor) if any(planes) else None
     cloud = None if depth is not None else _cloud(folder, data, file, notes)
-    notes += picture_notes(files) + [found.line for found in gap_findings(files)]
+    notes += (
+        picture_notes(files)
+        + unregistered(files, f"listed in {file.name}")
+        + [found.line for found in gap_findings(files)]
+    )
     if beside := [name for name in OTHERS if file.name == FILES[1] and (folder / name).is_file()]:
         notes.append(f"{file.name} is read; not read: {', '.join(beside)}")
     return Clip(

@@ -8,6 +8,8 @@ are stated on the command line.
 import re
 from pathlib import Path
 
+import numpy as np
+
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
@@ -27,6 +29,7 @@ from endotsr.clips.sequences.sources import (
     unit_of,
 )
 from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
 
 PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
          ("left_frames", "right_frames"), ("left_rectified", "right_rectified"),
@@ -83,6 +86,15 @@ def _numbers(files: list[Path]) -> list[int] | None:
     return None if found is None or len(found[0]) != 1 else [number for (number,) in found]
 
 
+def _named_times(files: list[Path]) -> tuple[float | None, FloatArray | None]:
+    """Rate and seconds of pictures whose names are seconds with decimals, as in TUM; None for other names."""
+    if len(files) < 2 or not all(re.fullmatch(r"\d+\.\d+", file.stem) for file in files):
+        return None, None
+    times = np.array([float(file.stem) for file in files])
+    steps = np.diff(times)
+    return (float(1 / np.median(steps)), times - times[0]) if (steps > 0).all() else (None, None)
+
+
 def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     """The pictures as a clip. Raises InputError."""
     left, right = find_pictures(path)
@@ -97,7 +109,10 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     width, height = halves(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
     gaps = [found.line for found in gap_findings(left)]
-    poses, notes = stated_poses(options, len(left), options.rate, numbers=_numbers(left))
+    rate, times = _named_times(left) if options.rate is None else (options.rate, None)
+    if times is not None:
+        gaps.append(f"names of the pictures are read as seconds, {times[-1]:g} s in all; --source-rate overrides them")
+    poses, notes = stated_poses(options, len(left), rate, times, _numbers(left))
     return Clip(
         layout="pictures",
         where=path,
@@ -110,7 +125,8 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         calibration=camera.calibration,
         baseline=camera.baseline,
         poses=poses,
-        rate=options.rate,
+        rate=rate,
+        times=times,
         read_here=tuple(
             {file.parent.name.lower() for file in [*left, *right] if file.parent != path}
             | {file.name.lower() for file in [*left, *right] if file.parent == path}
