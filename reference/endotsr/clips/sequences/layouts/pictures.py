@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings
@@ -29,7 +30,6 @@ from endotsr.clips.sequences.sources import (
     unit_of,
 )
 from endotsr.errors import InputError
-from endotsr.method.kernels.arrays import FloatArray
 
 PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
          ("left_frames", "right_frames"), ("left_rectified", "right_rectified"),
@@ -86,11 +86,11 @@ def _numbers(files: list[Path]) -> list[int] | None:
     return None if found is None or len(found[0]) != 1 else [number for (number,) in found]
 
 
-def _named_times(files: list[Path]) -> tuple[float | None, FloatArray | None]:
+def _named_times(files: list[Path]) -> tuple[float | None, NDArray[np.float64] | None]:
     """Rate and seconds of pictures whose names are seconds with decimals, as in TUM; None for other names."""
     if len(files) < 2 or not all(re.fullmatch(r"\d+\.\d+", file.stem) for file in files):
         return None, None
-    times = np.array([float(file.stem) for file in files])
+    times = np.array([float(file.stem) for file in files], np.float64)
     steps = np.diff(times)
     return (float(1 / np.median(steps)), times - times[0]) if (steps > 0).all() else (None, None)
 
