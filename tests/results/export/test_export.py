@@ -190,6 +190,23 @@ def test_a_ply_file_that_is_cut_short_or_odd_is_refused(tmp_path):
         assert said in str(refused.value) and "b.ply" in str(refused.value)
 
 
+def test_the_filter_of_mip_splatting_widens_the_gaussians_and_keeps_their_integral(tmp_path):
+    names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3".split()
+    found = []
+    for extra in ([], ["filter_3D"]):
+        vertices = np.ones(1, [(name, "f4") for name in names + extra])
+        if extra:
+            vertices["filter_3D"] = 2.0
+        out = io.BytesIO()
+        plyfile.PlyData([plyfile.PlyElement.describe(vertices, "vertex")]).write(out)
+        (tmp_path / "a.ply").write_bytes(out.getvalue())
+        read = read_gaussians(tmp_path / "a.ply")
+        found.append((np.exp(read.log_scale[:, 0].astype(float)), 1 / (1 + np.exp(-float(read.opacity_logit[0])))))
+    (narrow, opacity), (wide, less) = found
+    np.testing.assert_allclose(wide**2, narrow**2 + 4, rtol=1e-5)
+    np.testing.assert_allclose(less * wide.prod(), opacity * narrow.prod(), rtol=1e-5)
+
+
 def test_gaussians_of_another_writer_are_read(tmp_path):
     """Float64, degree 0, properties in another order, one number that is not finite."""
     names = ["opacity", "x", "y", "z", "rot_0", "rot_1", "rot_2", "rot_3", "scale_0", "scale_1", "scale_2"]

@@ -143,13 +143,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     factor = scene_factor(unit)
     depth = depth_of(planes, DEPTH_STEP * factor) if any(planes) else None
     cloud = None if depth is not None else _cloud(folder, data, file, notes)
-    notes += (
-        picture_notes(files)
-        + unregistered(files, f"listed in {file.name}")
-        + [found.line for found in gap_findings(files)]
-    )
-    if beside := [name for name in OTHERS if file.name == FILES[1] and (folder / name).is_file()]:
-        notes.append(f"{file.name} is read; not read: {', '.join(beside)}")
+    notes += _of_files(file, files)
     return Clip(
         layout="nerfstudio",
         where=path,
@@ -166,6 +160,15 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         read_here=_places(entries, data),
         notes=[f"{file.name}: {len(files)} frames, unit of lengths {'unknown' if unit == ARBITRARY else unit}", *notes],
     )
+
+
+def _of_files(file: Path, files: list[Path]) -> list[str]:
+    """Notes on the pictures, on others beside them, and on further files of poses."""
+    notes = picture_notes(files) + unregistered(files, f"listed in {file.name}")
+    notes += [found.line for found in gap_findings(files)]
+    if beside := [name for name in OTHERS if file.name == FILES[1] and (file.parent / name).is_file()]:
+        notes.append(f"{file.name} is read; not read: {', '.join(beside)}")
+    return notes
 
 
 def _entries(data: Keys, file: Path) -> list[Keys]:
