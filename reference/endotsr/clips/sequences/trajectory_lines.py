@@ -22,6 +22,7 @@ ALLOWED = (
     "allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw; without stamps 7, or the 12 or 16 of a matrix, as KITTI has"
     " them; or other columns that a head line names"
 )
+LONGEST_HEAD = 4096  # characters; the search for brackets takes the square of it
 NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
 # Names in head lines, in lower case: the axis is the last letter, behind q, t, p or the words that stand for them.
 QUATERNION = re.compile(r"(?:q|quat|quaternion|rot|orientation)(?:[._]\w*?)??[._]?([wxyz])")
@@ -130,6 +131,8 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
 
 def _named_columns(line: str) -> list[str]:
     """The columns that a line names: stamp, tx .. qw, others as they are; [] unless it names a pose."""
+    if len(line) > LONGEST_HEAD:
+        return []
     plain = re.sub(r"\[[^\]]*\]|\([^)]*\)|#", " ", line).replace(";", ",")
     words = [word.strip() for word in (plain.split(",") if "," in plain else plain.split())]
     found = []
