@@ -96,6 +96,14 @@ def test_a_part_has_no_certificate(tmp_path, capsys):
     assert not (tmp_path / "c.json").exists()
 
 
+def test_a_part_is_refused_if_the_port_fails_after_right_outputs(tmp_path):
+    failing = tmp_path / "failing.py"
+    failing.write_text(f"import runpy, sys\nrunpy.run_path({str(THREE)!r}, run_name='__main__')\nsys.exit(3)\n")
+    words = ["--precision", "float64", "--level", "2", "--only", "motion"]
+    assert run(["run", "--port", port(), *words]) == 0
+    assert run(["run", "--port", port(failing), *words]) == 1
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -136,8 +136,8 @@ class Report(msgspec.Struct, kw_only=True):
 
     @property
     def accepted(self) -> bool:
-        """Whether no judged case is refused or missing, as asked of a part."""
-        return all(case.status in ("passed", "not ported") for case in self.cases)
+        """Whether no judged case is refused or missing, as asked of a part, and the port itself did not fail."""
+        return not self.failures and all(case.status in ("passed", "not ported") for case in self.cases)
 
 
 def judge(
