@@ -50,12 +50,13 @@ rng = np.random.default_rng(9)
 # %% [markdown]
 # ## Down and up
 #
-# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples. The
-# border is reflected without repeating the edge sample:
+# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples:
 #
 # $$
-# (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr].
+# (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
 # $$
+#
+# with the border reflected without repeating the edge sample.
 #
 # Up-sampling $\mathsf U$ is linear interpolation along each axis, by one of two rules. The preset `paper` uses `co_sited`:
 #

@@ -104,11 +104,12 @@ H, W = M.shape
 # \begin{aligned}
 # B_1&=\tfrac12(\mu_f^2+\mu_e^2)+C_1,\qquad B_2=\tfrac12(\sigma_f^2+\sigma_e^2)+C_2,\\
 # P&=1-\frac{\mu_e^2}{B_1},\qquad Q=1-\frac{\sigma_e^2}{B_2},\\
-# s&=PQ,\qquad 1-s=(1-P)+P(1-Q).
+# s&=PQ,\qquad 1-s=(1-P)+P(1-Q),
 # \end{aligned}
 # $$
 #
-# Without tissue $\mathcal L_1$ is 0 and $\mathcal S$ is 1.
+# where $\mu_e,\sigma_e^2$ and $\mu_f,\sigma_f^2$ are mean and variance of $e$ and $f$ in the window. Without tissue
+# $\mathcal L_1$ is 0 and $\mathcal S$ is 1.
 #
 # <!-- definition: endotsr.definition.masked_l1.masked_l1_forward -->
 # ```python
@@ -199,9 +200,11 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # \begin{aligned}
 # \mathcal L_{\mathrm{smooth}}&=\mathcal Q(\hat D)+f\,\mathrm{TV}(\bar D)+f\,\mathrm{TV}(\bar I),\\
 # \mathcal Q(\hat D)&=\frac{\sum_{(p,p')\in\mathcal P}[\nu_p\nu_{p'}]\,(\hat D_p-\hat D_{p'})^2}{\sum_p\nu_p+10^{-6}},\\
-# \mathrm{TV}(x)&=\frac{1}{K\,H\,W}\sum_{c=1}^{K}\sum_{(p,p')\in\mathcal P}|x_{cp}-x_{cp'}| .
+# \mathrm{TV}(x)&=\frac{1}{K\,H\,W}\sum_{c=1}^{K}\sum_{(p,p')\in\mathcal P}|x_{cp}-x_{cp'}|,
 # \end{aligned}
 # $$
+#
+# with $K$ the number of channels (1 or 3).
 #
 # <!-- definition: endotsr.definition.depth.normalised_depth_forward -->
 # ```python

@@ -290,12 +290,9 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # **(13.8) Clone or split.** A candidate whose largest semi-axis is at most $p\,e=0.1$ scene units is small for its region:
 # an exact copy is added, at the same place. A larger candidate is replaced by two children:
 #
-# $$
-# \begin{aligned}
-# \max_kS_{ki}&\le p\,e:\quad\text{clone},\\
-# \max_kS_{ki}&>p\,e:\quad\mu'=\mu_i+R(q_i)\,(S_i\odot\xi),\quad s'=s_i-\ln1.6,\quad\xi\sim\mathcal N(0,I_3).
-# \end{aligned}
-# $$
+# - $\max_kS_{ki}\le p\,e$: clone;
+# - $\max_kS_{ki}>p\,e$: two children with $\mu'=\mu_i+R(q_i)\,(S_i\odot\xi)$ and $s'=s_i-\ln1.6$, where
+#   $\xi\sim\mathcal N(0,I_3)$.
 #
 # Each child has its own $\xi$. Clones and children copy everything else: quaternion, opacity, harmonics, deformation,
 # $A$ and $C$. Their moments of Adam are 0; the step count of the array continues. The new order of the arrays is: the
@@ -399,7 +396,7 @@ assert (d.gradient_threshold, d.prune_opacity, d.extent, d.dense_fraction, d.max
 
 
 def screen_gradients(size):
-    """Norms in normalised device coordinates and per pixel, for one smooth gradient image of a mean over pixels."""
+    """Norms in NDC and per pixel, for one smooth gradient image of a mean over pixels."""
     large = Camera(
         np.eye(3),
         np.zeros(3),

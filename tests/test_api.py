@@ -3,10 +3,12 @@
 import dataclasses
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
@@ -134,7 +136,7 @@ def folder(sequence, tmp_path_factory):
 
 
 def test_training_is_that_of_the_command(folder, tmp_path):
-    run = tiny(endotsr.load_sequence(folder))
+    run = tiny(endotsr.load_sequence(folder, preset="demo"))
     words = [
         "--preset=demo",
         "--iterations=8",
@@ -148,6 +150,22 @@ def test_training_is_that_of_the_command(folder, tmp_path):
     assert arrays(commanded) == arrays(run)
     assert without_seconds(commanded.log) == without_seconds(run.log)
     assert commanded.record.keys() == run.record.keys()
+
+
+def test_depth_outliers_that_the_preset_would_remove_are_said(folder, tmp_path):
+    clip = tmp_path / "clip"
+    shutil.copytree(folder, clip)
+    file = sorted((clip / "depth").iterdir())[4]
+    depth = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    depth[:, :8] = 5 * depth.max()
+    cv2.imwrite(str(file), depth)
+    for preset, count in ((None, 1), ("demo", 0)):
+        said = []
+        more = {"iterations": 1, "training": {"threads": 1}, "initialisation": POINTS}
+        endotsr.train(endotsr.load_sequence(clip, preset=preset), preset="demo", on_message=said.append, **more)
+        assert len([line for line in said if "outliers" in line and "preset='demo'" in line]) == count
+    with pytest.raises(endotsr.InputError, match="one of the two"):
+        endotsr.load_sequence(clip, endotsr.make_config("sharp"), preset="sharp")
 
 
 def test_the_callback_sees_every_entry_and_its_answer_is_ignored(sequence, run):

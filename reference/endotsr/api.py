@@ -28,7 +28,7 @@ import msgspec
 from endotsr.clips.sequences.record import SequenceRecord, record_of
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
-from endotsr.config import PAPER, Config, config_from_dict, lengthened, merged, with_iterations
+from endotsr.config import PAPER, Config, SequenceConfig, config_from_dict, lengthened, merged, with_iterations
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
@@ -86,13 +86,15 @@ def load_sequence(
     source: str | Path,
     config: Config | None = None,
     *,
+    preset: str | None = None,
     simulator: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Sequence:
     """The complete sequence in memory, checked.
 
     source      sequence folder, or the word "simulated"
-    config      initial settings (section `sequence` and the near plane are used); default: preset `paper`
+    config      initial settings (section `sequence` and the near plane are used); default: those of `preset`
+    preset      a name in `endotsr.config.PRESETS`; default: paper. The others remove outliers of the prior depth
     simulator   settings of "simulated": {"frames": 16, "width": 96, "pull": {"on": False}}
     settings    keys of section `sequence`: scale=0.5, frames="0:60", masks="gt_masks", split="blocks"
 
@@ -101,7 +103,9 @@ def load_sequence(
 
     Raises: InputError naming the file, the frame or the key, and the allowed values.
     """
-    config = _changed(PAPER if config is None else config, None, {"sequence": settings})
+    if config is not None and preset is not None:
+        raise InputError(f"load_sequence: preset = {preset!r} with a config is not allowed; allowed: one of the two")
+    config = _changed(make_config(preset) if config is None else config, None, {"sequence": settings})
     wanted = dict(simulator or {})
     refuse_unknown_keys(wanted, SimulatorSettings, "simulator")
     shown = checked(wanted, SimulatorSettings, "simulator")
@@ -151,6 +155,8 @@ def train(
     else:
         config = _changed(config, iterations, sections)
     if sequence.settings is not None:
+        if said := _outliers_kept(sequence, config):
+            on_message(said)
         config = msgspec.structs.replace(config, sequence=sequence.settings)
     simulator = sequence.simulator if isinstance(sequence.simulator, SimulatorSettings) else SimulatorSettings()
     config = lengthened(config, len(sequence.train_index))
@@ -161,6 +167,15 @@ def train(
     seen = record_of(sequence)
     run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message, on_run)
+
+
+def _outliers_kept(sequence: Sequence, config: Config) -> str:
+    """A sentence if the settings would have removed wrong depth that the sequence was loaded with; "" if not."""
+    loaded, name = sequence.settings, config.preset
+    kept = isinstance(loaded, SequenceConfig) and loaded.depth_outliers == "kept" != config.sequence.depth_outliers
+    if not kept or not any("depth-outliers" in note for note in sequence.notes):
+        return ""
+    return f"the prior depth has outliers, which load_sequence(..., preset={name!r}) removes"
 
 
 def _called_for(

@@ -84,7 +84,7 @@ def test_refusals(tmp_path):
     write_ply(whole)
     whole.write_bytes(whole.read_bytes()[:-50])
     reasons = {
-        "text.ply": "not a binary little-endian PLY", "bands.ply": "6 f_rest columns", "empty.ply": "not a binary",
+        "text.ply": "lines of 24 numbers", "bands.ply": "6 f_rest columns", "empty.ply": "not a",
         "a.npz": "not an .npz file", "less.npz": "is missing", "nan.npz": "no Gaussian with finite numbers",
         "cut.ply": "cannot be read", "missing.ply": "No such file", "x.txt": "ends in .ply or .npz",
     }  # fmt: skip
