@@ -67,6 +67,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "kill.most": Setting("endotsr.training.runs.training:MOST_SECONDS", scale=1 / 60),
     "kill.share": Setting("endotsr.training.runs.training:LARGEST_LOSS", scale=100),
     "kill.cost": Setting("endotsr.training.runs.training:LARGEST_FRACTION", scale=100),
+    "depth.farther": Setting("endotsr.clips.sequences.depth_outliers:FARTHER", "{:.1f}"),
     "mask.tissue": Setting("endotsr.clips.sequences.masks:LEAST_TISSUE_FRACTION", scale=100),
     "mask.soft": Setting("endotsr.clips.sequences.masks:MOST_SOFT_FRACTION", scale=100),
     "mask.missing": Setting("endotsr.clips.sequences.masks:LEAST_MISSING_FRACTION", scale=100),
