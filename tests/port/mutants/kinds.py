@@ -6,6 +6,7 @@ small number added to a divisor, single precision, a neighbouring name, an assig
 """
 
 import ast
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -53,7 +54,9 @@ def wrong_versions(source: Source) -> Iterator[tuple[Callable, Mutant]]:
 
 def _compiled(tree: ast.FunctionDef, function: Callable) -> CodeType:
     module = ast.fix_missing_locations(ast.Module([tree], []))
-    made = compile(module, function.__code__.co_filename, "exec")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)  # a wrong version may index a number
+        made = compile(module, function.__code__.co_filename, "exec")
     return next(c for c in made.co_consts if isinstance(c, CodeType) and c.co_name == tree.name)
 
 
