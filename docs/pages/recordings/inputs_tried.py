@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections import Counter
 from datetime import date
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,8 +100,7 @@ FOUND = [  # inputs made up later, on revision 9c72cc4f
 def measured() -> dict[str, Any]:
     """The outcome of every row of `inputs_tried.py`, run now."""
     sys.path.insert(0, str(ROWS))
-    import inputs_tried
-
+    inputs_tried: Any = import_module("inputs_tried")  # of the tests; this module is `pages.recordings.inputs_tried`
     found = {}
     for row in inputs_tried.ROWS:
         with tempfile.TemporaryDirectory() as scratch:
