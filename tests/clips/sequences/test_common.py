@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import describe, layout_of, layouts
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.record import checked_record, record_of
@@ -118,6 +119,17 @@ def test_depth_in_other_files(tmp_path, ending):
     after = read_sequence(tmp_path, WHOLE, 0.2).depth
     assert not after[:, 0, :2].any()  # not a number and negative: no depth
     np.testing.assert_allclose(after[:, 1:], before[:, 1:], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("factor", "accepted"), [("-1", True), ("1.0", True), ("-0.003922", False), ("0.0", False)])
+def test_a_scale_factor_of_pfm_is_refused(tmp_path, factor, accepted):
+    order = "<f4" if factor.startswith("-") else ">f4"
+    (tmp_path / "a.pfm").write_bytes(f"Pf\n3 2\n{factor}\n".encode() + np.arange(6, dtype=order).tobytes())
+    if accepted:
+        np.testing.assert_array_equal(read_plane(tmp_path / "a.pfm"), [[3, 4, 5], [0, 1, 2]])
+        return
+    with pytest.raises(InputError, match=r"a\.pfm: .*scale factor .*; allowed: 1 or -1"):
+        read_plane(tmp_path / "a.pfm")
 
 
 def write_plane(path: Path, plane: np.ndarray) -> None:

@@ -69,12 +69,20 @@ def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) ->
 
 
 def read_pfm(path: Path) -> NDArray[np.float32]:
-    """The plane (H, W) of a greyscale PFM file, top row first. Raises InputError for any other file."""
+    """The plane (H, W) of a greyscale PFM file, top row first.
+
+    Raises:  InputError for any other file, and for a scale factor, which some programs apply and others ignore.
+    """
     data = read_bytes(Path(path), LARGEST_FILE)
     header = PFM_HEADER.match(data)
     if not header or header[1] != b"Pf":
         raise InputError(f"{path}: not a grey PFM file (its first bytes are not `Pf width height scale`)")
     width, height, scale = int(header[2]), int(header[3]), float(header[4])
+    if abs(scale) != 1.0:
+        raise InputError(
+            f"{path}: its first lines state the scale factor {abs(scale):g}, which some programs apply and others"
+            " ignore; allowed: 1 or -1, with the values as they are meant"
+        )
     if len(data) - header.end() != 4 * width * height:
         raise InputError(
             f"{path}: {len(data) - header.end()} bytes of pixels, {width}x{height} need {4 * width * height}"
