@@ -38,7 +38,7 @@ def test_a_wrong_port_is_explained():
 @pytest.mark.slow
 def test_known_failures_are_strict(tmp_path):
     listed = tmp_path / "known.txt"
-    listed.write_text("motion/generic  # a factor 2\n")
+    listed.write_text("motion/generic  # a factor 2\nmotion/wide\n")
     for port, known, code in (("half", str(listed), 0), ("answer", str(listed), 1), ("answer", None, 0)):
         file = tmp_path / f"test_{port}_{known is None}.py"  # a module is imported once a process
         file.write_text(
