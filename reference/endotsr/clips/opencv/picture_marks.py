@@ -8,18 +8,19 @@ import io
 import struct
 import warnings
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.png import LARGEST_FILE
 
-LARGEST_FILE = 1 << 28  # bytes
 MOST_FIELDS = 4096
 LARGEST_PROFILE = 1 << 22  # bytes, unpacked
 PNG_START, EXIF_START, MPF_START, ICC_START = b"\x89PNG\r\n\x1a\n", b"Exif\0\0", b"MPF\0", b"ICC_PROFILE\0"
 ADOBE_START = b"Adobe"
-ORIENTATION, EXIF_IFD, COLOUR_SPACE = 0x0112, 0x8769, 0xA001
+ORIENTATION, EXIF_IFD, COLOUR_SPACE = 0x0112, 0x8769, 0xA001  # EXIF tags; orientation 1 = shown as it is stored
 OTHER_SPACES = (2, 65535)  # Adobe RGB; uncalibrated, as cameras state it for Adobe RGB
 GAMMA, PRIMARIES = 45455, (31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)  # of sRGB in a PNG
 SAME_GAMMA, SAME = 0.1, 1000  # relative difference of gamma; difference of primaries, in these steps
@@ -29,7 +30,14 @@ WIDE_RANGE = {16: "PQ", 18: "HLG"}  # transfer functions of cICP
 def picture_marks(path: Path) -> dict[str, Any]:
     """The fields of a picture file. A value of None or False is neutral: the field says what holds without it."""
     try:
-        data = read_bytes(path, LARGEST_FILE)
+        return marks_of(read_bytes(path, LARGEST_FILE))
+    except InputError:
+        return {}  # the reader of the pixels reports the fault
+
+
+def marks_of(data: bytes) -> dict[str, Any]:
+    """As `picture_marks`, from the content of the file."""
+    try:
         if data.startswith(PNG_START):
             return _png(data)
         if data.startswith(b"\xff\xd8"):
@@ -38,7 +46,7 @@ def picture_marks(path: Path) -> dict[str, Any]:
             return _webp(data)
         if data[:4] in (b"II*\0", b"MM\0*"):
             return _tags(data)
-    except (InputError, struct.error, zlib.error, ValueError, IndexError, KeyError, OverflowError):
+    except (struct.error, zlib.error, ValueError, IndexError, KeyError, OverflowError):
         pass  # the reader of the pixels reports the fault
     return {}
 
@@ -46,7 +54,7 @@ def picture_marks(path: Path) -> dict[str, Any]:
 def _png(data: bytes) -> dict[str, Any]:
     """Chunks up to the pixels; their value is what a decoder would do with them."""
     found: dict[str, Any] = {}
-    for kind, content in _chunks(data, 8, "big"):
+    for kind, content in _chunks(data):
         value: Any = True
         if kind == "gAMA":
             value = abs(int.from_bytes(content) / GAMMA - 1) > SAME_GAMMA
@@ -70,10 +78,11 @@ def _png(data: bytes) -> dict[str, Any]:
     return found
 
 
-def _chunks(data: bytes, start: int, order: Any):
+def _chunks(data: bytes) -> Iterator[tuple[str, bytes]]:
     """Kind and content of the chunks of a PNG."""
+    start = len(PNG_START)
     for _ in range(MOST_FIELDS):
-        length = int.from_bytes(data[start : start + 4], order)
+        length = int.from_bytes(data[start : start + 4])
         kind = data[start + 4 : start + 8]
         if len(kind) < 4:
             return

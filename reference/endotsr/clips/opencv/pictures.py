@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.opencv import decoded, opaque, read_png, write_encoded
+from endotsr.clips.opencv import decode_png, decoded, opaque, write_encoded
 from endotsr.clips.opencv.library import cv2_library
-from endotsr.clips.opencv.picture_marks import picture_marks
+from endotsr.clips.opencv.picture_marks import ORIENTATION, marks_of, picture_marks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
@@ -36,7 +36,6 @@ STARTS = {  # extension -> file type, and its first bytes
     ".exr": ("EXR", (b"v/1\x01",)),
 }
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
-ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 277, 339  # tags
 FLOATING_POINT = 3  # of TIFF_FORMAT
 GREY = ("1", "L")  # modes of Pillow
@@ -51,8 +50,9 @@ def read_picture(path: Path) -> Array:
     """
     ending = Path(path).suffix.lower()
     if ending == ".png":
-        pixels = read_png(path)
-        _check_turn(picture_marks(path).get("Orientation") or 1, path)
+        data = read_bytes(Path(path), LARGEST_FILE)
+        pixels = decode_png(data, path)
+        _check_turn(marks_of(data).get("Orientation") or 1, path)
         return pixels
     if ending not in STARTS:
         raise InputError(f"{path}: no picture by its name; allowed: {', '.join((*PICTURE_ENDINGS, *EXR_ENDINGS))}")

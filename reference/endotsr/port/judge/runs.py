@@ -47,7 +47,7 @@ def called_often(
         raise InputError("--runs: level 5 asks for the same bits; give --level 4 or less")
     level = min(asked_of(golden, only, profile, level)[1], BITS - 1)
     worst, first = called(golden, port, root, precision, level=level, only=only, timeout=timeout, profile=profile)
-    seconds, spread, wrong = worst.seconds, RunDifference(frozenset(), 0.0, ""), [] if _good(worst) else [1]
+    seconds, spread, wrong = worst.seconds, RunDifference(frozenset(), 0.0, ""), [] if worst.accepted else [1]
     second = root / KEPT[2]
     for number in range(2, runs + 1):
         shutil.rmtree(second, ignore_errors=True)
@@ -55,16 +55,12 @@ def called_often(
         report = judge(golden, second, precision, level=level, only=only, profile=profile)
         if note:
             without_claim(report, [f"run {number}: {note}"])
-        wrong += [] if _good(report) else [number]
-        worst = min(worst, report, key=lambda one: (_good(one), one.level, _right(one)))
+        wrong += [] if report.accepted else [number]
+        worst = min(worst, report, key=lambda one: (one.accepted, one.level, _right(one)))
         spread = _joined(spread, spread_of(golden, first, second, precision, level))
     worst.seconds = seconds
     worst.notes += lines(runs, wrong, spread)
     return worst, first
-
-
-def _good(report: Report) -> bool:
-    return report.accepted
 
 
 def _right(report: Report) -> int:

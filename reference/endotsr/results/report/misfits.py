@@ -1,7 +1,7 @@
 """Training frames that the model fits much worse than the others, found in the log of a training.
 
-A frame with a wrong prior depth, a mask that shows an instrument, or another exposure keeps a large value of one term
-until the end. In: the entries of the log. Out: frames, terms and ratios, and a table of them for the report.
+A frame with a wrong prior depth, a mask that shows an instrument, or another exposure can keep a large value of one
+term until the end. In: the entries of the log. Out: frames, terms and ratios, and a table of them for the report.
 
 The views of a run between two training frames count for the nearer one, as in the log.
 """
@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.results.report import parts
+from endotsr.results.report.curves import minimised
 from endotsr.results.report.tables import html_table
 from endotsr.training.fitting.records import LogEntry
 
@@ -48,8 +49,8 @@ def misfits(log: list[LogEntry]) -> list[Misfit]:
 def _of_term(late: list[LogEntry], term: str) -> list[Misfit]:
     values: dict[int, list[float]] = defaultdict(list)
     for entry in late:
-        if (value := entry.get(term)) is not None:
-            values[entry["frame"]].append(1.0 - value if term == "ssim" else value)
+        if (value := minimised(entry, term)) is not None:
+            values[entry["frame"]].append(value)
     medians = {frame: float(np.median(found)) for frame, found in values.items() if len(found) >= FEWEST}
     usual = float(np.median(list(medians.values()))) if len(medians) > FEWEST else 0.0
     if usual <= 0.0:
