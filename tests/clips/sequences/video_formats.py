@@ -33,7 +33,8 @@ def made(name: str) -> bytes:
         if name == "mp4":
             hidden_lead_in(folder)
             return turn(folder / "a.mp4", 180).read_bytes()
-        with av.open(str(folder / "a.mkv"), "w") as container:
+        # Without this flag the file holds random identifiers, in which a mark of one byte may turn up.
+        with av.open(str(folder / "a.mkv"), "w", options={"fflags": "+bitexact"}) as container:
             stream = container.add_stream("ffv1", rate=25)
             stream.width, stream.height, stream.pix_fmt = 128, 96, "bgr0"
             stream.codec_context.sample_aspect_ratio = Fraction(4, 3)
