@@ -6,6 +6,7 @@ from typing import Any
 from endotsr.results.report.labels import Label, place_labels
 from endotsr.results.report.style import GREY, LIGHT, SMALL, name_axes, new_figure, save
 from endotsr.studies.tradeoff.figure import logarithmic_axes, main_figure
+from endotsr.studies.tradeoff.results import Measurement
 
 
 def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
@@ -16,7 +17,7 @@ def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
     return list(pictures)
 
 
-def draw(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> list[str]:
+def draw(result: Measurement, folder: Path, name: str = "tradeoff") -> list[str]:
     """The picture of a study; returns the written stems."""
     return save_pictures({name: main_figure(result)}, folder) if result["joint"] else []
 

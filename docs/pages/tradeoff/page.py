@@ -13,13 +13,13 @@ the study is complete. A SEQUENCE is a sequence folder or the word `simulated`.
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.tradeoff import RESULT, TradeoffOptions, chosen_scene
 from endotsr.errors import InputError
 from endotsr.method.kernels.threads import use_threads
-from endotsr.studies.tradeoff.results import read_result
+from endotsr.studies.tradeoff.results import Measurement, read_format, read_measurement
 from endotsr.studies.tradeoff.study import described
 from endotsr.training.runs.files import write_json
 from pages.store.marks import read_json, write_marked
@@ -41,7 +41,7 @@ def measure(name: str, options: TradeoffOptions) -> None:
     use_threads(options.threads)
     with StepBar("settings") as bar:
         found = run_whole_study(chosen_scene(options), begin=bar.begin, step=bar.step)
-    write_json(RESULTS / f"{name}.json", described(found))
+    write_json(RESULTS / f"{name}.json", described(cast(Measurement, found)))
 
 
 def measure_trained(scene: Path) -> None:
@@ -54,9 +54,9 @@ def draw_measured(folder: Path) -> None:
     """Draw the pictures of the measurements in a folder, into that folder. Raises: InputError if there is none."""
     drawn = []
     if (folder / RESULT).exists():
-        drawn += draw(read_result(folder / RESULT), folder)
+        drawn += draw(read_measurement(folder / RESULT), folder)
     if (folder / TRAINING).exists():
-        drawn += draw_training(read_result(folder / TRAINING), folder, "training")
+        drawn += draw_training(read_format(folder / TRAINING), folder, "training")
     if not drawn:
         raise InputError(f"{folder}: holds no measurement; make one with `endotsr tradeoff --out {folder}`")
     print(*(folder / f"{stem}.png" for stem in drawn), sep="\n")
@@ -88,7 +88,7 @@ def _read(start: str) -> dict[str, dict[str, Any]]:
 
 def write_page() -> None:
     """Write the pictures of the page, and its generated parts."""
-    result, trainings = read_json(RESULTS / "tradeoff.json", COMMAND), read_trainings()
+    result, trainings = read_measurement(RESULTS / "tradeoff.json"), read_trainings()
     draw(result, RESULTS)
     for name, study in trainings.items():
         draw_training(study, RESULTS, f"tradeoff_training_{name}")

@@ -1,8 +1,9 @@
 """Generated parts of docs/tradeoff.md as Markdown, from the JSON of `endotsr tradeoff` and `tradeoff_train.py`."""
 
-from typing import Any
+from typing import Any, cast
 
 from endotsr.results.report.tables import markdown
+from endotsr.studies.tradeoff.results import DatedMeasurement
 from endotsr.studies.tradeoff.text import COLUMNS, front_rows, levels, made
 from pages.tradeoff.dials import OMITTED
 from pages.tradeoff.text import (
@@ -33,8 +34,8 @@ def fragments(
     return {
         "promise": promise(result, others),
         "advice": _numbered(advice(result)),
-        "made": made(result),
-        "front": markdown(COLUMNS, front_rows(result)),
+        "made": made(cast(DatedMeasurement, result)),
+        "front": markdown(COLUMNS, front_rows(cast(DatedMeasurement, result))),
         "dials": markdown(DIAL_COLUMNS, dial_rows(result)),
         "presets": _bullets(preset_lines(result)),
         "certificate": certificate_line(result),
@@ -146,7 +147,9 @@ def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
         "verdict",
     )
     rows = [_scene_row(result, result), *(_scene_row(other, result) for other in others.values())]
-    about = [f"`{name}`: {made(other)} {certificate_line(other)}" for name, other in others.items()]
+    about = [
+        f"`{name}`: {made(cast(DatedMeasurement, other))} {certificate_line(other)}" for name, other in others.items()
+    ]
     return "\n\n".join([markdown(columns, rows), _bullets(about)]) if others else "Not measured yet."
 
 

@@ -43,7 +43,7 @@ def run_whole_study(
     certificate = certify(scene, frame(prepare(scene, aim))[0].colour, aim.raster)
     result = run_study(scene, repeats=repeats, plan=plan, keep=keep, begin=begin, step=step)
     result["reference"]["certificate"] = certificate.as_dict()
-    return result | {"dials": plan.dials, "omitted": omitted(scene)}
+    return dict(result) | {"dials": plan.dials, "omitted": omitted(scene)}
 
 
 def omitted(scene: StudyScene) -> dict[str, str]:

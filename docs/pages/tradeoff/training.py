@@ -20,7 +20,7 @@ from endotsr.config import Config, config_from_dict, config_to_toml, with_iterat
 from endotsr.errors import InputError
 from endotsr.results.evaluation.evaluate import evaluate_frames
 from endotsr.results.evaluation.lpips import LpipsWeights
-from endotsr.studies.tradeoff.results import FORMAT, read_result
+from endotsr.studies.tradeoff.results import FORMAT, read_format
 from endotsr.training.fitting.compile_ahead import rehearse
 from endotsr.training.fitting.model import render_at, spectral_from, with_corrected_cameras
 from endotsr.training.fitting.records import LogEntry
@@ -232,7 +232,7 @@ def _begun(
     """The study in `file` if it has the same sequence and settings, else a new one without trainings."""
     digest = hashlib.sha256(config_to_toml(base).encode() + full.images.tobytes() + full.depth.tobytes()).hexdigest()
     if file.exists():
-        found = read_result(file)
+        found = read_format(file)
         if found.get("input_sha256") == digest and iterations in (None, found["iterations"]):
             return found
         raise InputError(f"{file}: holds trainings of another sequence, length or settings; choose another --out")

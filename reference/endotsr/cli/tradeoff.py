@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
@@ -13,6 +13,7 @@ from endotsr.training.runs.files import refuse_folder, write_json
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
+    from endotsr.studies.tradeoff.results import DatedMeasurement
     from endotsr.studies.tradeoff.scenes import StudyScene
 
 RESULT, PAGE = "tradeoff.json", "tradeoff.html"  # in the folder of the measurement
@@ -48,13 +49,13 @@ def run(words: list[str]) -> int:
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
     from endotsr.studies.tradeoff.budget import frame_advice, parse_budget
-    from endotsr.studies.tradeoff.results import Measurement, read_result
+    from endotsr.studies.tradeoff.results import read_measurement
 
     budget = None if options.budget is None else parse_budget(options.budget)
     file = options.out / RESULT
     if budget is None and file.exists():
         raise InputError(f"{options.out}: already contains a measurement; choose another --out, or use --budget")
-    result = read_result(file, Measurement) if file.exists() else _measure(options)
+    result = read_measurement(file) if file.exists() else _measure(options)
     if budget is not None:
         advice = frame_advice(result, budget)
         print("\n".join(advice.lines))
@@ -71,7 +72,7 @@ def _refuse(options: TradeoffOptions) -> None:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
 
 
-def _measure(options: TradeoffOptions) -> dict[str, Any]:
+def _measure(options: TradeoffOptions) -> "DatedMeasurement":
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.report.tables import plain
     from endotsr.studies.tradeoff.page import tradeoff_page

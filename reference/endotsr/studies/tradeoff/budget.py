@@ -5,9 +5,10 @@ Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), or an error (`1/255`, `0
 
 import math
 import re
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.studies.tradeoff.results import Measurement, Point, SettingPart
 from endotsr.studies.tradeoff.text import levels, milliseconds
 
 Kind = Literal["frame", "error"]
@@ -28,7 +29,7 @@ class Budget(NamedTuple):
 class Advice(NamedTuple):
     """A measured setting within a budget."""
 
-    point: dict[str, Any]
+    point: Point
     lines: list[str]
 
 
@@ -56,7 +57,7 @@ def _quotient(numerator: float, denominator: float) -> float:
     return numerator / denominator if denominator else math.inf
 
 
-def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
+def frame_advice(result: Measurement, budget: Budget) -> Advice:
     """The best setting within the budget, with what to expect. Raises InputError as `best_point`, naming the option."""
     try:
         chosen = best_point(result, budget)
@@ -66,12 +67,12 @@ def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
     return Advice(chosen, [f"{budget.text}: {chosen['name']}", *_expectation(chosen), where])
 
 
-def _scene(result: dict[str, Any]) -> str:
+def _scene(result: Measurement) -> str:
     about = result["scene"]
     return f"{about['gaussians']} Gaussians at {about['width']}x{about['height']} ({about['name']})"
 
 
-def best_point(result: dict[str, Any], budget: Budget) -> dict[str, Any]:
+def best_point(result: Measurement, budget: Budget) -> Point:
     """The point of the best setting within the budget, on the Pareto front of error against forward time.
 
     For a time budget: the most accurate setting with its upper quartile within the budget. For an error budget: the
@@ -98,7 +99,7 @@ def best_point(result: dict[str, Any], budget: Budget) -> dict[str, Any]:
     return min(kept, key=lambda p: p["forward"]["median"])
 
 
-def _expectation(point: dict[str, Any]) -> list[str]:
+def _expectation(point: Point) -> list[str]:
     error = point["error"]
     return [
         f"expected error: largest {levels(error['max'])}, RMS {levels(error['rms'])}, "
@@ -109,7 +110,7 @@ def _expectation(point: dict[str, Any]) -> list[str]:
     ]
 
 
-def settings_words(setting: dict[str, Any]) -> str:
+def settings_words(setting: SettingPart) -> str:
     """The options of `endotsr train` for a setting."""
     raster = setting["raster"]
     words = [

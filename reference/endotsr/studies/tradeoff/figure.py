@@ -4,19 +4,23 @@ from typing import Any
 
 from endotsr.results.report.labels import Label, place_labels
 from endotsr.results.report.style import BLUE, FAINT, GREY, NORMAL, ORANGE, Sizes, name_axes, new_figure, plain_axes
-from endotsr.studies.tradeoff.study import cost_of
+from endotsr.studies.tradeoff.results import Measurement, Point
+from endotsr.studies.tradeoff.study import Cost, cost_of
 from endotsr.studies.tradeoff.text import LEVELS, small
 
-COSTS = {"forward": ("milliseconds a frame", 1e3), "visits": ("visited pixel-Gaussian pairs", 1.0)}  # label, factor
+COSTS: dict[Cost, tuple[str, float]] = {  # label, factor
+    "forward": ("milliseconds a frame", 1e3),
+    "visits": ("visited pixel-Gaussian pairs", 1.0),
+}
 FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn
 
 
-def main_figure(result: dict[str, Any]) -> Any:
+def main_figure(result: Measurement) -> Any:
     """Every setting of the joint sweep, the front and the presets: error against time, and against visits."""
     figure = new_figure(11.0, 5.0)
     left, right = figure.subplots(1, 2, sharey=True)
     labels = []
-    for axes, cost in ((left, "forward"), (right, "visits")):
+    for axes, cost in zip((left, right), COSTS, strict=True):
         labels += _sweep(axes, result, cost)
         _draw_levels(axes, result)
         logarithmic_axes(axes, COSTS[cost][0])
@@ -29,7 +33,7 @@ def main_figure(result: dict[str, Any]) -> Any:
     return figure
 
 
-def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
+def _sweep(axes: Any, result: Measurement, cost: Cost) -> list[Label]:
     """Draw the points; returns their labels, presets first."""
     by_name = {p["name"]: p for p in result["points"]}
     factor = COSTS[cost][1]
@@ -52,7 +56,7 @@ def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
     return labels + [Label(axes, _short(by_name[name], cost), *at(name), BLUE) for name in swept]
 
 
-def _short(point: dict[str, Any], cost: str) -> str:
+def _short(point: Point, cost: Cost) -> str:
     """Label of a setting: precision (which changes no visit), cutoff, and any other coarse choice."""
     raster, scale = point["setting"]["raster"], point["setting"]["scale"]
     cut, stop = raster["alpha_cutoff"], raster["transmittance_stop"]
@@ -62,7 +66,7 @@ def _short(point: dict[str, Any], cost: str) -> str:
     return ", ".join(words + (["half size"] if scale != 1 else []))
 
 
-def _draw_levels(axes: Any, result: dict[str, Any]) -> None:
+def _draw_levels(axes: Any, result: Measurement) -> None:
     """Half a step of an 8-bit picture, and the noise of the sensor."""
     lines = [(result["lines"]["eight_bit"], "half a step of 8 bit", "--")]
     if result["lines"]["sensor_noise"]:

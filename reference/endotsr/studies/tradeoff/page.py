@@ -1,7 +1,5 @@
 """The page of a measurement, `tradeoff.html`: answers to common budgets, the diagram, and the settings on the front."""
 
-from typing import Any
-
 from endotsr.errors import InputError
 from endotsr.results.report import parts
 from endotsr.results.report.figures import data_uri
@@ -9,6 +7,7 @@ from endotsr.results.report.style import encoded
 from endotsr.results.report.tables import html_table
 from endotsr.studies.tradeoff.budget import best_point, parse_budget, settings_words
 from endotsr.studies.tradeoff.figure import main_figure
+from endotsr.studies.tradeoff.results import DatedMeasurement, Measurement
 from endotsr.studies.tradeoff.text import COLUMNS, LEVELS, front_rows, levels, made, milliseconds
 
 BUDGETS = ("60 fps", "30 fps", "1/255", "0.1/255")  # answered on the page; `--budget` answers any other
@@ -16,7 +15,7 @@ CAPTION = "Each point is a setting; lower is more accurate, further left is chea
 FRONT = "No measured setting is both faster and more accurate than one in this table."
 
 
-def tradeoff_page(result: dict[str, Any]) -> str:
+def tradeoff_page(result: DatedMeasurement) -> str:
     """The page as text.
 
     result   a measurement, the content of `tradeoff.json`
@@ -33,7 +32,7 @@ def tradeoff_page(result: dict[str, Any]) -> str:
     return parts.page(f"endotsr tradeoff: {name}", "\n".join(part for part in body if part))
 
 
-def compared_with_paper(result: dict[str, Any]) -> str:
+def compared_with_paper(result: Measurement) -> str:
     """The error of `paper`, and what the setting costs that is never off by more than a level of 8 bits.
 
     The cost is that of the visited pairs, which are counted: times of equal work differ between runs.
@@ -49,12 +48,12 @@ def compared_with_paper(result: dict[str, Any]) -> str:
     return f"{said}. The setting {chosen['name']} is off by at most {error}, for {times:.1f} times its visits."
 
 
-def _diagram(result: dict[str, Any]) -> str:
+def _diagram(result: Measurement) -> str:
     picture = data_uri(encoded(main_figure(result), "svg"), "svg+xml")
     return parts.figure(CAPTION, f'<img class="chart" src="{picture}" alt="Error against time and against visits">')
 
 
-def _answers(result: dict[str, Any]) -> list[tuple[str, str]]:
+def _answers(result: Measurement) -> list[tuple[str, str]]:
     """For every budget the setting, its error, its time and its options; or why there is none."""
     answers = []
     for text in BUDGETS:

@@ -1,33 +1,36 @@
-"""The file of a measurement, `tradeoff.json`."""
+"""The file of a measurement, `tradeoff.json`, and the types of its parts."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, TypedDict, cast
 
 import msgspec
 
 from endotsr.errors import InputError
-from endotsr.untrusted.json import read_json
+from endotsr.training.runs.machine import MachinePart
+from endotsr.untrusted.json import Keys, read_json
 
 FORMAT = 1  # raised when a key changes its name or meaning
 
 
-class Seconds(msgspec.Struct):
+class Seconds(TypedDict):
     """Quartiles of the seconds per frame."""
 
+    low: float
     median: float
     high: float
 
 
-class Errors(msgspec.Struct):
-    """Errors of a setting."""
+class ErrorPart(TypedDict):
+    """Errors of a setting: largest and RMS of the colour in display units, and of the gradients, relative."""
 
     max: float
     rms: float
-    gradient: float
+    gradient: float  # of the worst block
+    gradients: dict[str, float]  # by block
 
 
-class Raster(msgspec.Struct):
-    """The rasteriser settings that are command-line options."""
+class RasterPart(TypedDict):
+    """The settings of the rasteriser that are command-line options; the file holds the others too."""
 
     alpha_cutoff: float
     transmittance_stop: float
@@ -35,63 +38,95 @@ class Raster(msgspec.Struct):
     support: str
 
 
-class ChosenSetting(msgspec.Struct):
+class SettingPart(TypedDict):
     """A setting, as far as it consists of command-line options."""
 
-    raster: Raster
+    raster: RasterPart
     precision: str
     scale: float
 
 
-class Point(msgspec.Struct):
+class Point(TypedDict):
     """One measured setting."""
 
     name: str
-    setting: ChosenSetting
-    error: Errors
+    file: str  # name of its arrays, where they are kept
+    setting: SettingPart
+    error: ErrorPart
+    visits: int  # pixel-Gaussian pairs
+    terms: int
     forward: Seconds
-    both: Seconds
+    both: Seconds  # with the reverse pass
 
 
-class Front(msgspec.Struct):
-    """Names of the undominated points."""
+class Fronts(TypedDict):
+    """Names of the undominated points by cost."""
 
     forward: Annotated[list[str], msgspec.Meta(min_length=1)]
+    both: list[str]
+    visits: list[str]
 
 
-class SceneSize(msgspec.Struct):
+class ScenePart(TypedDict):
     """The rendered scene."""
 
     name: str
+    about: str
     gaussians: int
     width: int
     height: int
+    degree: int
+    bases: int
+    frequencies: int
+    log10_pairs: float
 
 
-class Measurement(msgspec.Struct):
-    """The keys of tradeoff.json that a budget reads."""
+class LinesPart(TypedDict):
+    """Errors drawn for comparison, in display units."""
 
-    scene: SceneSize
+    eight_bit: float
+    sensor_noise: float | None
+
+
+class Measurement(TypedDict):
+    """What a study measures on a scene."""
+
+    format: int
+    scene: ScenePart
+    reference: Keys
+    lines: LinesPart
     points: list[Point]
-    fronts: Front
+    joint: list[str]
+    presets: dict[str, str]
+    fronts: Fronts
+    repeats: int
 
-    def __post_init__(self) -> None:
-        if unknown := sorted(set(self.fronts.forward) - {point.name for point in self.points}):
-            raise ValueError(f"fronts.forward contains {unknown[0]!r}, which is no point")
+
+class DatedMeasurement(Measurement):
+    """tradeoff.json: the measurement with its time and machine."""
+
+    date: str
+    machine: MachinePart
+    versions: dict[str, str]
+    threads: int
 
 
-def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[str, Any]:
-    """Read a measurement.
+def read_measurement(file: Path) -> DatedMeasurement:
+    """Read a measurement. Raises InputError if it cannot be read, has another format, or lacks a key."""
+    found = read_format(file)
+    try:
+        msgspec.convert(found, DatedMeasurement)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{file}: incomplete measurement: {error}; measure again with another --out") from None
+    measured = cast(DatedMeasurement, found)  # with the keys that only the file has
+    if unknown := sorted(set(measured["fronts"]["forward"]) - {point["name"] for point in measured["points"]}):
+        raise InputError(f"{file}: incomplete measurement: fronts.forward contains {unknown[0]!r}, which is no point")
+    return measured
 
-    needed   the required keys with their types; None = check the format only
-    Raises:  InputError if it cannot be read, has another format, or lacks a key.
-    """
+
+def read_format(file: Path) -> Keys:
+    """Read a file of this format. Raises InputError if it cannot be read or has another format."""
     found = read_json(file)
     if found.get("format") != FORMAT:
         raise InputError(f"{file}: not a measurement of this version; measure again with another --out")
-    if needed is not None:
-        try:
-            msgspec.convert(found, needed)
-        except msgspec.ValidationError as error:
-            raise InputError(f"{file}: incomplete measurement: {error}; measure again with another --out") from None
     return found

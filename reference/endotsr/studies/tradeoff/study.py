@@ -5,22 +5,23 @@ The result is one JSON-able dictionary, `tradeoff.json`, the only input of `text
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.studies.tradeoff.measure import Prepared, RenderedFrame, Shared, errors, frame, prepare, seconds, terms
-from endotsr.studies.tradeoff.results import FORMAT
+from endotsr.studies.tradeoff.results import FORMAT, DatedMeasurement, Measurement, Point, ScenePart, Seconds
 from endotsr.studies.tradeoff.scenes import StudyScene
 from endotsr.studies.tradeoff.settings import CLOSE, Setting, joint, presets
 from endotsr.studies.tradeoff.text import LEVELS
 from endotsr.training.runs.machine import dated
+from endotsr.untrusted.json import Keys
 
 REPEATS = 7
 EXACT_PAIRS = 150e6  # maximum Gaussians x pixels for the exact path as reference
-COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse", "visits": "pixel-Gaussian pairs"}
+Cost = Literal["forward", "both", "visits"]  # seconds of a frame, seconds with the reverse, pixel-Gaussian pairs
 
 Progress = Callable[[int], None]  # called with the number of completed steps
 
@@ -61,7 +62,7 @@ def run_study(
     keep: Callable[[str, RenderedFrame], object] = lambda file, found: None,
     begin: Callable[[int], None] = lambda steps: None,
     step: Progress = lambda steps: None,
-) -> dict[str, Any]:
+) -> Measurement:
     """Measure errors and costs of every setting.
 
     repeats   timed frames per setting, after one warm-up frame
@@ -78,7 +79,7 @@ def run_study(
     step(1)
     keep("reference", reference)
     prepared = [prepare(scene, setting, shared) for setting in plan.names]
-    points = []
+    points: list[Point] = []
     for number, (ready, (setting, name)) in enumerate(zip(prepared, plan.names.items())):
         found, visits = (reference, reference_visits) if setting == aim else frame(ready)
         points.append(_point(name, number, ready, found, reference, visits))
@@ -86,6 +87,7 @@ def run_study(
         step(1)
     for point, times in zip(points, _timed(prepared, repeats, step), strict=True):
         point["forward"], point["both"] = (_spread(column) for column in times.T)
+    candidates = {*plan.joint, *plan.presets.values()}
     return {
         "format": FORMAT,
         "scene": _about(scene),
@@ -94,21 +96,26 @@ def run_study(
         "points": points,
         "joint": plan.joint,
         "presets": plan.presets,
-        "fronts": {cost: _front(points, {*plan.joint, *plan.presets.values()}, cost) for cost in COSTS},
+        "fronts": {
+            "forward": _front(points, candidates, "forward"),
+            "both": _front(points, candidates, "both"),
+            "visits": _front(points, candidates, "visits"),
+        },
         "repeats": repeats,
     }
 
 
-def described(result: dict[str, Any]) -> dict[str, Any]:
+def described(result: Measurement) -> DatedMeasurement:
     """The result with the date, the machine, the versions and the threads in use."""
-    return dated(result) | {"threads": numba.get_num_threads()}
+    return cast(DatedMeasurement, dated(result) | {"threads": numba.get_num_threads()})
 
 
 def _point(
     name: str, number: int, ready: Prepared, found: RenderedFrame, reference: RenderedFrame, visits: int
-) -> dict[str, Any]:
+) -> Point:
+    """A point without its times."""
     error = errors(found, reference)
-    return {
+    point = {
         "name": name,
         "file": f"{number:03d}",
         "setting": setting_dict(ready.setting),
@@ -116,9 +123,10 @@ def _point(
         "visits": visits,
         "terms": terms(ready),
     }
+    return cast(Point, point)
 
 
-def setting_dict(setting: Setting) -> dict[str, Any]:
+def setting_dict(setting: Setting) -> Keys:
     """A setting as plain data, without its kernels."""
     raster = setting.raster._asdict() | {"deviations": setting.raster.deviations._asdict()}
     return {name: value for name, value in setting._asdict().items() if name != "kernels"} | {"raster": raster}
@@ -137,12 +145,12 @@ def _timed(prepared: list[Prepared], repeats: int, step: Progress) -> NDArray[np
     return times
 
 
-def _spread(values: NDArray[np.float64]) -> dict[str, float]:
+def _spread(values: NDArray[np.float64]) -> Seconds:
     low, median, high = np.percentile(values, [25, 50, 75])
     return {"median": float(median), "low": float(low), "high": float(high)}
 
 
-def cost_of(point: dict[str, Any], cost: str) -> float:
+def cost_of(point: Point, cost: Cost) -> float:
     """Seconds (median) or visits of a point."""
     return float(point["visits"] if cost == "visits" else point[cost]["median"])
 
@@ -170,13 +178,13 @@ def non_dominated(points: Iterable[Ranked]) -> list[Ranked]:
     return front
 
 
-def _front(points: list[dict[str, Any]], candidates: set[str], cost: str) -> list[str]:
+def _front(points: list[Point], candidates: set[str], cost: Cost) -> list[str]:
     """Names of the undominated settings among `candidates`, cheapest first."""
     ranked = [Ranked(p["name"], cost_of(p, cost), (p["error"]["max"],)) for p in points if p["name"] in candidates]
     return [p.name for p in non_dominated(ranked)]
 
 
-def _about(scene: StudyScene) -> dict[str, Any]:
+def _about(scene: StudyScene) -> ScenePart:
     return {
         "name": scene.name,
         "about": scene.about,

@@ -1,6 +1,6 @@
 """The results in `tradeoff.json` as table rows, and quantities as text."""
 
-from typing import Any
+from endotsr.studies.tradeoff.results import DatedMeasurement, Measurement, Point
 
 LEVELS = 255.0  # levels of an 8-bit picture
 
@@ -20,7 +20,7 @@ def small(number: float) -> str:
     return f"1/{round(1 / number)}" if number > 5e-4 else f"{number:.0e}".replace("e-0", "e-")
 
 
-def front_rows(result: dict[str, Any]) -> list[list[str]]:
+def front_rows(result: Measurement) -> list[list[str]]:
     """The undominated settings, fastest first: name, times, visits, errors."""
     by_name = {p["name"]: p for p in result["points"]}
     return [_row(by_name[name]) for name in result["fronts"]["forward"]]
@@ -29,7 +29,7 @@ def front_rows(result: dict[str, Any]) -> list[list[str]]:
 COLUMNS = ("Setting", "frame", "with reverse", "visits", "largest error", "RMS", "worst gradient block")
 
 
-def _row(point: dict[str, Any]) -> list[str]:
+def _row(point: Point) -> list[str]:
     error = point["error"]
     return [
         point["name"],
@@ -42,11 +42,12 @@ def _row(point: dict[str, Any]) -> list[str]:
     ]
 
 
-def made(result: dict[str, Any]) -> str:
+def made(result: DatedMeasurement) -> str:
     """A sentence with date, machine, version and scene of the measurement."""
-    m, about = result["machine"], result["scene"]
+    processor, cores = (result["machine"].get(key) for key in ("processor", "cores"))
+    about = result["scene"]
     return (
-        f"Measured {result['date'][:10]} on {result['threads']} threads of {m['processor']} ({m['cores']} cores), "
+        f"Measured {result['date'][:10]} on {result['threads']} threads of {processor} ({cores} cores), "
         f"endotsr {result['versions']['endotsr']}; medians of {result['repeats']} warm runs. Scene: {about['about']}, "
         f"{about['gaussians']} Gaussians at {about['width']}x{about['height']}."
     )
