@@ -30,7 +30,7 @@ def golden():
     return read_golden(golden_folder())
 
 
-def causes(golden, folder, operation, *, inputs=lambda found: found, settings=lambda found: found, seconds=8.0):
+def causes(golden, folder, operation, *, inputs=lambda found: found, settings=lambda found: found, seconds=24.0):
     """What is said of the answers of the definition as it is patched now, for all cases of an operation."""
     for case in (case for case in golden.cases if case.operation == operation):
         given = inputs(in_precision(golden.inputs(case), "float64"))
@@ -41,7 +41,7 @@ def causes(golden, folder, operation, *, inputs=lambda found: found, settings=la
     return report(golden, folder, operation, seconds)
 
 
-def report(golden, folder, operation, seconds=8.0):
+def report(golden, folder, operation, seconds=24.0):
     (family,) = {case.family for case in golden.cases if case.operation == operation}
     with pytest.MonkeyPatch.context() as right:
         for module, name, function in RIGHT:
