@@ -17,7 +17,8 @@ TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "o
           "pose_readings")  # fmt: skip
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
             "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP", "hamlyn": "Hamlyn",
-            "scared": "SCARED", "servct": "SERV-CT", "c3vd": "C3VD", "nerfstudio": "nerfstudio"}  # fmt: skip
+            "scared": "SCARED", "servct": "SERV-CT", "c3vd": "C3VD", "euroc": "EuRoC",
+            "nerfstudio": "nerfstudio"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", TABLES)

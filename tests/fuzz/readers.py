@@ -322,6 +322,7 @@ READERS = {
     "calibration (ini)": Reader("StereoCalibration.ini", recordings.rig_seeds, mutate.lines, recordings.read_rig),
     "trajectory": Reader("groundtruth.txt", recordings.trajectory_seeds, mutate.lines, recordings.read_trajectory),
     "list of pictures": Reader("rgb.txt", recordings.list_seeds, mutate.lines, recordings.read_list),
+    "list of nanoseconds": Reader("data.csv", recordings.rows_seeds, mutate.lines, recordings.read_rows),
     "COLMAP (text)": Reader("model", recordings.colmap_seeds, mutate.lines, recordings.read_colmap),
     "COLMAP (binary)": Reader("model", recordings.colmap_binary_seeds, mutate.plain, recordings.read_colmap_binary),
     "cameras and points (npz)": Reader("a.npz", recordings.points_seeds, mutate.npz, recordings.read_points),

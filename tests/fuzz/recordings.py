@@ -181,6 +181,20 @@ def read_list(path: Path) -> object:
     return found
 
 
+def rows_seeds() -> list[bytes]:
+    """The list of a camera of EuRoC."""
+    lines = [f"{10**18 + k * 5 * 10**7},{10**18 + k * 5 * 10**7}.png" for k in range(3)]
+    return ["\r\n".join(["#timestamp [ns],filename", *lines, ""]).encode()]
+
+
+def read_rows(path: Path) -> object:
+    from endotsr.clips.sequences.time_lists import nanosecond_list
+
+    found = nanosecond_list(path, path.parent, [])
+    assert all(row.file.resolve().is_relative_to(path.parent.resolve()) for row in found)
+    return found
+
+
 COLMAP_TEXT = (
     b"1 OPENCV 64 48 60 61 32 24 0.01 0 0 0\n2 SIMPLE_RADIAL 64 48 60 32 24 0.1\n",
     b"1 1 0 0 0 0.1 0.2 0.3 1 a.png\n1.5 2.5 7 3 4 -1\n2 0.6 0.8 0 0 0 0 0 2 b/c d.png\n\n",

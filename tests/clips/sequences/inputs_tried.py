@@ -70,6 +70,7 @@ from input_kinds import (
 from left_inputs import LEFT_ROWS
 from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
 from odd_inputs import ODD_ROWS
+from rig_inputs import RIG_ROWS
 from silent_inputs import SILENT_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
@@ -286,6 +287,7 @@ ROWS = [
     *ODD_ROWS,
     *LEFT_ROWS,
     *SILENT_ROWS,
+    *RIG_ROWS,
 ]  # fmt: skip
 
 

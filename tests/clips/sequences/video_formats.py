@@ -9,7 +9,10 @@ from functools import cache
 from pathlib import Path
 
 import av
+import numpy as np
+import yaml
 from field_inputs import Format, Keys, result, stated, write_yaml
+from field_inputs import pictures as pictures_of
 from left_inputs import hidden_lead_in
 from made_videos import pictures, turn
 
@@ -72,9 +75,26 @@ ORB_BASE = {"Camera.type": "PinHole", "Camera.fx": 30.0, "Camera.fy": 31.0, "Cam
             "Camera.width": 32, "Camera.height": 24, "Camera.bf": 0.12}  # fmt: skip
 ORB_CHANGES = {name: 2 * value for name, value in ORB_BASE.items() if name != "Camera.type"} | {
     "Camera.type": "KannalaBrandt8", "Stereo.b": 0.2}  # fmt: skip
-EUROC_BASE = {"resolution": [32, 24], "camera_model": "pinhole", "intrinsics": [30, 31, 15, 11],
+MOUNT = {"cols": 4, "rows": 4, "data": np.eye(4).ravel().tolist()}
+OTHER_MOUNT = {"cols": 4, "rows": 4, "data": [1.0, 0, 0, 0.1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
+
+
+def write_rig(folder: Path, keys: Keys) -> None:
+    """The folder mav0/ of a camera with these keys, and poses of its body."""
+    (folder / "cam0").mkdir()
+    pictures_of(folder / "cam0", "data")
+    rows = [f"{10**18 + k * 4 * 10**7},{k:03d}.png" for k in range(4)]
+    (folder / "cam0/data.csv").write_text("#timestamp [ns],filename\n" + "\n".join(rows))
+    (folder / "cam0/sensor.yaml").write_text(yaml.safe_dump({k: v for k, v in keys.items() if v is not None}))
+    (folder / "state_groundtruth_estimate0").mkdir()
+    poses = [f"{row.split(',')[0]},{k},0,0,1,0,0,0" for k, row in enumerate(rows)]
+    head = "#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n"
+    (folder / "state_groundtruth_estimate0/data.csv").write_text(head + "\n".join(poses))
+
+
+EUROC_BASE = {"T_BS": MOUNT, "resolution": [32, 24], "camera_model": "pinhole", "intrinsics": [30, 31, 15, 11],
               "distortion_model": "radial-tangential", "distortion_coefficients": [0.1, 0, 0, 0]}  # fmt: skip
-EUROC_CHANGES = {"resolution": [64, 48], "camera_model": "omni", "intrinsics": [33, 31, 15, 11],
+EUROC_CHANGES = {"T_BS": OTHER_MOUNT, "resolution": [64, 48], "camera_model": "omni", "intrinsics": [33, 31, 15, 11],
                  "distortion_model": "equidistant", "distortion_coefficients": [0.2, 0, 0, 0]}  # fmt: skip
 TRACKS = {
     "mp4": Format(video_marks.MP4, dict.fromkeys(KEPT, True), write_track("mp4"), told, dict.fromkeys(KEPT),
@@ -86,7 +106,7 @@ TRACKS = {
                      ("Top", "Bottom", "Left", "Right")}),
     "orb": Format(ORB, ORB_BASE, write_yaml, stated, ORB_CHANGES, {"Camera.k4": 0.1, "Camera2.fx": 30.0,
                   "LEFT.K": [1], "Stereo.T_c1_c2": [1]}),
-    "euroc": Format(EUROC, EUROC_BASE, write_yaml, stated, EUROC_CHANGES, {}),
+    "euroc": Format(EUROC, EUROC_BASE, write_rig, lambda folder: result(describe(folder)), EUROC_CHANGES, {}),
 }  # fmt: skip
 # In these files the coded pictures repeat it, or the file has none; inputs_tried.py tries colour, fields and pairs.
 REPEATED = {

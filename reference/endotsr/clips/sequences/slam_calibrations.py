@@ -52,11 +52,11 @@ EUROC = Inventory(
         "intrinsics": "fx fy cx cy, pixel centres at integers",
         "distortion_coefficients": "k1 k2 p1 p2",
         "resolution": "width and height",
+        "T_BS": "from the camera to the body, metres: in mav0/ it relates two cameras, and the camera to the poses",
     },
     harmless={
         "sensor_type comment": "it documents the calibration",
-        "T_BS": "it relates the camera to an inertial sensor, which is not read",
-        "rate_hz": "the times of the pictures are in their names or a list; prepare has --source-rate",
+        "rate_hz": "the times of the pictures are in data.csv; a file of one camera needs none",
     },
 )
 EUROC_MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radial-tangential", "radtan", "none")}
