@@ -13,6 +13,9 @@ from endotsr.cli.parts.relations import Needs, shown
 from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts.nerfstudio import FIELDS, FRAME_FIELDS
+from endotsr.clips.sequences.matlab_calibrations import BOUGUET
+from endotsr.clips.sequences.matlab_calibrations import CAMERA as MATLAB
+from endotsr.clips.sequences.matlab_calibrations import PAIR as MATLAB_PAIR
 from endotsr.clips.sequences.picture_fields import JPEG, PNG, TIFF, WEBP
 from endotsr.clips.sequences.point_files import CLOUD
 from endotsr.clips.sequences.pose_fields import COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF
@@ -26,7 +29,7 @@ from pages.store.marks import write_marked
 PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
 INVENTORIES = (
     FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, INI, ORB,
-    EUROC, PNG, JPEG, WEBP, TIFF, MP4, MATROSKA, CLOUD, GAUSSIAN,
+    EUROC, MATLAB, MATLAB_PAIR, BOUGUET, PNG, JPEG, WEBP, TIFF, MP4, MATROSKA, CLOUD, GAUSSIAN,
 )  # fmt: skip
 USES = {"used": "used", "refused": "refused", "told": "named in a note", "harmless": "harmless"}
 COMMANDS = ("prepare", "depth", "render", "export")  # of `train`, most related options are settings

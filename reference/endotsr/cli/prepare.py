@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class PrepareOptions:
     """Convert a recording to a folder for `endotsr train`: pictures, masks, depth and sequence.toml.
 
-    SOURCE is a folder of pictures, a video, a StereoMIS, COLMAP, TUM or EndoNeRF folder, or a folder in the common
-    format. Options supply missing metadata. Lengths are converted to millimetres. The printed notes list all
+    SOURCE is a folder of pictures, a video, a StereoMIS, COLMAP, TUM, EuRoC or EndoNeRF folder, or a folder in the
+    common format. Options supply missing metadata. Lengths are converted to millimetres. The printed notes list all
     assumptions and changes.
     """
 
@@ -30,8 +30,8 @@ class PrepareOptions:
     """folder to create"""
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
-    stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
-    """stereo pairs in one picture: side_by_side = left picture on the left, stacked = left picture on top"""
+    stereo: Literal["auto", "none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"] = "auto"
+    """stereo pairs in one picture: side_by_side = left on the left, stacked = left on top; half = squeezed to half"""
     right: Annotated[Path | None, Option("PATH")] = None
     """right view of a pair: a second video, or a folder of pictures"""
     camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
@@ -39,7 +39,7 @@ class PrepareOptions:
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
     """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; pictures are undistorted"""
     calibration: Annotated[Path | None, Option("FILE")] = None
-    """calibration of one camera or of a pair (is rectified): ini, YAML of OpenCV, ROS or Kalibr, or a matrix K"""
+    """calibration of one camera or of a pair (is rectified): ini, YAML of OpenCV, ROS or Kalibr, .mat, or a matrix K"""
     baseline: float | None = None
     """baseline of an already rectified pair, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
@@ -57,7 +57,7 @@ class PrepareOptions:
     pairing: Literal["auto", "number", "source", "order"] = "auto"
     """how masks and depth belong to frames: by number, by the number in the source of a prepared clip, or in order"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
-    """depth of every frame: png, tiff, npy or pfm"""
+    """depth of every frame: png, tiff, npy, mat or pfm"""
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     """unit of the depth"""
     depth_scale: float = 1.0

@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from endotsr.clips.opencv import write_png
-from endotsr.clips.sequences import calibration_fields
+from endotsr.clips.sequences import calibration_fields, matlab_calibrations
 from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.inventory import Inventory
@@ -190,6 +190,41 @@ INI_CHANGES = {"res_x": 64, "res_y": 48, "fc_x": 33, "fc_y": 33, "cc_x": 16, "cc
     f"kc_{k}": 0.02 for k in range(8)
 } | {f"R_{k}": 0.5 for k in range(9)} | {"T_0": -5, "T_1": 0.2, "T_2": 0.2}  # fmt: skip
 
+
+def write_mat(folder: Path, keys: Keys) -> None:
+    """file.mat with these variables."""
+    from scipy.io import savemat
+
+    savemat(folder / "file.mat", {name: value for name, value in keys.items() if value is not None})
+
+
+def write_mat_cameras(folder: Path, keys: Keys) -> None:
+    """A pair of MATLAB whose cameras have these fields."""
+    both = {name: value for name, value in keys.items() if value is not None}
+    write_mat(folder, MAT_PAIR | {"CameraParameters1": both, "CameraParameters2": both})
+
+
+MAT_CAMERA = {"IntrinsicMatrix": np.array(K).T, "RadialDistortion": [[0.1, 0.01]], "ImageSize": [[HEIGHT, WIDTH]],
+              "TangentialDistortion": [[0.0, 1e-3]], "WorldUnits": "mm"}  # fmt: skip
+OTHER_K = np.array([[33.0, 0, 15], [0, 31, 11], [0, 0, 1]])
+MAT_CAMERA_CHANGES = {"IntrinsicMatrix": OTHER_K.T, "K": OTHER_K, "Intrinsics": {"K": OTHER_K}, "WorldUnits": "m",
+                      "RadialDistortion": [[0.2, 0.01]], "TangentialDistortion": [[1e-3, 0.0]],
+                      "ImageSize": [[2 * HEIGHT, 2 * WIDTH]]}  # fmt: skip
+MAT_PAIR = {"CameraParameters1": MAT_CAMERA, "CameraParameters2": MAT_CAMERA, "RotationOfCamera2": np.eye(3),
+            "TranslationOfCamera2": [[-4.0, 0.0, 0.0]]}  # fmt: skip
+MAT_PAIR_CHANGES = {"CameraParameters1": MAT_CAMERA | {"IntrinsicMatrix": OTHER_K.T},
+                    "CameraParameters2": MAT_CAMERA | {"IntrinsicMatrix": OTHER_K.T},
+                    "RotationOfCamera2": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+                    "TranslationOfCamera2": [[-5.0, 0.0, 0.0]]}  # fmt: skip
+TOOLBOX = {"nx": WIDTH, "ny": HEIGHT, "R": np.eye(3), "T": [[-4.0], [0.0], [0.0]]} | {
+    f"{name}{side}": value for side in ("_left", "_right")
+    for name, value in (("fc", [[30.0], [31.0]]), ("cc", [[15.0], [11.0]]), ("kc", [[0.1], [0], [0], [0], [0]]))
+}  # fmt: skip
+TOOLBOX_CHANGES = {"nx": 64, "ny": 48, "R": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), "T": [[-5.0], [0], [0]]} | {
+    f"{name}{side}": value for side in ("_left", "_right")
+    for name, value in (("fc", [[33.0], [31.0]]), ("cc", [[16.0], [11.0]]), ("kc", [[0.2], [0], [0], [0], [0]]))
+}  # fmt: skip
+
 FORMATS = {
     "nerfstudio": Format(nerfstudio.FIELDS, CAMERA, write_transforms, lambda folder: result(describe(folder)),
                          OTHER | {"frames": [entry(1), entry(2)], "ply_file_path": "cloud.ply"},
@@ -205,5 +240,12 @@ FORMATS = {
                        {"binning_x": 2, "binning_y": 2, "roi": {"x_offset": 8}}),
     "opencv": Format(calibration_fields.OPENCV, PAIR, write_yaml, stated, PAIR_CHANGES,
                      {"fisheye_model": 1, "xi": 0.9, "model": "fisheye", "skew": 0.1}),
+    "matlab": Format(matlab_calibrations.CAMERA, MAT_CAMERA, write_mat_cameras, stated,
+                     MAT_CAMERA_CHANGES,
+                     {"Skew": 0.1, "MappingCoefficients": [[800.0, 0, 0, 0]], "StretchMatrix": [[1.0, 0], [0, 1]],
+                      "DistortionCenter": [[15.0, 11]]}),
+    "matlab pair": Format(matlab_calibrations.PAIR, MAT_PAIR, write_mat, stated, MAT_PAIR_CHANGES, {}),
+    "bouguet": Format(matlab_calibrations.BOUGUET, TOOLBOX, write_mat, stated, TOOLBOX_CHANGES,
+                      {"alpha_c_left": 0.1, "alpha_c_right": 0.1}),
     "ini": Format(calibration_fields.INI, INI, write_ini, stated, INI_CHANGES, {"skew": 0.1}),
 }  # fmt: skip

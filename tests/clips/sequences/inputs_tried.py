@@ -69,11 +69,14 @@ from input_kinds import (
 )
 from left_inputs import LEFT_ROWS
 from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
+from matlab_inputs import MATLAB_ROWS
 from odd_inputs import ODD_ROWS
 from rig_inputs import RIG_ROWS
 from silent_inputs import SILENT_ROWS
+from squeezed_inputs import SQUEEZED_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
+from time_inputs import BESIDE_ROWS, TIME_ROWS
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
@@ -288,6 +291,10 @@ ROWS = [
     *LEFT_ROWS,
     *SILENT_ROWS,
     *RIG_ROWS,
+    *TIME_ROWS,
+    *BESIDE_ROWS,
+    *MATLAB_ROWS,
+    *SQUEEZED_ROWS,
 ]  # fmt: skip
 
 

@@ -448,7 +448,7 @@ PICTURES = [
     Row("pictures, several in a JPEG", folder_of(pictures(4), change=two_in_a_jpeg), "told", "MPF: further pictures"),
     Row("pictures, Adobe RGB by EXIF", folder_of(pictures(4), change=adobe_rgb), "told", "profile other than sRGB"),
     Row("pictures beside masks, depth, times and a calibration", beside("masks/0.png", "depth/0.png", "times.txt",
-        "calib.yaml"), "told", "not read: calib.yaml, depth/, masks/, times.txt; see --masks, --depth, --calibration"),
+        "calib.yaml"), "told", "not read: calib.yaml, depth/, masks/; see --masks, --depth, --calibration"),
     Row("pictures, others of a kind that is not read", folder_of(pictures(), change=of_another_kind), "told",
         "not read: 5 files .jp2"),
     Row("pictures named by their seconds", named_by_seconds, "told", "read as seconds", timed([0, 100, 400, 900])),

@@ -139,3 +139,18 @@ def test_what_is_no_calibration_is_refused(said, tmp_path):
 
 def test_every_format_says_what_it_reads():
     assert len(FORMATS) == 5 and len({entry.about for entry in FORMATS}) == 5
+
+
+def test_a_pair_of_matlab_has_transposed_matrices_and_counts_pixels_from_one(tmp_path):
+    from scipy.io import savemat
+
+    one = {"IntrinsicMatrix": np.array([[100.0, 0, 0], [0, 101, 0], [33, 25, 1]]), "ImageSize": [[48, 64]],
+           "RadialDistortion": [[0.1, 0.2, 0.3]], "TangentialDistortion": [[0.01, 0.02]]}  # fmt: skip
+    pair = {"CameraParameters1": one, "CameraParameters2": one, "RotationOfCamera2": np.array(TURN).T,
+            "TranslationOfCamera2": [[-4.0, 0.1, 0.2]]}  # fmt: skip
+    savemat(tmp_path / "a.mat", pair)
+    found = calibrated(tmp_path / "a.mat", 64, 48).calibration
+    np.testing.assert_allclose(found.rotation, TURN)
+    np.testing.assert_allclose(found.translation, [-4.0, 0.1, 0.2])
+    assert found.left[:4] == (100.0, 101.0, 32.5, 24.5)  # the first pixel has its centre at 0.5 here
+    assert found.left.distortion == (0.1, 0.2, 0.01, 0.02, 0.3)

@@ -66,7 +66,8 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
     patterns = [word for names in found.inventory.used for word in names.split()]
     tried = {*found.changed, *found.base}
     spelled = {"nerfstudio frame": {"camera_angle_x", "camera_angle_y"}, "ros": ALIASES, "ros echo": ALIASES,
-               "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, **REPEATED}.get(name, set())  # fmt: skip
+               "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, "matlab": {"FocalLength", "PrincipalPoint"},
+               "bouguet": {"fc", "cc", "kc"}, **REPEATED}.get(name, set())  # fmt: skip
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
         known = pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried)
@@ -93,7 +94,7 @@ def test_a_file_with_a_new_field_says_so(name, tmp_path):
     assert any("unknown here: lens_shading_map" in note for note in describe(tmp_path).notes)
 
 
-@pytest.mark.parametrize("name", ["kalibr", "ros", "ros echo", "opencv", "ini"])
+@pytest.mark.parametrize("name", ["kalibr", "ros", "ros echo", "opencv", "ini", "matlab pair", "bouguet"])
 def test_a_calibration_with_a_new_field_says_so(name, tmp_path):
     from endotsr.clips.sequences.calibrations import calibrated
 
@@ -119,6 +120,7 @@ def test_a_video_with_a_new_field_says_so(name, old, tmp_path):
         ("kalibr", "T_cn_cnm1"),
         ("opencv", "D2"),
         ("ini", "T_0"),
+        ("matlab pair", "RotationOfCamera2"),
         ("colmap image binary", "TX"),
         ("llff", "R"),
         ("png", "PLTE"),

@@ -29,7 +29,11 @@ PREPARE = (
     Needs(("depth-unit", "depth-scale", "trust-depth"), ("depth",), "it describes the depth of these files"),
     Needs(("points",), ("layout=colmap", "layout=points"), "only a reconstruction has points"),
     Needs(("right",), ("layout=video", "layout=pictures"), "the other layouts have their own right pictures, or none"),
-    Excludes(("right",), ("stereo=side_by_side", "stereo=stacked"), "each picture would hold two views already"),
+    Excludes(
+        ("right",),
+        tuple(f"stereo={half}{way}" for way in ("side_by_side", "stacked") for half in ("", "half_")),
+        "each picture would hold two views already",
+    ),
     Needs(("model",), ("layout=colmap",), "only COLMAP leaves several models"),
     Excludes(
         ("source-rate",),

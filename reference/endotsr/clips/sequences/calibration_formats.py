@@ -259,7 +259,7 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
     """
     size, notes = _opencv_size(keys), ()
     if any(name in keys for names in (*ONE, *PAIRS) for name in names[:1]):
-        notes = (*OPENCV.noted(keys, path), *_four_coefficients(keys, path))
+        notes = (*OPENCV.noted(keys, path), *_four_coefficients(keys, path), *_of_matlab(path))
     for left, left_distortion, right, right_distortion in PAIRS:
         if left in keys and right in keys:
             for name in ("R", "T"):
@@ -291,6 +291,13 @@ def _four_coefficients(keys: Keys, path: Path) -> list[str]:
     if not any(isinstance(value, list) and len(value) == 4 and any(value) for value in values):
         return []
     return [f"{path.name}: 4 coefficients are read as k1 k2 p1 p2; those of a fisheye model, stored alike, are not"]
+
+
+def _of_matlab(path: Path) -> list[str]:
+    """A note on plain matrices in a MAT-file, whose pixel coordinates nothing states."""
+    if path.suffix.lower() != ".mat":
+        return []
+    return [f"{path.name}: its camera matrix is read in OpenCV's coordinates; those of MATLAB's classes are 1 larger"]
 
 
 def _opencv_size(keys: Keys) -> tuple[int, int] | None:

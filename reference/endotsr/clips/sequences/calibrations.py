@@ -11,13 +11,16 @@ import numpy as np
 from endotsr.clips.sequences.calibration_formats import FORMATS as GENERAL
 from endotsr.clips.sequences.calibration_formats import StoredCalibration, StoredIntrinsics
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration, checked_rotation, intrinsics_of_matrix
+from endotsr.clips.sequences.matlab_calibrations import FORMATS as MATLAB
+from endotsr.clips.sequences.matlab_calibrations import matlab_keys
 from endotsr.clips.sequences.slam_calibrations import FORMATS as SLAM
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.storage import read_storage
 from endotsr.untrusted.yaml import read_yaml
 
-FORMATS = (GENERAL[0], *SLAM, *GENERAL[1:])  # in the order in which they are tried
+FORMATS = (GENERAL[0], *SLAM, *MATLAB, *GENERAL[1:])  # in the order in which they are tried
+READERS = {".yaml": read_yaml, ".yml": read_yaml, ".json": read_json, ".xml": read_storage, ".mat": matlab_keys}
 
 
 def read_calibration(path: Path) -> StoredCalibration:
@@ -25,7 +28,7 @@ def read_calibration(path: Path) -> StoredCalibration:
 
     Raises:  InputError naming the file, the key and what is allowed.
     """
-    read = {".yaml": read_yaml, ".yml": read_yaml, ".json": read_json, ".xml": read_storage}.get(path.suffix.lower())
+    read = READERS.get(path.suffix.lower())
     keys = read(path) if read else {}
     for entry in FORMATS:
         found = entry.read(path, keys)
@@ -33,6 +36,9 @@ def read_calibration(path: Path) -> StoredCalibration:
             return found
     known = "; ".join(entry.about for entry in FORMATS)
     raise InputError(f"{path}: no calibration that is known here; allowed: {known}")
+
+
+SAME_SHAPE = 0.02  # relative difference of proportions
 
 
 class StatedCamera(NamedTuple):
@@ -67,11 +73,19 @@ def calibrated(path: Path, width: int, height: int) -> StatedCamera:
     return StatedCamera(calibration=pair, notes=found.notes)
 
 
+def _squeezed(whole: float, found: float) -> str:
+    """The remedy, if pictures have half or twice the proportions of the calibration."""
+    for factor, way in ((2.0, "half_side_by_side"), (0.5, "half_stacked")):
+        if abs(whole / found / factor - 1) < SAME_SHAPE:
+            return f"; if the views of a pair are squeezed to half, --stereo {way} restores them"
+    return ""
+
+
 def fitted_intrinsics(intrinsics: Intrinsics, width: int, height: int, where: object) -> Intrinsics:
     """The intrinsics for pictures of this size. Raises InputError for another aspect ratio."""
     if abs(intrinsics.width * height - intrinsics.height * width) > max(intrinsics.width, width) // 100:
         raise InputError(
             f"{where}: the calibration is of {intrinsics.width}x{intrinsics.height} pixels, the pictures have"
-            f" {width}x{height}"
+            f" {width}x{height}{_squeezed(intrinsics.width / intrinsics.height, width / height)}"
         )
     return intrinsics.scaled(width, height)

@@ -117,11 +117,14 @@ def intrinsics_of_matrix(
 ) -> Intrinsics:
     """The intrinsics of a 3x3 matrix in OpenCV's convention, with pixel centres at integers: half a pixel is added.
 
-    Raises:  InputError for a matrix that is not finite or has skew, and as `checked_intrinsics`.
+    Raises:  InputError for a matrix that is not finite, is transposed or has skew, and as `checked_intrinsics`.
     """
     numbers = np.asarray(matrix, np.float64)
     if numbers.shape != (3, 3) or not np.isfinite(numbers).all():
         raise InputError(f"{where}: camera matrix: allowed: 3x3 finite numbers")
+    if (numbers[2] != (0, 0, 1)).any() or numbers[1, 0] != 0:
+        last = " ".join(f"{value:g}" for value in numbers[2])
+        raise InputError(f"{where}: camera matrix: the last row is {last}; use 0 0 1: is the matrix transposed?")
     if numbers[0, 1] != 0:
         raise InputError(f"{where}: camera matrix: skew {numbers[0, 1]:g}; allowed: 0 (square angles)")
     fx, fy, cx, cy = (

@@ -96,6 +96,7 @@ class Clip:
     faults: list[Finding] = field(default_factory=list)  # missing or unusable parts
     pose_faults: dict[int, str] = field(default_factory=dict)  # why a frame has no pose
     read_here: tuple[str, ...] = ()  # further names in the folder that were read, in lower case
+    not_read: tuple[str, ...] = ()  # notes on entries of the folder that are not read; set for training
 
     @property
     def count(self) -> int:

@@ -19,7 +19,7 @@ from endotsr.untrusted.files import read_bytes
 CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
 LEAST_DEPTH_FRACTION = 0.05  # of a frame; the median of fewer pixels may be an outlier
-DEPTH_ENDINGS = (".png", ".npy", ".npz", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
+DEPTH_ENDINGS = (".png", ".npy", ".npz", ".mat", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
 DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
@@ -40,7 +40,7 @@ def read_plane(path: Path) -> NDArray:
     points = read_points(path)
     if points is not None:
         return np.ascontiguousarray(points[:, :, 2])
-    readers = {".npy": read_npy, ".npz": array_of, ".pfm": read_pfm}
+    readers = {".npy": read_npy, ".npz": array_of, ".mat": array_of, ".pfm": read_pfm}
     array = readers.get(ending, read_picture)(path)
     plane = np.squeeze(array) if ending in readers else grey_plane(array, path)
     hole = no_data(path)

@@ -1,4 +1,4 @@
-"""Depth of a whole clip in one file: an .npz or .npy array (n, H, W), as networks for videos write it.
+"""Depth of a whole clip in one file: an .npz or .npy array (n, H, W), as networks for videos write it; .mat of a frame.
 
 A plane of such a file has the name `FILE/000003`, so that planes are listed, paired and read like files.
 """
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.untrusted.arrays import RefusedArray, open_npz, read_npy
+from endotsr.untrusted.matlab import read_mat
 
 ENDINGS = (".npz", ".npy")
 LARGEST_FILE = 1 << 34  # bytes
+MATLAB = ".mat"  # one frame: MATLAB stores frames last, and others first
 ONE = "allowed: one array of real numbers, (frames, height, width) for a clip or (height, width) for a frame"
 
 
@@ -34,7 +36,7 @@ def plane_of_stack(path: Path) -> NDArray | None:
 
 
 def array_of(path: Path) -> NDArray:
-    """The array of an .npz or .npy file, (n, H, W) or (H, W); axes of length 1 are dropped.
+    """The array of an .npz or .npy file, (n, H, W) or (H, W), or of a .mat file, (H, W); axes of length 1 are dropped.
 
     Raises:  InputError for a file without exactly one such array.
     """
@@ -46,6 +48,8 @@ def array_of(path: Path) -> NDArray:
 def _array(path: Path, changed: int, size: int) -> NDArray:
     if path.suffix.lower() == ".npy":
         arrays = {path.name: read_npy(path, LARGEST_FILE)}
+    elif path.suffix.lower() == MATLAB:
+        arrays = {name: array for name, array in read_mat(path).items() if isinstance(array, np.ndarray)}
     else:
         try:
             with open_npz(path, LARGEST_FILE, compressed=True) as file:
@@ -54,6 +58,8 @@ def _array(path: Path, changed: int, size: int) -> NDArray:
             raise InputError(f"{path}: {error}; {ONE}") from None
     planes = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "fiu"}
     planes = {name: array for name, array in planes.items() if array.ndim in (2, 3) and min(array.shape) > 3}
+    if path.suffix.lower() == MATLAB and any(array.ndim == 3 for array in planes.values()):
+        raise InputError(f"{path}: holds an array of several frames; use one file of (height, width) per frame")
     if len(planes) != 1:
         held = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "nothing"
         raise InputError(f"{path}: holds {held}; {ONE}")

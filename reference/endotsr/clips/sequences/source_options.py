@@ -13,7 +13,7 @@ class SourceOptions:
     """Statements about a source; the defaults state nothing."""
 
     layout: str = "auto"
-    stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
+    stereo: Literal["auto", "none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"] = "auto"
     camera: tuple[float, ...] | None = None  # fx fy cx cy, pixel edges at integers
     distortion: tuple[float, ...] = ()
     calibration: Path | None = None  # a file in one of `calibration_formats.FORMATS`

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.opencv import stretched
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, scene_factor
@@ -29,6 +30,9 @@ from endotsr.untrusted.json import read_json, text
 
 PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
 LARGEST_MARK = 1 << 16  # bytes of this file
+# Pairs whose views are squeezed: how they are arranged, and the factors that restore width and height.
+SQUEEZED = {"half_side_by_side": ("side_by_side", 2, 1), "half_stacked": ("stacked", 1, 2)}
+WIDEST = 2.2  # width over height, above which a view of a stacked pair is probably squeezed
 
 
 def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
@@ -49,11 +53,17 @@ def size_of(files: list[Path]) -> tuple[int, int]:
 def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
     """Left and right of one stored picture: side by side (left half first), stacked (left on top), or none.
 
+    Squeezed views are restored to their width or height.
+
     Raises:  InputError for a picture without two equal halves.
     """
     height, width = picture.shape[:2]
     if stereo == "none":
         return PicturePair(picture)
+    if stereo in SQUEEZED:
+        arrangement, *factors = SQUEEZED[stereo]
+        pair = split_pair(picture, arrangement, where)
+        return PicturePair(*(stretched(view, *factors) for view in pair if view is not None))
     if (width if stereo == "side_by_side" else height) % 2:
         side = "width" if stereo == "side_by_side" else "height"
         raise InputError(f"{where}: {width}x{height} pixels: a {stereo} pair has an even {side}")
@@ -64,7 +74,23 @@ def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
 
 def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
     """The size of one picture of a stored pair."""
+    if stereo in SQUEEZED:
+        arrangement, across, down = SQUEEZED[stereo]
+        width, height = halves(width, height, arrangement)
+        return across * width, down * height
     return (width // 2 if stereo == "side_by_side" else width), (height // 2 if stereo == "stacked" else height)
+
+
+def squeezed_note(width: int, height: int, stereo: str) -> list[str]:
+    """A note on the views of a pair whose shape indicates that they are squeezed to half their width or height."""
+    if stereo == "side_by_side" and width < height:
+        shape, side = "higher than wide", "width"
+    elif stereo == "stacked" and width > WIDEST * height:
+        shape, side = f"{width / height:.3g} times as wide as high", "height"
+    else:
+        return []
+    restored = f"if the views are squeezed to half their {side}, --stereo half_{stereo} restores it"
+    return [f"each view of {width}x{height} pixels is {shape}: {restored}"]
 
 
 def pictures_from_files(
@@ -195,13 +221,14 @@ def stated_poses(
     rate: float | None,
     times: FloatArray | None = None,
     numbers: list[int] | None = None,
+    clock: FloatArray | None = None,
 ) -> tuple[list[CameraPose | None] | None, list[str]]:
     """The poses of `--trajectory`, and a note; (None, []) without it. See `poses_of_frames`. Raises InputError."""
     if options.trajectory is None:
         return None, []
     unit = options.trajectory_unit or "m"
     trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes or "opencv")
-    poses, how = poses_of_frames(trajectory, count, rate, times, numbers)
+    poses, how = poses_of_frames(trajectory, count, rate, times, numbers, clock)
     return poses, ["; ".join([f"{options.trajectory.name}: {how}", f"positions in {unit}", *trajectory.notes])]
 
 

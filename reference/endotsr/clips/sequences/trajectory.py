@@ -75,15 +75,18 @@ def poses_of_frames(
     rate: float | None,
     times: FloatArray | None = None,
     numbers: list[int] | None = None,
+    clock: FloatArray | None = None,
 ) -> tuple[list[CameraPose | None], str]:
     """One pose per frame, None without one, and a sentence on the assignment of stamps to frames.
 
     times     seconds of the frames from the first one; None: evenly spaced at `rate`
     numbers   in the names of the frames
+    clock     seconds of the frames, on a clock that the trajectory may share; None: unknown
 
     Integer stamps that are all numbers of frames belong to these, and so do those of a file that has all of them, where
-    the rate is unknown. Integer stamps below the number of frames are frame numbers. If there are as many poses as
-    frames, they match in order. Other stamps are seconds from the first one, and poses between stamps are interpolated.
+    the rate is unknown. Integer stamps below the number of frames are frame numbers. Stamps within the clock of the
+    frames belong to it. If there are as many poses as frames, they match in order. Other stamps are seconds from the
+    first one. Poses between stamps are interpolated.
 
     Raises:  InputError if the stamps are times and the frame rate is unknown.
     """
@@ -99,6 +102,9 @@ def poses_of_frames(
         for stamp, pose in zip(stamps, trajectory.poses):
             found[int(stamp)] = pose
         return found, "stamps are frame numbers"
+    timed = trajectory.in_seconds()
+    if clock is not None and rate and _overlap(timed.stamps, clock):
+        return poses_at(timed, clock, 1.0 / rate), f"stamps are {trajectory.tick[1]} on the clock of the pictures"
     if len(stamps) == count:
         return list(trajectory.poses), "one pose per frame, in order"
     if rate is None:
@@ -106,10 +112,14 @@ def poses_of_frames(
             f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose per frame, frame"
             " numbers as stamps, or a known frame rate"
         )
-    timed = trajectory.in_seconds()
     wanted = timed.stamps[0] + (np.arange(count) / rate if times is None else times)
     how = f"stamps are {trajectory.tick[1]}; frames at {rate:g} Hz from the first one"
     return poses_at(timed, wanted, 1.0 / rate), how
+
+
+def _overlap(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two ascending series have times in common."""
+    return bool(a[0] <= b[-1] and b[0] <= a[-1])
 
 
 def _by_numbers(

@@ -10,12 +10,13 @@ from typing import Any, Literal, NamedTuple
 
 from endotsr.errors import InputError
 
-Stereo = Literal["none", "side_by_side", "stacked"]
+Stereo = Literal["none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"]
 # Numbers of FFmpeg for the arrangement of a pair.
 ARRANGED: dict[int, Stereo] = {1: "side_by_side", 2: "stacked"}
 OTHERS = {3: "alternating pictures", 4: "a checkerboard", 5: "side by side in a quincunx", 6: "alternating rows",
           7: "alternating columns"}  # fmt: skip
 RIGHT_FIRST = 1  # flag
+SAME_SHAPE = 0.02  # relative difference of the shape of a pixel from that of a squeezed view
 SPLIT = "use a file with both views side by side or stacked, or with one; --stereo none reads the pictures as one view"
 
 
@@ -44,10 +45,19 @@ def view_marks(frame: Any, path: Path) -> ViewMarks:
     return found
 
 
-def chosen_views(marks: ViewMarks, stated: str, path: Path) -> tuple[Stereo, bool, list[str]]:
+def squeezed(stereo: Stereo, shape: float) -> Stereo:
+    """The arrangement with `half_`, if the shape of a pixel (width over height) shows that the views are squeezed."""
+    for way, value, half in (("side_by_side", 2.0, "half_side_by_side"), ("stacked", 0.5, "half_stacked")):
+        if stereo == way and abs(shape / value - 1) < SAME_SHAPE:
+            return half  # type: ignore[return-value]
+    return stereo
+
+
+def chosen_views(marks: ViewMarks, stated: str, path: Path, shape: float = 1.0) -> tuple[Stereo, bool, list[str]]:
     """How the pictures are divided, whether the right view comes first, and notes.
 
     stated   --stereo: auto follows the mark
+    shape    of a pixel, width over height, as the file states it
 
     Raises:  InputError for a marked arrangement that cannot be separated, unless a way is stated.
     """
@@ -57,10 +67,15 @@ def chosen_views(marks: ViewMarks, stated: str, path: Path) -> tuple[Stereo, boo
         if marks.stereo == "none":
             return "none", False, []
         order = ", the right view first" if marks.right_first else ""
-        words = f"{path.name} states stereo pairs {marks.stereo.replace('_', ' ')}{order}: read as such"
-        return marks.stereo, marks.right_first, [f"{words}; --stereo none reads one view"]
+        found = squeezed(marks.stereo, shape)
+        half = (
+            "" if found == marks.stereo else f", squeezed to half: restored; --stereo {marks.stereo} keeps the pixels"
+        )
+        words = f"{path.name} states stereo pairs {marks.stereo.replace('_', ' ')}{order}{half}: read as such"
+        return found, marks.right_first, [f"{words}; --stereo none reads one view"]
     chosen: Stereo = stated  # type: ignore[assignment]
-    if chosen != marks.stereo and (marks.stereo != "none" or marks.other):
+    way = chosen.removeprefix("half_")
+    if way != marks.stereo and (marks.stereo != "none" or marks.other):
         said = marks.other or marks.stereo.replace("_", " ")
         return chosen, False, [f"{path.name} states stereo pairs, {said}: --stereo {stated} overrides it"]
-    return chosen, marks.right_first and chosen == marks.stereo, []
+    return chosen, marks.right_first and way == marks.stereo, []

@@ -143,7 +143,7 @@ def _origin(clip: Clip) -> str:
 
 def _stated(clip: Clip) -> list[Finding]:
     """Findings on what the files of a clip state."""
-    found, where = [], clip.stated_in
+    found, where = [finding("not-read", clip.where, said) for said in clip.not_read], clip.stated_in
     broken = {fault.code for fault in clip.faults}
     if clip.depth is None and not broken & {"depth-files", "sequence-file"}:
         found.append(finding("no-depth", where, "[depth] is missing"))

@@ -35,6 +35,8 @@ KINDS: dict[str, Kind] = {
     "frames": Kind("refusal", REFUSED, "more frames, or another split"),
     "number-gap": Kind("warning", "frames count as evenly spaced in time",
                        "supply the missing frames, or cut the clip there"),
+    "not-read": Kind("note", "training knows nothing of it",
+                     "none needed for files of other programs; endotsr prepare has options that read such files"),
     "uneven-times": Kind("note", "training uses the times in sequence.toml", "none needed"),
     # pictures
     "picture": Kind("refusal", REFUSED, f"copy or export the file again, or {LEAVE_OUT}"),

@@ -99,7 +99,9 @@ def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
 
 
 def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
-    """The clip of a folder that training reads directly, with its faults. A path in no known layout counts as EndoNeRF.
+    """The clip of a folder that training reads directly, with its faults and what it does not read.
+
+    A path in no known layout counts as EndoNeRF.
 
     Raises:  InputError for a layout that needs `endotsr prepare`, and for a folder that cannot be described at all.
     """
@@ -109,4 +111,5 @@ def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
         found = layout_of(path, "endonerf")  # its messages name the missing parts
     if not found.direct:
         raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` converts it")
-    return found.describe(path, SourceOptions(settings=config))
+    clip = found.describe(path, SourceOptions(settings=config))
+    return replace(clip, not_read=tuple(unread(path, (*found.reads, *clip.read_here), NOTHING, found.takes)))

@@ -61,6 +61,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         size_said=STATES,
         faults=folder.faults,
         pose_faults=pose_faults,
+        read_here=tuple(entry.folder.lower() for entry in (found.masks, found.depth) if entry is not None),
     )
     return with_stated(clip, options)
 
@@ -105,6 +106,6 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_common,
     direct=True,
-    reads=("*",),
+    reads=(FILE_NAME, IMAGES, RIGHT, "proposed_masks.png", "transforms.json", "sparse", "masks_kept", "truth"),
     takes=("masks", "depth"),
 )

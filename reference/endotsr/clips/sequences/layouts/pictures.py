@@ -1,8 +1,8 @@
 """A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one per frame, alone or as stereo pairs.
 
 A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
-or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo clip. All other properties
-are stated on the command line.
+or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo clip. A list of times beside
+the pictures states their times. All other properties are stated on the command line.
 """
 
 import re
@@ -23,17 +23,19 @@ from endotsr.clips.sequences.sources import (
     halves,
     pictures_from_files,
     size_of,
+    squeezed_note,
     stated_camera,
     stated_depth,
     stated_masks,
     stated_poses,
     unit_of,
 )
+from endotsr.clips.sequences.time_lists import PictureTimes, picture_times
 from endotsr.errors import InputError
 
 PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
          ("left_frames", "right_frames"), ("left_rectified", "right_rectified"),
-         ("Left", "Right"), ("cam0", "cam1"), ("image01", "image02"))  # fmt: skip
+         ("image_2", "image_3"), ("Left", "Right"), ("cam0", "cam1"), ("image01", "image02"))  # fmt: skip
 SIDE = re.compile(r"(?:^|[-_. ])(left|right|l|r)(?:[-_. ]|$)|(?<=\d)(l|r)$", re.IGNORECASE)  # in the stem of a name
 
 
@@ -86,13 +88,26 @@ def _numbers(files: list[Path]) -> list[int] | None:
     return None if found is None or len(found[0]) != 1 else [number for (number,) in found]
 
 
-def _named_times(files: list[Path]) -> tuple[float | None, NDArray[np.float64] | None]:
-    """Rate and seconds of pictures whose names are seconds with decimals, as in TUM; None for other names."""
+def _named_times(files: list[Path]) -> NDArray[np.float64] | None:
+    """Seconds of pictures whose names are seconds with decimals, as in TUM; None for other names."""
     if len(files) < 2 or not all(re.fullmatch(r"\d+\.\d+", file.stem) for file in files):
-        return None, None
+        return None
     times = np.array([float(file.stem) for file in files], np.float64)
-    steps = np.diff(times)
-    return (float(1 / np.median(steps)), times - times[0]) if (steps > 0).all() else (None, None)
+    return times if (np.diff(times) > 0).all() else None
+
+
+def _clock(path: Path, files: list[Path], rate: float | None) -> tuple[NDArray[np.float64] | None, PictureTimes]:
+    """Seconds of the pictures on a clock of their own: those of a list beside them, or of their names; and the lists.
+
+    rate   stated frame rate, which overrides both
+    """
+    folders = [folder for folder in (path, files[0].parent) if folder.is_dir()]
+    listed = picture_times(folders if path.is_dir() else [], files, rate)
+    named = _named_times(files) if rate is None and listed.seconds is None else None
+    if named is None:
+        return listed.seconds, listed
+    said = f"names of the pictures are read as seconds, {named[-1] - named[0]:g} s in all; --source-rate overrides them"
+    return named, listed._replace(notes=(*listed.notes, said))
 
 
 def describe_pictures(path: Path, options: SourceOptions) -> Clip:
@@ -108,11 +123,11 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
     width, height = halves(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
-    gaps = [found.line for found in gap_findings(left)]
-    rate, times = _named_times(left) if options.rate is None else (options.rate, None)
-    if times is not None:
-        gaps.append(f"names of the pictures are read as seconds, {times[-1]:g} s in all; --source-rate overrides them")
-    poses, notes = stated_poses(options, len(left), rate, times, _numbers(left))
+    gaps = [found.line for found in gap_findings(left)] + squeezed_note(width, height, stereo)
+    clock, lists = _clock(path, left, options.rate)
+    times = None if clock is None else clock - clock[0]
+    rate = options.rate if clock is None else float(1 / np.median(np.diff(clock)))
+    poses, notes = stated_poses(options, len(left), rate, times, _numbers(left), clock)
     return Clip(
         layout="pictures",
         where=path,
@@ -130,8 +145,9 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         read_here=tuple(
             {file.parent.name.lower() for file in [*left, *right] if file.parent != path}
             | {file.name.lower() for file in [*left, *right] if file.parent == path}
+            | set(lists.files)
         ),
-        notes=[*picture_notes([*left, *right]), *gaps, *camera.notes, *notes],
+        notes=[*picture_notes([*left, *right]), *gaps, *lists.notes, *camera.notes, *notes],
     )
 
 

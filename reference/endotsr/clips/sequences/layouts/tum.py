@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.clips.sequences.camera import Intrinsics
-from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.clip import Clip, Depth
+from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -23,7 +25,7 @@ from endotsr.clips.sequences.sources import (
     stated_depth,
     stated_masks,
 )
-from endotsr.clips.sequences.trajectory import poses_at, read_trajectory
+from endotsr.clips.sequences.trajectory import TICKS, poses_at, read_trajectory
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
@@ -47,7 +49,10 @@ def recognises(path: Path) -> bool:
 
 
 def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
-    """Times and files of a list, in time order. Raises InputError naming the line."""
+    """Seconds and files of a list, in time order; stamps of other programs may be nanoseconds, as in trajectories.
+
+    Raises:  InputError naming the line.
+    """
     times, files = [], []
     for number, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split(maxsplit=1)
@@ -64,15 +69,36 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
     if not times:
         raise InputError(f"{path}: names no picture")
     order = np.argsort(times, kind="stable")
-    return np.array(times)[order], [files[i] for i in order]
+    stamps = np.array(times)[order]
+    step = next(step for least, step, _ in TICKS if stamps[0] >= least)
+    return stamps * step, [files[i] for i in order]
+
+
+def _unlisted(path: Path, files: list[Path]) -> list[str]:
+    """A note on pictures in the folders of a list that it does not name."""
+    stored = {file for folder in {file.parent for file in files} if folder.is_dir() for file in folder.iterdir()}
+    found = sorted(file.name for file in stored - set(files) if file.suffix.lower() in PICTURE_ENDINGS)
+    return [f"{path.name}: without a line in {LIST}, left out: {shortened(found)}"] if found else []
+
+
+def _listed_depth(path: Path, times: np.ndarray) -> Depth | None:
+    """The depth of `depth.txt` nearest in time to each picture; None without the file."""
+    if not (path / DEPTH_LIST).is_file():
+        return None
+    stamps, planes = read_list(path / DEPTH_LIST)
+    nearest = np.abs(stamps[None, :] - times[:, None]).argmin(axis=1)
+    paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
+    return depth_of(paired, STEP)
 
 
 def describe_tum(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
+    notes = _unlisted(path, files)
     width, height = size_of(files)
     intrinsics = stated_camera(options, width, height, path).intrinsics
-    notes, given = picture_notes(files), [path / name for name in TRAJECTORIES if (path / name).is_file()]
+    notes += picture_notes(files)
+    given = [path / name for name in TRAJECTORIES if (path / name).is_file()]
     settings = next((file for file in sorted(path.glob("*.yaml")) if SETTINGS in read_text(file)), None)
     if intrinsics is None and settings is not None:
         intrinsics = calibrated(settings, width, height).intrinsics
@@ -80,12 +106,6 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     if intrinsics is None and (width, height) == (640, 480):
         intrinsics = Intrinsics(*DEFAULT, width, height)
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")
-    depth = None
-    if (path / DEPTH_LIST).is_file():
-        stamps, planes = read_list(path / DEPTH_LIST)
-        nearest = np.abs(stamps[None, :] - times[:, None]).argmin(axis=1)
-        paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
-        depth = depth_of(paired, STEP)
     poses: list[CameraPose | None] | None = None
     where = options.trajectory or next(iter(given), None)
     if where is not None:
@@ -99,7 +119,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         names=[file.stem for file in files],
         pictures=pictures_from_files(files, []),
         masks=stated_masks(options, files, width, height),
-        depth=stated_depth(options, files) or depth,
+        depth=stated_depth(options, files) or _listed_depth(path, times),
         unit="mm",
         intrinsics=intrinsics,
         poses=poses,

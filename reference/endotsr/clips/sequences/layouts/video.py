@@ -4,6 +4,7 @@ A folder with two videos whose names state their sides, such as left.mp4 and rig
 """
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import repeat
 from pathlib import Path
 
@@ -15,8 +16,10 @@ from endotsr.clips.sequences.layouts import STATEMENTS, Layout
 from endotsr.clips.sequences.layouts.pictures import SIDE
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
+    SQUEEZED,
     halves,
     split_pair,
+    squeezed_note,
     stated_camera,
     stated_depth,
     stated_masks,
@@ -48,30 +51,25 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
-    stereo, right_first, views = chosen_views(facts.views, "none" if right else options.stereo, path)
+    stereo, right_first, views = chosen_views(facts.views, "none" if right else options.stereo, path, facts.pixel_shape)
     width, height = halves(across, down, stereo)
     if right is not None:
         _check_right(facts, video_facts(right), path, right)
     rate, times = _clock(facts, options, path)
     camera = stated_camera(options, width, height, path)
-    notes = _notes(facts, rate, path) + views + _turn_notes(facts, quarters, options, path)
+    notes = (
+        _notes(facts, rate, path, stereo)
+        + views
+        + squeezed_note(width, height, stereo)
+        + _turn_notes(facts, quarters, options, path)
+    )
     poses, note = stated_poses(options, facts.count, rate, times)
-
-    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
-        others = video_pictures(right, wanted) if right else repeat(None)
-        for i, picture, other in zip(wanted, video_pictures(path, wanted), others):
-            turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
-            if other is None:
-                pair = split_pair(turned, stereo, f"{path}: picture {i}")
-                yield PicturePair(pair.right, pair.left) if right_first and pair.right is not None else pair
-            else:
-                yield PicturePair(turned, np.ascontiguousarray(np.rot90(other, quarters)))
 
     return Clip(
         layout="video",
         where=path,
         names=[f"{i:06d}" for i in range(facts.count)],
-        pictures=pictures,
+        pictures=partial(_pictures, path, right, quarters, stereo, right_first),
         masks=stated_masks(options, facts.count, width, height),
         depth=stated_depth(options, facts.count),
         unit=unit_of(options, "m"),
@@ -83,6 +81,20 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         times=times,
         notes=[*notes, *camera.notes, *note],
     )
+
+
+def _pictures(
+    path: Path, right: Path | None, quarters: int, stereo: str, right_first: bool, wanted: list[int]
+) -> Iterator[PicturePair]:
+    """The pictures of these frames, turned and divided, or with those of a second video."""
+    others = video_pictures(right, wanted) if right else repeat(None)
+    for i, picture, other in zip(wanted, video_pictures(path, wanted), others):
+        turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
+        if other is None:
+            pair = split_pair(turned, stereo, f"{path}: picture {i}")
+            yield PicturePair(pair.right, pair.left) if right_first and pair.right is not None else pair
+        else:
+            yield PicturePair(turned, np.ascontiguousarray(np.rot90(other, quarters)))
 
 
 def _check_right(left: VideoFacts, right: VideoFacts, path: Path, other: Path) -> None:
@@ -138,15 +150,17 @@ def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int
     return facts.turn // 90 if options.orientation == "turned" else 0
 
 
-def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
+def _notes(facts: VideoFacts, rate: float | None, path: Path, stereo: str) -> list[str]:
     found = [
         f"{path.name}: {facts.count} pictures of {facts.width}x{facts.height}, {facts.codec}, {rate or 0:g} a second"
     ]
     found += [f"{path.name}: {remark}" for remark in facts.remarks]
     if facts.interlaced:
         found.append(f"{path.name} is interlaced: deinterlaced to one picture per two fields (bwdif)")
-    if facts.pixel_shape != 1:
-        found.append(f"{path.name}: pixels are {facts.pixel_shape:.4g} times as wide as high, as are fx and fy")
+    _, across, down = SQUEEZED.get(stereo, (stereo, 1, 1))
+    shape = facts.pixel_shape * down / across
+    if abs(shape - 1) > 1e-6:
+        found.append(f"{path.name}: pixels are {shape:.4g} times as wide as high, as are fx and fy")
     if facts.clock.remark:
         found.append(f"{path.name}: {facts.clock.remark}")
     elif facts.clock.times is None:

@@ -1,0 +1,174 @@
+"""Rows of `inputs_tried.py` about lists of times beside pictures, as recorders and other programs write them."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+import raw_sources
+from common_folder import written
+from input_kinds import Row, files, folder_of, prepare, timed
+from left_inputs import lens_of, matrices
+from made_videos import pictures
+from rig_inputs import STEP, true_rig
+from silent_inputs import quaternions
+
+from endotsr.clips.opencv import write_png
+from endotsr.clips.sequences.sequence_file import read_sequence_file
+
+UNEVEN = [0, 40, 80, 160, 200, 240, 280, 320, 360, 400, 440, 480]  # milliseconds of twelve pictures; one is missing
+EPOCH = 1403636579.763555584
+
+
+def listed(text: str, *words: str, name: str = "timestamps.txt"):
+    """A folder of twelve pictures, and a list beside them."""
+
+    def change(folder: Path) -> None:
+        (folder / "clip" / name).write_bytes(text.encode())
+
+    return folder_of(pictures(), *words, change=change)
+
+
+def lines(of, separator: str = "\n") -> str:
+    return separator.join(of(k, ms) for k, ms in enumerate(UNEVEN)) + separator
+
+
+def kitti(folder: Path) -> list[str]:
+    """A sequence of KITTI in colour: image_2/, image_3/ and times.txt."""
+    (folder / "clip").mkdir()
+    for name in ("image_2", "image_3"):
+        files(folder / "clip", name, pictures())
+    (folder / "clip/times.txt").write_text(lines(lambda k, ms: f"{ms / 1e3:e}"))
+    return prepare("clip", "--baseline", "4")(folder)
+
+
+def two_lists(folder: Path) -> list[str]:
+    words = listed(lines(lambda k, ms: f"{ms / 1e3:.3f}"), name="times.txt")(folder)
+    (folder / "clip/timestamps_imu.csv").write_text("0.0\n0.1\n0.2\n")
+    return words
+
+
+def is_even(folder: Path) -> bool:
+    found = read_sequence_file(folder / "o")
+    return found.times is None and found.frame_rate == 0
+
+
+def later_path(folder: Path, begin: int) -> np.ndarray:
+    """Lines of a trajectory of TUM on the clock of the pictures, which begins with picture `begin`."""
+    found = matrices(folder)[begin:]
+    ticks = np.repeat(np.arange(len(found)) + begin, 4) + np.tile(np.arange(4) / 4, len(found))
+    rows = np.column_stack([found[:, :, 3] / 1e3, quaternions(found)])
+    return np.column_stack([EPOCH + STEP / 1e9 * ticks, np.repeat(rows, 4, axis=0)])
+
+
+def on_one_clock(by_names: bool):
+    """Pictures with their times, in a list or as their names, and a trajectory that begins with the fourth."""
+
+    def make(folder: Path) -> list[str]:
+        np.savetxt(folder / "path.txt", later_path(folder, 3), fmt="%.9f")
+        images = sorted((folder / "clip/images").iterdir())
+        times = [f"{EPOCH + STEP / 1e9 * k:.6f}" for k in range(len(images))]
+        if by_names:
+            for file, time in zip(images, times):
+                file.rename(file.with_name(f"{time}.png"))
+        else:
+            (folder / "clip/images/timestamps.txt").write_text("\n".join(times) + "\n")
+        lens = ("--camera", *map(str, lens_of(folder / "clip")))
+        words = ("--trajectory", str(folder / "path.txt"), "--gaps", "drop")
+        return prepare("clip/images", *words, camera=lens)(folder)
+
+    return make
+
+
+def tum(change=lambda raw: None):
+    def make(folder: Path) -> list[str]:
+        raw_sources.tum(folder / "raw")
+        change(folder / "raw")
+        return prepare("raw", camera=("--camera", "60", "60", "32", "24"))(folder)
+
+    return make
+
+
+def tum_in_nanoseconds(raw: Path) -> None:
+    for name in ("rgb.txt", "depth.txt", "groundtruth.txt"):
+        rows = [line.split() for line in (raw / name).read_text().splitlines() if not line.startswith("#")]
+        stamped = [" ".join([str(round((1.4e9 + float(row[0])) * 1e9)), *row[1:]]) for row in rows]
+        (raw / name).write_text("\n".join(stamped))
+
+
+def one_more(raw: Path) -> None:
+    write_png(raw / "rgb/99.png", raw_sources.scene_picture(9))
+
+
+def tum_kept(folder: Path) -> bool:
+    found = read_sequence_file(folder / "o")
+    return found.frames == 5 and np.isclose(found.frame_rate, 25, atol=0.01) and found.poses is not None
+
+
+def in_training(command: str, *names: str, change=None):
+    """A folder in the common format with further entries, looked at before a training."""
+
+    def make(folder: Path) -> list[str]:
+        written(folder / "clip", **({} if change is None else change))
+        for name in names:
+            (folder / "clip" / name).parent.mkdir(exist_ok=True)
+            (folder / "clip" / name).write_text("1")
+        return [command, str(folder / "clip")]
+
+    return make
+
+
+IN_NANOSECONDS = "#timestamp [ns]\r\n" + lines(lambda k, ms: f"{1403636579763555584 + ms * 10**6}", "\r\n")
+NAMED = "filename,timestamp\n" + lines(lambda k, ms: f"clip\\{k:04d}.png,{EPOCH + ms / 1e3:.6f}")
+TIME_ROWS = [
+    Row("times, times.txt of KITTI", kitti, "told", "times.txt: times of the pictures in seconds, 0.48 s in all",
+        timed(UNEVEN)),
+    Row("times, nanoseconds by the head line", listed(IN_NANOSECONDS), "told", "times of the pictures in nanoseconds",
+        timed(UNEVEN)),
+    Row("times, milliseconds, not stated", listed(lines(lambda k, ms: str(ms))), "told", "pictures in milliseconds",
+        timed(UNEVEN)),
+    Row("times, microseconds of a running clock", listed(lines(lambda k, ms: str(5400_000_000 + ms * 1000))), "told",
+        "pictures in microseconds", timed(UNEVEN)),
+    Row("times, seconds from 1970, one picture in ten seconds", listed(lines(lambda k, ms: str(1.4e9 + ms / 4))),
+        "told", "pictures in seconds, 120 s in all", timed([250 * ms for ms in UNEVEN])),
+    Row("times, dates", listed(lines(lambda k, ms: f"2011-09-26 13:02:25.{100 + ms:03d}389445")), "told",
+        "pictures in seconds", timed(UNEVEN)),
+    Row("times by the names of the pictures, in another order", listed("\n".join(
+        [*reversed(NAMED.splitlines()[1:]), "clip\\9999.png,1403636599.0"]), name="timestamps.csv"), "told",
+        "1 lines name no picture", timed(UNEVEN)),
+    Row("times, frame numbers and times", listed(lines(lambda k, ms: f"{k} {ms / 1e3:.3f}")), "told",
+        "pictures in seconds", timed(UNEVEN)),
+    Row("times, the head line names a column among three", listed("sec,exposure,gain\n" + lines(
+        lambda k, ms: f"{ms / 1e3:.3f},{20 + k % 3}.5,{k % 5}"), name="timestamps.csv"), "told", "pictures in seconds",
+        timed(UNEVEN)),
+    Row("times, a line fewer than pictures", listed("\n".join(lines(lambda k, ms: str(ms)).split()[:-1])), "told",
+        "not used as times of the pictures: 11 lines for 12 pictures", is_even),
+    Row("times, a picture without a line", listed("\n".join(NAMED.splitlines()[:-1])), "told",
+        "it has no line for 0011.png", is_even),
+    Row("times, numbers of frames", listed(lines(lambda k, ms: str(k))), "told", "it counts frames", is_even),
+    Row("times that go back", listed(lines(lambda k, ms: str(ms % 300))), "told", "its times do not ascend", is_even),
+    Row("times of no camera", listed(lines(lambda k, ms: f"{k * 1e-4:.4f}")), "told", "pictures a second, if its",
+        is_even),
+    Row("times, several columns without a head line", listed(lines(lambda k, ms: f"{ms} {ms + 1} 7")), "told",
+        "it has 3 columns", is_even),
+    Row("times, no numbers", listed("to be written\n"), "told", "it holds no number", is_even),
+    Row("times and --source-rate", listed(lines(lambda k, ms: str(ms)), "--source-rate", "25"), "told",
+        "--source-rate overrides it", lambda folder: read_sequence_file(folder / "o").frame_rate == 25),
+    Row("times, two lists", two_lists, "told", "timestamps_imu.csv: not used as times of the pictures: another list",
+        timed(UNEVEN)),
+    Row("times and a trajectory that begins later", on_one_clock(by_names=False), "told",
+        "on the clock of the pictures", lambda folder: true_rig(folder, slice(3, None))),
+    Row("names in seconds and a trajectory that begins later", on_one_clock(by_names=True), "told",
+        "on the clock of the pictures", lambda folder: true_rig(folder, slice(3, None))),
+    Row("TUM in nanoseconds", tum(tum_in_nanoseconds), "right", "", tum_kept),
+    Row("TUM, a picture without a line", tum(one_more), "told", "without a line in rgb.txt, left out: 99.png",
+        tum_kept),
+]  # fmt: skip
+BESIDE_ROWS = [
+    Row("common format, further files, check", in_training("check", "times.txt", "gt_masks/0.png"), "told",
+        "not read: gt_masks/, times.txt"),
+    Row("common format, masks that sequence.toml does not state, check", in_training("check", "masks/0.png",
+        change={"masks": False}), "told", "not read: masks/"),
+    Row("common format, further files, inspect", in_training("inspect", "times.txt"), "told", "not read: times.txt"),
+]  # fmt: skip
