@@ -16,7 +16,7 @@ copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this s
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 # Those of docs/_extensions.
 extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]
-extensions += ["notebook_cells", "unbroken_units", "demo_run"]
+extensions += ["notebook_cells", "unbroken_units", "demo_run", "live_chapters"]
 exclude_patterns = ["_build", "_extensions", "conf.py", "make.py", "pages/**", "results/**.py"]  # makers of other pages
 exclude_patterns += ["notebooks/running_clip/**"]  # a module of the chapters, no page
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}

@@ -1,14 +1,15 @@
 """One page of the book as HTML, without the others: python docs/make.py book.preview PAGE [FOLDER]
 
-    python docs/make.py book.preview b06_masked_l1     a page of text, about five seconds
-    python docs/make.py book.preview 01_dictionary     a chapter, executed at the small size
+    python docs/make.py book.preview b06_masked_l1          a page of text, about five seconds
+    python docs/make.py book.preview 02_colour_residual     a chapter, executed at the small size
 
 PAGE is the name of a page of `docs` or of a notebook, or its path.
 
 The page has the style, the formulas and the figures of the book. Links to other pages and to the API stay plain text.
-FOLDER is docs/_build/preview by default.
+FOLDER is docs/_build/preview by default. With ENDOTSR_DOCS_EXECUTE=0 a chapter is shown without its outputs.
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -65,7 +66,7 @@ def main(words: list[str]) -> None:
         left_out=LEFT_OUT,
         page=relative.as_posix(),
         name=relative.with_suffix("").as_posix(),
-        mode="force" if page.suffix == ".py" else "off",
+        mode="force" if page.suffix == ".py" and os.environ.get("ENDOTSR_DOCS_EXECUTE") != "0" else "off",
     )
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "conf.py").write_text(text, encoding="utf-8")

@@ -48,8 +48,8 @@ class Remote:
         self._in, self._out, self._rest, self._id, self._session = from_test, to_test, b"", 0, ""
         self._target = ""
 
-    def open(self, page: Path, downloads: Path, width: int = 1400, height: int = 900) -> "Remote":
-        """Show a page instead of the one before, which is not asked whether it may be closed."""
+    def open(self, page: Path, downloads: Path, width: int = 1400, height: int = 900, images: int = 1) -> "Remote":
+        """Show a page with so many images instead of the one before, which is not asked whether it may be closed."""
         old, self._session = self._target, ""
         self._target = self._send("Target.createTarget", url="about:blank")["targetId"]
         if old:
@@ -58,8 +58,13 @@ class Remote:
         self._send("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(downloads))
         self.size(width, height)
         self._send("Page.navigate", url=page.as_uri())
-        self.until("document.readyState === 'complete' && document.images.length > 0")
+        self.until(f"document.readyState === 'complete' && document.images.length >= {images}")
         return self
+
+    @property
+    def process(self) -> int:
+        """The number of the process of the browser."""
+        return self._process.pid
 
     def __enter__(self) -> "Remote":
         return self

@@ -1,0 +1,136 @@
+"""Chapters in the page: cells, size and seconds of each, in a browser.
+
+    python docs/make.py live measure FOLDER [CHAPTER ...]   open these chapters, or all, in a headless browser with the
+                                                            filled FOLDER, and keep the stored rows of the others
+    python docs/make.py live                                rewrite the table in notebooks/index.md
+
+The record is docs/results/live.json. Processor time is that of all processes of the browser.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.results.report.tables import markdown
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import machine
+from pages.live.bundle import CHAPTERS, cells, files, formulas
+from pages.live.supply import supply
+from pages.store.marks import read_json, write_marked
+
+ROOT = Path(__file__).parents[3]
+PAGE, FILE = ROOT / "notebooks" / "index.md", ROOT / "docs" / "results" / "live.json"
+COMMAND = "python docs/make.py live measure FOLDER"
+LONGEST = 900.0  # seconds for one chapter
+STATUS = "document.querySelector('.live-bar [role=status]').textContent"
+OUTPUTS = "[...document.querySelectorAll('.live-row span')].map((word) => word.textContent)"
+
+
+def opened(chapter: str, folder: Path, scratch: Path) -> dict[str, Any]:
+    """Build the page of a chapter with the folder of Pyodide, press the button, and wait for the last cell.
+
+    Raises: InputError if the page cannot be built, or the chapter does not end.
+    """
+    environment = os.environ | {"ENDOTSR_DOCS_EXECUTE": "0"}
+    words = [sys.executable, "docs/make.py", "book.preview", f"notebooks/{chapter}.py", str(scratch / "book")]
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
+    if done.returncode:
+        raise InputError(f"{chapter}: the page cannot be built: {done.stderr[-500:]}")
+    shutil.copytree(folder, scratch / "book" / "_static" / "pyodide", dirs_exist_ok=True)
+    return pressed(scratch / "book" / "notebooks" / f"{chapter}.html", scratch)
+
+
+def pressed(page: Path, scratch: Path) -> dict[str, Any]:
+    """Press the button of a page. Returns: seconds to the first and to the last cell, and the cells that passed."""
+    sys.path.insert(0, str(ROOT / "tests" / "results" / "views"))
+    from remote import Remote  # type: ignore[import-not-found]
+
+    with Remote(scratch / "profile") as remote:
+        remote.open(page, scratch, images=0)
+        before, began, found = processor_seconds(remote.process), time.monotonic(), {}
+        remote.value("document.querySelector('.live-bar button').click()")
+        while "last" not in found:
+            spent = {
+                "seconds": time.monotonic() - began,
+                "processor_seconds": processor_seconds(remote.process) - before,
+            }
+            status, verdicts = remote.value(STATUS), remote.value(OUTPUTS)
+            if "first" not in found and {"passed", "failed"} & {*verdicts}:
+                found["first"] = spent
+            if "cells ran" in status:
+                found["last"] = spent
+            if "does not run" in status or spent["seconds"] > LONGEST:
+                raise InputError(f"{page.name}: {status}")
+            time.sleep(0.1)
+        passed = sum(verdict == "passed" for verdict in remote.value(OUTPUTS))
+    return found | {"passed": passed, "load": os.getloadavg()[0]}
+
+
+def processor_seconds(process: int) -> float:
+    """Processor time of a process and of those that it has started and that still run."""
+    import psutil
+
+    total, parent = 0.0, psutil.Process(process)
+    for one in (parent, *parent.children(recursive=True)):
+        try:
+            times = one.cpu_times()
+        except psutil.NoSuchProcess:
+            continue
+        total += times.user + times.system
+    return total
+
+
+def measured(folder: Path, chapters: list[str]) -> dict[str, Any]:
+    """The record, with new rows for these chapters.
+
+    Raises: InputError for a name that is no chapter that runs.
+    """
+    if wrong := sorted({*chapters} - {*CHAPTERS}):
+        raise InputError(f"{', '.join(wrong)}: runs in no page; allowed: {', '.join(CHAPTERS)}")
+    found = read_json(FILE, COMMAND)["chapters"] if chapters else {}
+    for name in chapters or CHAPTERS:
+        with tempfile.TemporaryDirectory() as scratch:
+            row = opened(name, folder, Path(scratch))
+        row |= {"cells": len(cells(name)), "formulas": len(formulas(name))}
+        found[name] = row | {"bytes": supply().size + sum(map(len, files(name).values()))}
+        print(f"{name}: {row['passed']} of {row['cells']} cells, {row['last']['seconds']:.0f} s", flush=True)
+    return {"date": date.today().isoformat(), "machine": machine(), "pyodide": supply().version, "chapters": found}
+
+
+def table(result: dict[str, Any]) -> str:
+    """One row per chapter."""
+    rows = []
+    for name in CHAPTERS:
+        row = result["chapters"][name]
+        times = [f"{row[key]['processor_seconds']:.0f} s" for key in ("first", "last")]
+        times.append(f"{row['first']['seconds']:.0f} s")
+        size = f"{row['bytes'] / 1e6:.1f} MB"
+        rows.append([f"{{doc}}`{name}`", f"{row['passed']} of {row['cells']}", f"{row['formulas']}", size, *times])
+    heads = ("Chapter", "Cells", "Formulas", "Read", "First result", "Last cell", "First, elapsed")
+    load, about = max(row["load"] for row in result["chapters"].values()), result["machine"]
+    machine_text = f"{about['processor']}, {about['cores']} cores, {result['date']}"
+    return (
+        f"{markdown(heads, rows)}\n\nProcessor time of a headless browser from the press to the first result and to "
+        "the last cell, then elapsed time to the first result, from local files "
+        f"(Pyodide {result['pyodide']}, {machine_text}). The machine did other work meanwhile: up to {load:.0f} "
+        "processes were waiting or running."
+    )
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    try:
+        if words[:1] == ["measure"] and len(words) > 1:
+            write_json(FILE, measured(Path(words[1]), words[2:]))
+        elif words:
+            sys.exit(__doc__)
+        write_marked(PAGE, {"table": table(read_json(FILE, COMMAND))}, "live")
+    except InputError as error:
+        sys.exit(f"error: {error}")
