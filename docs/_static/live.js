@@ -45,8 +45,9 @@ window.endotsrLive = {kept: {}, keep(name, base64) { this.kept[name] = base64; }
   };
   const fromHost = async (name, {sha256}) => {
     const integrity = "sha256-" + btoa(String.fromCharCode(...sha256.match(/../g).map((pair) => parseInt(pair, 16))));
-    const reply = await fetch(live.supply.host + name, {integrity, credentials: "omit", referrerPolicy: "no-referrer"});
-    if (!reply.ok) throw new Error(`${name}: status ${reply.status}`);
+    const how = {integrity, credentials: "omit", referrerPolicy: "no-referrer"};
+    const reply = await fetch(live.supply.host + name, how).catch(() => ({ok: false}));
+    if (!reply.ok) throw new Error(`${name} cannot be read or has another SHA-256`);
     return new Uint8Array(await reply.arrayBuffer());
   };
   const read = async () => {
@@ -54,12 +55,13 @@ window.endotsrLive = {kept: {}, keep(name, base64) { this.kept[name] = base64; }
     const {files, packages, host} = live.supply, names = Object.keys(files), found = {};
     const local = await load("pyodide/filled.js").then(() => true, () => false);
     const place = local ? "the folder of this book" : new URL(host).host;
-    let count = 0;
+    let count = 0, failed = false;
     const one = async (name) => {
       found[name] = await (local ? fromFolder : fromHost)(name, files[name]);
-      say(`Reading Python from ${place}: file ${++count} of ${names.length} …`);
+      if (!failed) say(`Reading Python from ${place}: file ${++count} of ${names.length} …`);
     };
     await Promise.all(names.map(one)).catch((error) => {
+      failed = true;
       const absent = local ? "" : `the folder _static/pyodide of this book is not filled (${HINT}), and ${place}: `;
       throw new Error(absent + error.message);
     });
