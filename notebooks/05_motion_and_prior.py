@@ -33,7 +33,6 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy import stats
 
 from endotsr.definition import matern as definition_of_prior
 from endotsr.definition import motion as definition
@@ -171,10 +170,16 @@ assert max(abs(implied(tau)) for tau in np.linspace(0.6, 1.0, 81)) > 0.3, "three
 
 # %% [markdown]
 # **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale
-# $1/\ell$, evaluated at $2\pi\omega$. The Student-t density of an independent library gives the same weights:
+# $1/\ell$, evaluated at $2\pi\omega$. Such a variable is a normal variable whose precision has a gamma distribution of
+# shape and rate $5/2$. The integral over the precision gives the same weights without the formula of $S$:
 
 # %%
-density = stats.t(df=5, scale=1 / length).pdf(2 * np.pi * omega)
+precision = np.exp(np.linspace(-30, 5, 2001))  # equal steps of its logarithm
+gamma = precision ** (5 / 2) * np.exp(-5 / 2 * precision)
+normal = np.sqrt(precision) * np.exp(
+    -precision * (2 * np.pi * omega * length)[:, None] ** 2 / 2
+)
+density = (gamma * normal).sum(axis=1)  # up to a constant factor
 np.testing.assert_allclose(rho, (1 / density) / np.mean(1 / density), rtol=1e-13)
 
 # %% [markdown]

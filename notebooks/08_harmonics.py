@@ -30,10 +30,10 @@
 # The equation is {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import math
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.special import factorial, lpmv
 
 from endotsr.definition import harmonics as definition
 from endotsr.method.splatting.harmonics import harmonics_forward, harmonics_reverse
@@ -101,25 +101,26 @@ for degree in range(4):
 assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1"
 
 # %% [markdown]
-# **An independent source.** The associated Legendre functions $P_l^m$ of SciPy give the same sixteen functions. Their
-# sign convention $(-1)^m$ (Condon and Shortley) is the same as in the table.
+# **An independent source.** The associated Legendre functions $P_l^m(x)=(-1)^m(1-x^2)^{m/2}\,P_l^{(m)}(x)$, from the
+# Legendre polynomials $P_l$ of NumPy, give the same sixteen functions. Their sign convention $(-1)^m$ (Condon and
+# Shortley) is the same as in the table.
 
 # %%
 direction = rng.normal(size=(3, 50))
 direction /= np.linalg.norm(direction, axis=0)
-polar, azimuth = np.arccos(direction[2]), np.arctan2(direction[1], direction[0])
+height, azimuth = direction[2], np.arctan2(direction[1], direction[0])
 k = 0
 for band in range(4):
     for m in range(-band, band + 1):
-        norm = np.sqrt(
-            (2 * band + 1) / (4 * np.pi) * factorial(band - abs(m)) / factorial(band + abs(m))
-        )
+        norm = np.sqrt((2 * band + 1) / (4 * np.pi) / math.perm(band + abs(m), 2 * abs(m)))
         wave = (
             1
             if m == 0
             else np.sqrt(2) * (np.cos(m * azimuth) if m > 0 else np.sin(-m * azimuth))
         )
-        real = norm * wave * lpmv(abs(m), band, np.cos(polar))
+        legendre = np.polynomial.Legendre.basis(band).deriv(abs(m))(height)
+        associated = (-np.sqrt(1 - height**2)) ** abs(m) * legendre
+        real = norm * wave * associated
         np.testing.assert_allclose(definition.basis(direction, 16)[k], real, atol=1e-13)
         k += 1
 

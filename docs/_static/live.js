@@ -9,7 +9,7 @@ window.endotsrLive = {kept: {}, keep(name, base64) { this.kept[name] = base64; }
   const HINT = "python docs/make.py live.fetch";
   const NOTE = "Here the chapter runs on the definition, in NumPy compiled to WebAssembly. Numbers can differ from the " +
     "recorded ones in the last digits. Where a cell compares the compiled function with the definition, it compares " +
-    "the definition with itself. Edit a cell or a formula and press Run or Shift+Enter; a formula runs the gradient " +
+    "the definition with itself. A simulated clip is the small scene of the definition. Edit a cell or a formula and press Run or Shift+Enter; a formula runs the gradient " +
     "checks again.";
   let worker = null, answer = null, fail = null, chain = Promise.resolve(), status, start, data = null;
 

@@ -60,6 +60,11 @@ def numbered(chapter):
 MISTAKES = {
     "01_dictionary": ("dictionary.dictionary_reverse", "d_sine * cosine - d_cosine", "d_sine * cosine + d_cosine"),
     "02_colour_residual": ("appearance.appearance_reverse", "beta / Y00 *", "beta *"),
+    "04_deformation": ("deformation.deformation_reverse", "4 * delta**3", "2 * delta**3"),
+    "05_motion_and_prior": ("motion.motion_reverse", "d_translation, c)", "2 * d_translation, c)"),
+    "06_covariance": ("covariance.covariance_reverse", "d_shape.scale * scale", "d_shape.scale"),
+    "08_harmonics": ("harmonics.harmonics_reverse", "d_n - (n * d_n).sum(axis=0) * n", "d_n"),
+    "10_laplacian_pyramid": ("laplacian.laplacian_loss_reverse", "d_coarse - u_rows.T", "d_coarse + u_rows.T"),
 }
 
 

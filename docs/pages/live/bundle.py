@@ -9,7 +9,15 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-CHAPTERS = ("01_dictionary", "02_colour_residual")
+CHAPTERS = (
+    "01_dictionary",
+    "02_colour_residual",
+    "04_deformation",
+    "05_motion_and_prior",
+    "06_covariance",
+    "08_harmonics",
+    "10_laplacian_pyramid",
+)
 PACKAGE, HERE, CLIP = ROOT / "reference", Path(__file__).parent, ROOT / "notebooks" / "running_clip"
 PLAIN = (
     "endotsr/__init__.py",
@@ -20,7 +28,11 @@ PLAIN = (
     "endotsr/port/stages/__init__.py",
     "endotsr/port/stages/registry.py",
     "endotsr/port/stages/stage.py",
+    "endotsr/port/stages/made_up.py",
     "endotsr/port/stages/spectral.py",
+    "endotsr/port/stages/laplacian.py",
+    "endotsr/port/stages/deformation.py",
+    "endotsr/port/stages/projection.py",
     "endotsr/results/__init__.py",
     "endotsr/results/report/__init__.py",
     "endotsr/results/report/tables.py",

@@ -21,12 +21,26 @@ HOMES = {
     "endotsr.method.equations.appearance": {"appearance": "Y00 appearance_forward appearance_reverse"},
     "endotsr.method.equations.motion": {"motion": "motion_forward motion_reverse"},
     "endotsr.method.equations.matern": {"matern": "matern_weights matern_penalty_forward matern_penalty_reverse"},
+    "endotsr.method.equations.deformation": {"deformation": "deformation_forward deformation_reverse"},
+    "endotsr.method.equations.laplacian": {
+        "laplacian": "SupportMasks laplacian_levels laplacian_loss_forward laplacian_loss_reverse support_masks"
+    },
+    "endotsr.method.equations.calibration": {"calibration": "calibrate rms"},
     "endotsr.method.splatting.camera": {"projection": "Camera"},
+    "endotsr.method.splatting.covariance": {
+        "covariance": "Shape covariance_forward covariance_matrix covariance_reverse"
+    },
+    "endotsr.method.splatting.harmonics": {"harmonics": "HarmonicsSaved harmonics_forward harmonics_reverse"},
+    "endotsr.method.splatting.projection": {
+        "projection": "Projected ProjectionSaved projection_forward projection_reverse"
+    },
     "endotsr.method.splatting.render": {"render": "Scene"},
+    "endotsr.method.splatting.settings": {"settings": "EXACT PAPER LegacyDeviations RasterSettings"},
     "endotsr.training.fitting.model": {"scene": "Spectral spectral_from"},
     "endotsr.training.scene.gaussians": {"scene": "Gaussians"},
 }
-STAGES = ("spectral",)  # of `endotsr.port.stages`: the gradient checks of the chapters that run
+# The modules of `endotsr.port.stages` with the gradient checks of the chapters that run.
+STAGES = ("spectral", "laplacian", "deformation", "projection")
 
 
 def sections(data, where=""):
@@ -35,7 +49,50 @@ def sections(data, where=""):
     return namedtuple("Section", found)(**found)
 
 
-OWN = {"endotsr.config": {"Config": object, "config_from_dict": sections}}
+def raster_of(settings):
+    """Settings of the rasteriser by name, as `endotsr.port.stages.requests.raster_of`."""
+    definition = importlib.import_module("endotsr.definition.settings")
+    fields = dict(settings["raster"])
+    return definition.RasterSettings(**fields | {"deviations": definition.LegacyDeviations(**fields["deviations"])})
+
+
+def raster_dict(raster):
+    """The reverse of `raster_of`."""
+    return raster._asdict() | {"deviations": raster.deviations._asdict()}
+
+
+def camera_of(inputs, settings):
+    """Pose from the inputs, lens from the settings."""
+    camera = importlib.import_module("endotsr.definition.projection").Camera
+    return camera(inputs["rotation_matrix"], inputs["translation"], **settings["camera"])
+
+
+class SmallScene:
+    """The simulated scene of the definition, in the place of a sequence of the simulator."""
+
+    def __init__(self, scene):
+        self.scene = scene
+
+    def frame(self, k, dtype):
+        """Picture in [0, 1] and mask of a frame."""
+        image = self.scene.images[k].astype(dtype) / 255
+        return namedtuple("Frame", "image mask")(image, self.scene.masks[k])
+
+
+def simulated(size):
+    """The small scene of the definition with the size of the settings."""
+    scene = importlib.import_module("endotsr.definition.simulate").simulate(**size)
+    return namedtuple("Simulated", "sequence")(SmallScene(scene))
+
+
+# Compiled module -> names that are written here.
+OWN = {
+    "endotsr.config": {"Config": object, "config_from_dict": sections},
+    "endotsr.clips.simulator": {"SimulatorSettings": dict, "simulate": simulated},
+    "endotsr.method.equations.deformation": {"CHANNELS": 10, "Basis": str},
+    "endotsr.method.equations.pyramid": {"Upsampling": str},
+    "endotsr.port.stages.requests": {"camera_of": camera_of, "raster_dict": raster_dict, "raster_of": raster_of},
+}
 
 
 class Homes(MetaPathFinder, Loader):
@@ -78,3 +135,6 @@ def install():
     replaced = {"gradcheck": {"one_thread": contextlib.nullcontext}, "stages.registry": {"STAGE_MODULES": STAGES}}
     for name, values in replaced.items():
         vars(importlib.import_module(f"endotsr.port.{name}")).update(values)
+    # The signs of (5) are decisions of the forward pass. The definition saves them with their weight.
+    saved = importlib.import_module("endotsr.definition.laplacian").LaplacianSaved
+    saved.signs = property(lambda self: [(slope > 0).astype(int) - (slope < 0) for slope in self.slopes])
