@@ -30,7 +30,7 @@ MAKERS = {
 }
 # Beginning of a changed path -> tests beside those of its room.
 MORE = {
-    f"{PACKAGE}definition/": ("tests/definition", "tests/test_specification.py"),
+    f"{PACKAGE}definition/": ("tests/definition", "tests/test_specification.py", "tests/docs/test_live.py"),
     f"{PACKAGE}method/": ("tests/test_gradcheck.py", "tests/definition/test_twins.py"),
     f"{PACKAGE}port/stages/": (
         "tests/test_gradcheck.py",
@@ -88,7 +88,7 @@ def tests_of(path: str) -> list[str]:
             if len(parts) >= depth and (ROOT / folder).is_dir():
                 return [folder, *found]
     if path.startswith("notebooks/") and path.endswith(".py"):
-        found.append("tests/test_notebooks.py")
+        found += ["tests/test_notebooks.py", "tests/docs/test_live.py"]
     return found
 
 

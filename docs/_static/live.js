@@ -137,9 +137,25 @@ window.endotsrLive = {kept: {}, keep(name, base64) { this.kept[name] = base64; }
     new ResizeObserver(grow).observe(pane);
     grow();
   };
+  // A table of aligned text becomes a table of the page, as in the recorded outputs.
+  const put = (text, parent) => {
+    const lines = text.split("\n"), rule = lines.findIndex((line) => /^-+(?: {2,}-+)+$/.test(line));
+    if (rule < 1) return text.trim() && make("pre", {}, text.replace(/^\n+|\n+$/g, ""), parent);
+    const starts = [...lines[rule].matchAll(/-+/g)].map((dashes) => dashes.index);
+    const blank = lines.findIndex((line, k) => k > rule && !line.trim()), end = blank < 0 ? lines.length : blank;
+    put(lines.slice(0, rule - 1).join("\n"), parent);
+    const box = make("div", {class: "pst-scrollable-table-container"}, "", parent);
+    const table = make("table", {class: "table aligned"}, "", box);
+    for (let k = rule - 1; k < end; k++) {
+      if (k === rule) continue;
+      const row = make("tr", {}, "", table), kind = k < rule ? "th" : "td";
+      starts.forEach((begin, column) => make(kind, {}, lines[k].slice(begin, starts[column + 1]).trim(), row));
+    }
+    put(lines.slice(end).join("\n"), parent);
+  };
   const show = (cell, {text, figures, error}) => {
     cell.output.replaceChildren();
-    if (text) make("pre", {}, text, cell.output);
+    put(text, cell.output);
     for (const [k, figure] of figures.entries())
       make("img", {src: "data:image/png;base64," + figure, alt: `figure ${k + 1} of ${cell.title}`}, "", cell.output);
     if (error) make("pre", {class: "live-error"}, error, cell.output);

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from pages.live import fetch
+from pages.live import fetch, page
 from pages.live.bundle import CHAPTERS, cells, files, formulas, needs_clip
 from pages.live.supply import LOCK, File, Supply, needed, supply
 from pages.live.table import HOMES, STAGES
@@ -119,6 +119,14 @@ def test_every_name_of_the_table_is_in_the_compiled_module_and_in_the_definition
 def test_a_chapter_reads_the_clip_only_if_it_imports_it():
     assert [name for name in CHAPTERS if needs_clip(name)] == ["01_dictionary"]
     assert not any(name.startswith("running_clip/") for name in files("02_colour_residual"))
+
+
+def test_the_table_of_the_page_is_that_of_the_record_and_all_cells_passed():
+    record = json.loads(page.FILE.read_text(encoding="utf-8"))
+    assert page.table(record) in page.PAGE.read_text(encoding="utf-8"), "python docs/make.py live"
+    for name in CHAPTERS:
+        row = record["chapters"][name]
+        assert row["passed"] == row["cells"] == len(cells(name)), name
 
 
 # ---- the folder of Pyodide ----
