@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from endotsr.config import Config
+from endotsr.definition import dictionary as definition
+from endotsr.method.equations import dictionary
 from endotsr.method.equations.dictionary import (
     AtomStatistics,
     atom_statistics,
@@ -227,3 +229,33 @@ def test_refused_times():
         dictionary_forward(0.1, omega[None])
     with pytest.raises(ValueError, match="statistics"):
         normalise_forward(np.zeros(3), atom_statistics([0.1], omega))
+
+
+class Narrow:
+    """NumPy of a machine with indices of 32 bits: `choose` refuses wider ones."""
+
+    intp = np.int32
+
+    def __getattr__(self, name):
+        return getattr(np, name)
+
+    @staticmethod
+    def choose(which, choices):
+        assert which.dtype == np.int32, f"Cannot cast from {which.dtype} to int32"
+        return np.choose(which, choices)
+
+
+@pytest.mark.parametrize("module", [dictionary, definition], ids=["compiled", "definition"])
+def test_atoms_need_no_index_wider_than_a_pointer(module, monkeypatch):
+    omega = frequencies(8, 1.0, 16.0)
+    expected, _ = module.dictionary_forward(5 / 32, omega)
+    monkeypatch.setattr(module, "np", Narrow())
+    np.testing.assert_array_equal(module.dictionary_forward(5 / 32, omega)[0], expected)
+
+
+def test_the_report_of_the_definition_is_that_of_the_package():
+    omega = frequencies(8, 1.0, 16.0)
+    for times in (np.arange(32) / 32, np.delete(np.arange(24), [1, 9, 17]) / 24, np.arange(6) / 63, np.zeros(1)):
+        found, expected = definition.report_atoms(times, omega), report_atoms(times, omega)
+        assert (found.rank, found.dead, found.weak) == (expected.rank, expected.dead, expected.weak)
+        np.testing.assert_allclose(found.condition, expected.condition, rtol=1e-9)
