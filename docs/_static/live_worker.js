@@ -39,9 +39,9 @@ endotsrLive.worker = function () {
     for (const [path, content] of Object.entries(chapter)) write(path, content);
     known = {};
     say("Matplotlib is starting …");
-    python.runPython("import sys; sys.path.insert(0, '.'); import live_cells, live_table");
-    python.runPython("live_table.install(); live_cells.quiet()");
-    run = python.runPython("lambda *words: __import__('json').dumps(live_cells.run(*words))");
+    python.runPython("import json, sys; sys.path.insert(0, '.'); from pages.live import cells, table");
+    python.runPython("table.install(); cells.quiet()");
+    run = python.runPython("lambda *words: json.dumps(cells.run(*words))");
   };
 
   self.onmessage = async ({data}) => {

@@ -8,11 +8,13 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pages.live import fetch, page
 from pages.live.bundle import CHAPTERS, cells, files, formulas, needs_clip
+from pages.live.helpers import report_atoms
 from pages.live.supply import LOCK, File, Supply, needed, supply
-from pages.live.table import HOMES, STAGES
+from pages.live.table import HOMES, OWN, STAGES
 
 ROOT = Path(__file__).parents[2]
 # What Pyodide's packages bring, and the files of the page; everything else that is installed here is absent there.
@@ -20,7 +22,7 @@ PRESENT = "numpy matplotlib mpl_toolkits PIL contourpy cycler fontTools kiwisolv
 RUNNER = """
 import json, sys
 
-PRESENT = set(WORDS.split()) | {"endotsr", "running_clip", "live_table", "live_cells"}
+PRESENT = set(WORDS.split()) | {"endotsr", "running_clip", "pages"}
 
 class Absent:
     def find_spec(self, name, path=None, target=None):
@@ -30,11 +32,11 @@ class Absent:
 
 sys.meta_path.insert(0, Absent())
 sys.path.insert(0, ".")
-import live_cells, live_table
+from pages.live import cells, table
 
-live_table.install()
-live_cells.quiet()
-print(json.dumps([live_cells.run(*words) for words in json.load(sys.stdin)]))
+table.install()
+cells.quiet()
+print(json.dumps([cells.run(*words) for words in json.load(sys.stdin)]))
 """
 
 
@@ -108,12 +110,23 @@ def test_a_formula_has_to_define_its_function(tmp_path):
 
 
 def test_every_name_of_the_table_is_in_the_compiled_module_and_in_the_definition():
+    for compiled, names in OWN.items():
+        assert all(hasattr(import_module(compiled), name) for name in names), compiled
     for compiled, homes in HOMES.items():
         for home, names in homes.items():
             for name in names.split():
                 assert hasattr(import_module(compiled), name), (compiled, name)
                 assert hasattr(import_module(f"endotsr.definition.{home}"), name), (home, name)
     assert all((ROOT / f"reference/endotsr/port/stages/{name}.py").is_file() for name in STAGES)
+
+
+def test_the_report_of_the_atoms_is_that_of_the_package():
+    package = import_module("endotsr.method.equations.dictionary")
+    omega = package.frequencies(8, 1.0, 16.0)
+    for times in (np.arange(32) / 32, np.delete(np.arange(24), [1, 9, 17]) / 24, np.arange(6) / 63, np.zeros(1)):
+        found, expected = report_atoms(times, omega), package.report_atoms(times, omega)
+        assert (found.rank, found.dead, found.weak) == (expected.rank, expected.dead, expected.weak)
+        np.testing.assert_allclose(found.condition, expected.condition, rtol=1e-9)
 
 
 def test_a_chapter_reads_the_clip_only_if_it_imports_it():

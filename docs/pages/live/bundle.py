@@ -44,7 +44,8 @@ CELL = re.compile(r"^# %%(.*)$", re.MULTILINE)
 def files(chapter: str) -> dict[str, bytes]:
     """What a chapter needs beside NumPy and Matplotlib, by path."""
     found = {path.relative_to(PACKAGE).as_posix(): path for pattern in PLAIN for path in PACKAGE.glob(pattern)}
-    found |= {f"live_{name}.py": HERE / f"{name}.py" for name in ("table", "cells")}
+    found |= {f"pages/live/{name}.py": HERE / f"{name}.py" for name in ("__init__", "table", "helpers", "cells")}
+    found["pages/__init__.py"] = HERE.parent / "__init__.py"
     found["matplotlibrc"] = ROOT / "notebooks" / "matplotlibrc"
     if needs_clip(chapter):
         found |= {f"running_clip/{path.name}": path for path in sorted(CLIP.iterdir()) if path.is_file()}

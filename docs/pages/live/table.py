@@ -8,15 +8,16 @@ refused with a sentence. The modules that exist as files come first, so that not
 import contextlib
 import importlib
 import sys
-from collections import namedtuple
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
+
+from pages.live import helpers
 
 # Compiled module -> module of the definition -> names.
 HOMES = {
     "endotsr.method.equations.dictionary": {
         "dictionary": "frequencies dictionary_forward dictionary_reverse atom_statistics normalise_forward "
-        "normalise_reverse normalised_atoms report_atoms"
+        "normalise_reverse normalised_atoms"
     },
     "endotsr.method.equations.appearance": {"appearance": "Y00 appearance_forward appearance_reverse"},
     "endotsr.method.equations.motion": {"motion": "motion_forward motion_reverse"},
@@ -41,57 +42,16 @@ HOMES = {
 }
 # The modules of `endotsr.port.stages` with the gradient checks of the chapters that run.
 STAGES = ("spectral", "laplacian", "deformation", "projection")
-
-
-def sections(data, where=""):
-    """Settings by name from nested dictionaries, in the place of `endotsr.config.config_from_dict`."""
-    found = {name: sections(value) if isinstance(value, dict) else value for name, value in data.items()}
-    return namedtuple("Section", found)(**found)
-
-
-def raster_of(settings):
-    """Settings of the rasteriser by name, as `endotsr.port.stages.requests.raster_of`."""
-    definition = importlib.import_module("endotsr.definition.settings")
-    fields = dict(settings["raster"])
-    return definition.RasterSettings(**fields | {"deviations": definition.LegacyDeviations(**fields["deviations"])})
-
-
-def raster_dict(raster):
-    """The reverse of `raster_of`."""
-    return raster._asdict() | {"deviations": raster.deviations._asdict()}
-
-
-def camera_of(inputs, settings):
-    """Pose from the inputs, lens from the settings."""
-    camera = importlib.import_module("endotsr.definition.projection").Camera
-    return camera(inputs["rotation_matrix"], inputs["translation"], **settings["camera"])
-
-
-class SmallScene:
-    """The simulated scene of the definition, in the place of a sequence of the simulator."""
-
-    def __init__(self, scene):
-        self.scene = scene
-
-    def frame(self, k, dtype):
-        """Picture in [0, 1] and mask of a frame."""
-        image = self.scene.images[k].astype(dtype) / 255
-        return namedtuple("Frame", "image mask")(image, self.scene.masks[k])
-
-
-def simulated(size):
-    """The small scene of the definition with the size of the settings."""
-    scene = importlib.import_module("endotsr.definition.simulate").simulate(**size)
-    return namedtuple("Simulated", "sequence")(SmallScene(scene))
-
-
-# Compiled module -> names that are written here.
+# Compiled module -> names that are written in `helpers`, and constants.
 OWN = {
-    "endotsr.config": {"Config": object, "config_from_dict": sections},
-    "endotsr.clips.simulator": {"SimulatorSettings": dict, "simulate": simulated},
+    "endotsr.config": {"Config": object, "config_from_dict": helpers.sections},
+    "endotsr.clips.simulator": {"SimulatorSettings": dict, "simulate": helpers.simulated},
     "endotsr.method.equations.deformation": {"CHANNELS": 10, "Basis": str},
     "endotsr.method.equations.pyramid": {"Upsampling": str},
-    "endotsr.port.stages.requests": {"camera_of": camera_of, "raster_dict": raster_dict, "raster_of": raster_of},
+    "endotsr.method.equations.dictionary": {"report_atoms": helpers.report_atoms},
+    "endotsr.port.stages.requests": {
+        name: getattr(helpers, name) for name in ("camera_of", "raster_dict", "raster_of")
+    },
 }
 
 

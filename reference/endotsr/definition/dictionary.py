@@ -8,7 +8,6 @@ DictionarySaved = namedtuple("DictionarySaved", "t omega")
 DictionaryGrads = namedtuple("DictionaryGrads", "d_t d_omega")
 # Mean of every atom over the training stamps, RMS of the centred atom, and whether it is constant.
 AtomStatistics = namedtuple("AtomStatistics", "mean rms dead")
-AtomReport = namedtuple("AtomReport", "rank condition dead weak")  # the last two by name, "sin(2 pi 16 t)"
 
 
 def frequencies(count, low, high):
@@ -64,15 +63,3 @@ def normalise_reverse(d_phi_bar, saved):
 def normalised_atoms(t, omega, statistics):
     """Equations (1) and (1b): phi_bar(t) (2F,)."""
     return normalise_forward(dictionary_forward(t, omega)[0], statistics)[0]
-
-
-def report_atoms(times, omega):
-    """Rank and condition of the normalised dictionary over the stamps; its dead atoms, and weak ones, of RMS < 0.05."""
-    statistics = atom_statistics(times, omega)
-    atoms = np.array([normalised_atoms(t, omega, statistics) for t in np.unique(times)])
-    singular = np.linalg.svd(atoms, compute_uv=False)
-    rank = int((singular > singular[0] * max(atoms.shape) * np.finfo(float).eps).sum())
-    names = np.array([f"{wave}(2 pi {f:.4g} t)" for wave in ("sin", "cos") for f in omega])
-    weak = ~statistics.dead & (statistics.rms < 0.05)
-    condition = float(singular[0] / singular[rank - 1]) if rank else 0.0
-    return AtomReport(rank, condition, names[statistics.dead].tolist(), names[weak].tolist())

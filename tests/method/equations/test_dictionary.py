@@ -251,11 +251,3 @@ def test_atoms_need_no_index_wider_than_a_pointer(module, monkeypatch):
     expected, _ = module.dictionary_forward(5 / 32, omega)
     monkeypatch.setattr(module, "np", Narrow())
     np.testing.assert_array_equal(module.dictionary_forward(5 / 32, omega)[0], expected)
-
-
-def test_the_report_of_the_definition_is_that_of_the_package():
-    omega = frequencies(8, 1.0, 16.0)
-    for times in (np.arange(32) / 32, np.delete(np.arange(24), [1, 9, 17]) / 24, np.arange(6) / 63, np.zeros(1)):
-        found, expected = definition.report_atoms(times, omega), report_atoms(times, omega)
-        assert (found.rank, found.dead, found.weak) == (expected.rank, expected.dead, expected.weak)
-        np.testing.assert_allclose(found.condition, expected.condition, rtol=1e-9)
