@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pages.live import fetch, page
+from pages.live import fetch, helpers, page
 from pages.live.bundle import CHAPTERS, cells, files, formulas, needs_clip
-from pages.live.helpers import report_atoms
 from pages.live.supply import LOCK, File, Supply, needed, supply
 from pages.live.table import HOMES, OWN, STAGES
 
@@ -65,6 +64,7 @@ MISTAKES = {
     "04_deformation": ("deformation.deformation_reverse", "4 * delta**3", "2 * delta**3"),
     "05_motion_and_prior": ("motion.motion_reverse", "d_translation, c)", "2 * d_translation, c)"),
     "06_covariance": ("covariance.covariance_reverse", "d_shape.scale * scale", "d_shape.scale"),
+    "07_projection": ("projection.point_reverse", "by_scale - g_xy", "by_scale + g_xy"),
     "08_harmonics": ("harmonics.harmonics_reverse", "d_n - (n * d_n).sum(axis=0) * n", "d_n"),
     "10_laplacian_pyramid": ("laplacian.laplacian_loss_reverse", "d_coarse - u_rows.T", "d_coarse + u_rows.T"),
 }
@@ -124,9 +124,30 @@ def test_the_report_of_the_atoms_is_that_of_the_package():
     package = import_module("endotsr.method.equations.dictionary")
     omega = package.frequencies(8, 1.0, 16.0)
     for times in (np.arange(32) / 32, np.delete(np.arange(24), [1, 9, 17]) / 24, np.arange(6) / 63, np.zeros(1)):
-        found, expected = report_atoms(times, omega), package.report_atoms(times, omega)
+        found, expected = helpers.report_atoms(times, omega), package.report_atoms(times, omega)
         assert (found.rank, found.dead, found.weak) == (expected.rank, expected.dead, expected.weak)
         np.testing.assert_allclose(found.condition, expected.condition, rtol=1e-9)
+
+
+def test_the_helpers_project_as_the_package_does():
+    """Values and gradients of wide Gaussians, one behind the camera, by the helper and by the compiled function."""
+    package = import_module("endotsr.method.splatting.projection")
+    compiled = import_module("endotsr.method.splatting.covariance")
+    settings = import_module("endotsr.method.splatting.settings").PAPER
+    rng = np.random.default_rng(3)
+    shape, _ = compiled.covariance_forward(rng.normal(size=(4, 5)), rng.normal(-1, 0.5, (3, 5)))
+    camera = helpers.Camera(np.eye(3), np.array([0.1, 0, 0]), 60.0, 66.0, 33.0, 23.5, 64, 48)
+    position = rng.uniform(-1, 1, (3, 5)) + np.array([[0], [0], [4]])
+    position[2, 0] = -4
+    given = [rng.normal(size=(2, 5)), rng.normal(size=(3, 5)), rng.normal(size=5)]
+    out, saved = helpers.projection_forward(position, shape, camera, settings)
+    expected, there = package.projection_forward(position, shape, camera, settings)
+    for found, value in zip(out, expected):
+        np.testing.assert_allclose(found, value, rtol=1e-10, atol=1e-12)
+    for name in ("projection_reverse", "projection_reverse_footprint"):
+        grads, others = getattr(helpers, name)(*given, saved), getattr(package, name)(*given, there)
+        for found, value in zip(grads[:3], others[:3]):
+            np.testing.assert_allclose(found, value, rtol=1e-8, atol=1e-10)
 
 
 def test_a_chapter_reads_the_clip_only_if_it_imports_it():

@@ -15,6 +15,7 @@ CHAPTERS = (
     "04_deformation",
     "05_motion_and_prior",
     "06_covariance",
+    "07_projection",
     "08_harmonics",
     "10_laplacian_pyramid",
 )
@@ -33,6 +34,7 @@ PLAIN = (
     "endotsr/port/stages/laplacian.py",
     "endotsr/port/stages/deformation.py",
     "endotsr/port/stages/projection.py",
+    "endotsr/port/stages/pose.py",
     "endotsr/results/__init__.py",
     "endotsr/results/report/__init__.py",
     "endotsr/results/report/tables.py",

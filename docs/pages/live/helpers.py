@@ -7,6 +7,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from endotsr.definition import projection
 from endotsr.definition.dictionary import atom_statistics, normalised_atoms
 from endotsr.definition.projection import Camera
 from endotsr.definition.settings import LegacyDeviations, RasterSettings
@@ -50,6 +51,36 @@ def raster_dict(raster):
 def camera_of(inputs, settings):
     """Pose from the inputs, lens from the settings."""
     return Camera(inputs["rotation_matrix"], inputs["translation"], **settings["camera"])
+
+
+def projection_forward(position, shape, camera, settings):
+    """Equation (B3) in the precision of the position, with the determinant as a sum of nonnegative terms."""
+    out, saved = projection.projection_forward(position, shape, camera, settings)
+    point = np.where(out.visible, camera.rotation @ position + camera.translation[:, None], 1)
+    j = projection.jacobian(point, camera, settings)[0]
+    m = np.einsum("ijn,jk,kln->iln", j, camera.rotation, shape.rotation.astype(float)) * shape.scale
+    minors = np.cross(m[0], m[1], axis=0)
+    eps = settings.low_pass
+    determinant = eps**2 + eps * (m**2).sum(axis=(0, 1)) + (minors**2).sum(axis=0)
+    out = out._replace(determinant=np.where(out.visible, determinant, 0))
+    return out._replace(**{name: part.astype(position.dtype) for name, part in zip(out._fields[:4], out)}), saved
+
+
+def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved, pose_gradient=True):
+    """Reverse of (B3); the definition always returns the gradient with respect to the pose."""
+    return projection.projection_reverse(d_mean2d, d_covariance2d, d_depth, saved)
+
+
+def projection_reverse_footprint(d_mean2d, d_footprint, d_depth, saved):
+    """Reverse of (B3) from the gradients (3, N) with respect to A = c / det, m = b / c and r = 1 / c."""
+    out, _ = projection_forward(*saved[:4])
+    _, b, c = np.where(out.visible, out.covariance2d, 1)
+    g_a, g_m, g_r = np.where(out.visible, d_footprint, 0)
+    slope, inverse = b / c, 1 / c
+    by_a = (c / np.where(out.visible, out.determinant, 1)) ** 2 * g_a
+    d_c = -by_a * slope**2 - slope * inverse * g_m - inverse**2 * g_r
+    d_covariance2d = np.array([-by_a, 2 * by_a * slope + inverse * g_m, d_c])
+    return projection.projection_reverse(d_mean2d, d_covariance2d, d_depth, saved)
 
 
 class SmallScene:

@@ -27,21 +27,20 @@ HOMES = {
         "laplacian": "SupportMasks laplacian_levels laplacian_loss_forward laplacian_loss_reverse support_masks"
     },
     "endotsr.method.equations.calibration": {"calibration": "calibrate rms"},
+    "endotsr.method.equations.pose": {"pose": "pose_forward pose_reverse"},
     "endotsr.method.splatting.camera": {"projection": "Camera"},
     "endotsr.method.splatting.covariance": {
         "covariance": "Shape covariance_forward covariance_matrix covariance_reverse"
     },
     "endotsr.method.splatting.harmonics": {"harmonics": "HarmonicsSaved harmonics_forward harmonics_reverse"},
-    "endotsr.method.splatting.projection": {
-        "projection": "Projected ProjectionSaved projection_forward projection_reverse"
-    },
+    "endotsr.method.splatting.projection": {"projection": "Projected ProjectionSaved"},
     "endotsr.method.splatting.render": {"render": "Scene"},
     "endotsr.method.splatting.settings": {"settings": "EXACT PAPER LegacyDeviations RasterSettings"},
     "endotsr.training.fitting.model": {"scene": "Spectral spectral_from"},
     "endotsr.training.scene.gaussians": {"scene": "Gaussians"},
 }
 # The modules of `endotsr.port.stages` with the gradient checks of the chapters that run.
-STAGES = ("spectral", "laplacian", "deformation", "projection")
+STAGES = ("spectral", "laplacian", "deformation", "projection", "pose")
 # Compiled module -> names that are written in `helpers`, and constants.
 OWN = {
     "endotsr.config": {"Config": object, "config_from_dict": helpers.sections},
@@ -49,6 +48,10 @@ OWN = {
     "endotsr.method.equations.deformation": {"CHANNELS": 10, "Basis": str},
     "endotsr.method.equations.pyramid": {"Upsampling": str},
     "endotsr.method.equations.dictionary": {"report_atoms": helpers.report_atoms},
+    "endotsr.method.splatting.projection": {
+        name: getattr(helpers, name)
+        for name in ("projection_forward", "projection_reverse", "projection_reverse_footprint")
+    },
     "endotsr.port.stages.requests": {
         name: getattr(helpers, name) for name in ("camera_of", "raster_dict", "raster_of")
     },
