@@ -130,6 +130,26 @@ def test_a_wrong_formula_fails_the_gradient_check_and_undo_mends_it(page, book, 
         assert remote.value("document.documentElement.scrollWidth") <= width
 
 
+def test_stop_ends_an_endless_cell_and_the_next_run_starts_again(page, book, filled):
+    shutil.copytree(filled, book / "_static" / "pyodide", dirs_exist_ok=True)
+    remote = page()
+    press_button(remote)
+    until(remote, f"/cells ran|does not run/.test({STATUS})")
+    cell = "document.querySelector('textarea[aria-label=\"cell 2\"]')"
+    word, button = (f"{cell}.parentNode.querySelector('{name}')" for name in (".live-row span", "button"))
+    remote.value(f"{cell}.value = 'while True: pass'")
+    remote.value(f"{cell}.dispatchEvent(new Event('input'))")
+    remote.value(f"{button}.click()")
+    until(remote, f"{word}.textContent.startsWith('cell 2')")
+    assert remote.value(f"{button}.textContent") == "Stop"
+    remote.value(f"{button}.click()")
+    until(remote, f"{word}.textContent === 'stopped' && {button}.textContent === 'Run'")
+    assert "starts Python again" in remote.value(STATUS)
+    remote.value(f"{cell}.parentNode.querySelectorAll('button')[1].click()")
+    until(remote, f"/^2 cells ran/.test({STATUS})")
+    assert remote.value(f"{word}.textContent") == "passed"
+
+
 class Host(SimpleHTTPRequestHandler):
     """The files of Pyodide, for pages of any origin."""
 
