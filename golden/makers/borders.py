@@ -4,7 +4,6 @@ Points beside each edge of a picture, boxes that just reach or just miss the ima
 at which they are dead, one visit or one valid pixel, cameras whose median is not their mean, frames whose poses differ.
 """
 
-import msgspec
 import numpy as np
 
 from endotsr.config import InitialisationConfig, ModelConfig
@@ -20,7 +19,7 @@ from makers.initialisation import frames
 from makers.making import Made, Seeds, Spec, changed, given, scalar
 from makers.pose import pose_inputs
 from makers.registration import LENS as PICTURE
-from makers.settings import written_initialisation
+from makers.settings import OF_THE_INITIALISATION, written_section
 from makers.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
 
 OPERATIONS = (
@@ -190,8 +189,8 @@ def _shallow() -> Spec:
     turns = np.stack([np.linalg.matrix_power(turned, k) for k in range(4)])
     inputs |= {"prior_depths": depth, "rotation_matrices": given(turns, "R^k, R = Rz(0.1) Ry(-0.15) Rx(0.2)")}
     drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=0.0625)
-    model = msgspec.to_builtins(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.125))
-    settings = {"camera": SMALL_LENS, "initialisation": written_initialisation(drawn), "model": model}
+    model = written_section(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.125))
+    settings = {"camera": SMALL_LENS, "initialisation": written_section(drawn, OF_THE_INITIALISATION), "model": model}
     title = "Depths below 1; frames with different poses; a change of just the threshold"
     return Spec("initialisation", "shallow", "initialisation", title, ("points_left_in_camera",), settings, inputs,
                 ("prior_depths",))  # fmt: skip
@@ -205,8 +204,8 @@ def _pair() -> Spec:
     inputs["masks"] = given(alone, "True at (1, 1) and (3, 4) only")
     inputs["prior_depths"] = changed(inputs["prior_depths"], (0, [1, 3], [1, 4]), [44.0, 47.0], "44 and 47 there")
     drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=5.0)
-    model = msgspec.to_builtins(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.125))
-    settings = {"camera": SMALL_LENS, "initialisation": written_initialisation(drawn), "model": model}
+    model = written_section(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.125))
+    settings = {"camera": SMALL_LENS, "initialisation": written_section(drawn, OF_THE_INITIALISATION), "model": model}
     return Spec("initialisation", "two_points", "initialisation", "Two points: the one neighbour of each", (), settings,
                 inputs)  # fmt: skip
 

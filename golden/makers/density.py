@@ -7,11 +7,11 @@ there is too little room, the extent of moving cameras, and values exactly on th
 
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from endotsr.config import DensityConfig
 from makers.making import Made, Seeds, Spec, changed, given, permutation
+from makers.settings import written_section
 from makers.views import pose
 
 OPERATIONS = ("density",)
@@ -61,7 +61,7 @@ def density_spec(
     inputs = _inputs(Seeds("density", case), moving)
     if change:
         change(inputs)
-    density = msgspec.to_builtins(DensityConfig(**{"gradient_threshold": 0.25, "extent": 30.0, **config}))
+    density = written_section(DensityConfig(**{"gradient_threshold": 0.25, "extent": 30.0, **config}))
     settings = {"width": 16, "height": 8, "density": density | ({"extent": "cameras"} if moving else {})}
     return Spec("density", case, "density", title, flags, settings, inputs, ("d_mean2d",))
 
@@ -119,7 +119,7 @@ def _on_the_thresholds() -> Spec:
         "translations": given(np.zeros((2, 3)), "0"),
     }  # fmt: skip
     config = DensityConfig(gradient_threshold=0.25, extent=4.0, dense_fraction=0.25, prune_opacity=0.5)
-    settings = {"width": 24, "height": 10, "density": msgspec.to_builtins(config)}
+    settings = {"width": 24, "height": 10, "density": written_section(config)}
     flags = ("prune_at_the_threshold", "split_at_the_limit", "density_width_for_height")
     return Spec("density", "on_the_thresholds", "density", "On the prune threshold it stays, on the size limit it is "
                 "cloned; W of x and H of y", flags, settings, inputs, ("log_scale", "opacity_logit"))  # fmt: skip

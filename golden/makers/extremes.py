@@ -7,7 +7,6 @@ box but hidden by others.
 
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, TrainingConfig
@@ -16,7 +15,7 @@ from makers.making import Seeds, Spec, changed, given, scalar
 from makers.moving import BASES, LENS
 from makers.pose import pose_inputs
 from makers.screens import raster_settings, screen_inputs
-from makers.settings import written
+from makers.settings import written, written_section
 from makers.training import trajectory_inputs
 from makers.views import logit_of
 
@@ -97,7 +96,7 @@ def _hidden_statistics() -> Spec:
         "rotation_matrices": given(np.stack([np.eye(3)] * 2), "identity"),
         "translations": given(np.zeros((2, 3)), "0"),
     }  # fmt: skip
-    config = msgspec.to_builtins(DensityConfig(gradient_threshold=0.25, extent=30.0))
+    config = written_section(DensityConfig(gradient_threshold=0.25, extent=30.0))
     return Spec("density", "hidden", "density", "A view without a gradient counts where the Gaussian is visible",
                 ("visits_with_gradient_only",), {"width": 16, "height": 8, "density": config}, inputs)  # fmt: skip
 

@@ -4,12 +4,11 @@ Inputs: images, masks, prior depths and camera poses. Every candidate is selecte
 cases are three training frames of six, a clip long enough for skipped frames, and a single point.
 """
 
-import msgspec
 import numpy as np
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from makers.making import Made, Seeds, Spec, changed, given
-from makers.settings import written_initialisation
+from makers.settings import OF_THE_INITIALISATION, written_section
 from makers.views import pose
 
 OPERATIONS = ("initialisation",)
@@ -44,11 +43,11 @@ def frames(seeds: Seeds, count: int, train: list[int]) -> dict[str, Made]:
 
 def cases() -> list[Spec]:
     """A short clip, a long clip, one point."""
-    model = msgspec.to_builtins(ModelConfig(bases=3, harmonics_degree=1, initial_width=0.125))
+    model = written_section(ModelConfig(bases=3, harmonics_degree=1, initial_width=0.125))
 
     def spec(case: str, title: str, flags: tuple[str, ...], inputs: dict[str, Made]) -> Spec:
         drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=5.0)
-        settings = {"camera": LENS, "initialisation": written_initialisation(drawn), "model": model}
+        settings = {"camera": LENS, "initialisation": written_section(drawn, OF_THE_INITIALISATION), "model": model}
         return Spec("initialisation", case, "initialisation", title, flags, settings, inputs)
 
     one = frames(Seeds("initialisation", "one_point"), 1, [0])

@@ -7,6 +7,7 @@ import msgspec
 from endotsr.config import ModelConfig
 from makers.clock import stamps, train_index
 from makers.making import Made, Seeds
+from makers.settings import written_section
 from makers.views import pose, scene_inputs
 
 COUNT, BASES, FREQUENCIES, FRAMES = 12, 3, 2, 12
@@ -17,7 +18,7 @@ TIME = 0.3984375
 def model_settings(**changes: Any) -> dict[str, Any]:
     """The model of the moving scene as settings of a case."""
     model = ModelConfig(bases=BASES, frequencies=FREQUENCIES, initial_width=0.25)
-    return msgspec.to_builtins(msgspec.structs.replace(model, **changes))
+    return written_section(msgspec.structs.replace(model, **changes))
 
 
 def moving_inputs(seeds: Seeds, degree: int, static: bool, frequencies: int = FREQUENCIES) -> dict[str, Made]:

@@ -27,7 +27,7 @@ from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import BASES, FRAMES, LENS, moving_inputs
 from makers.objective import image_inputs
 from makers.screens import raster_settings, screen_inputs
-from makers.settings import written, written_initialisation
+from makers.settings import OF_THE_INITIALISATION, written, written_section
 from makers.training import trajectory_inputs
 from makers.views import cotangents, lens_settings, pose, scene_inputs, seen_at, shape_inputs, spread_points
 
@@ -108,9 +108,9 @@ def _splatting() -> list[Spec]:
 
 
 def _initialisation() -> Spec:
-    model = msgspec.to_builtins(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.0625))
+    model = written_section(ModelConfig(bases=2, harmonics_degree=0, initial_width=0.0625))
     drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=3.0)
-    settings = {"camera": SMALL_LENS, "initialisation": written_initialisation(drawn), "model": model}
+    settings = {"camera": SMALL_LENS, "initialisation": written_section(drawn, OF_THE_INITIALISATION), "model": model}
     inputs = frames(Seeds("initialisation", CASE), 3, [0, 2])
     return Spec("initialisation", CASE, "initialisation", TITLE, (), settings, inputs)
 
@@ -118,7 +118,7 @@ def _initialisation() -> Spec:
 def _moving(family: str, case: str, title: str, loss: dict[str, Any], without: tuple[str, ...], **model: Any) -> Spec:
     """The moving scene of `scene` or `objective`, without the arrays of disabled components."""
     seeds = Seeds(family, case)
-    settings = msgspec.to_builtins(msgspec.structs.replace(ModelConfig(), **(MODEL | model)))
+    settings = written_section(msgspec.structs.replace(ModelConfig(), **(MODEL | model)))
     inputs = moving_inputs(seeds, 1, True, frequencies=MODEL["frequencies"])
     inputs = {name: made for name, made in inputs.items() if name not in without}
     if family == "scene":

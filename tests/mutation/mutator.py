@@ -69,7 +69,7 @@ def mutants(kernel: str, function: Callable) -> list[Mutant]:
     tree = _tree(function)
     found = []
     for change in changes(tree):
-        with _applied(change):
+        with applied(change):
             code = _compiled(tree, function)
         found.append(Mutant(kernel, change.kind, f"{kernel}: {change.name}", code))
     return found
@@ -121,16 +121,17 @@ def changes(tree: ast.FunctionDef) -> list[Change]:
     found: list[Change] = []
     seen: Counter[str] = Counter()
     indices = _indices(tree)
-    for statement, place, node in _sites(tree):
+    for statement, place, node in sites(tree):
         for kind, new in _alternatives(node, id(node) in indices):
             new = ast.fix_missing_locations(ast.copy_location(new, node))
-            name = _name(statement, node, new)
+            name = name_of(statement, node, new)
             seen[name] += 1
             found.append(Change(kind, name if seen[name] == 1 else f"{name} ({seen[name]})", place, new))
     return found
 
 
-def _name(statement: ast.stmt, node: ast.AST, new: ast.AST) -> str:
+def name_of(statement: ast.stmt, node: ast.AST, new: ast.AST) -> str:
+    """What a change does, as text: the old and the new expression and the first line of their statement."""
     if isinstance(new, ast.Pass):
         return f"`{_header(statement)}` dropped"
     return f"`{_text(node)}` -> `{_text(new)}` in `{_header(statement)}`"
@@ -145,7 +146,8 @@ def _header(statement: ast.stmt) -> str:
     return _text(statement).splitlines()[0].rstrip(":")
 
 
-def _sites(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt, Place, ast.AST]]:
+def sites(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt, Place, ast.AST]]:
+    """Every node of a function that a change may replace, with its statement and its place in the tree."""
     for k, statement in enumerate(tree.body):
         if k == 0 and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
             continue
@@ -187,7 +189,8 @@ def _only_checks(node: ast.stmt) -> bool:
 
 
 @contextlib.contextmanager
-def _applied(change: Change) -> Iterator[None]:
+def applied(change: Change) -> Iterator[None]:
+    """The tree with the change."""
     parent, field, position = change.place
     if position is None:
         before = getattr(parent, field)

@@ -80,6 +80,39 @@ def test_a_command_out_of_a_file_is_shown_and_not_run(written):
         run(["verify", str(written / "c.json")])
 
 
+RACING = """
+import pathlib, runpy, sys
+import numpy as np
+count = pathlib.Path({count!r})
+run = int(count.read_text() or 0) if count.is_file() else 0
+count.write_text(str(run + 1))
+runpy.run_path({three!r}, run_name="__main__")
+for path in pathlib.Path(sys.argv[2]).glob("motion/*/translation.npy"):
+    np.save(path, np.load(path) * (1 + (0.5 if run == {wrong} else 0)))
+"""
+
+
+def test_the_runs_are_in_the_certificate_and_verified_again(tmp_path, capsys):
+    racing = tmp_path / "racing.py"
+    racing.write_text(RACING.format(count=str(tmp_path / "count"), three=str(THREE), wrong=-1))
+    words = ["run", "--port", port(racing), "--precision", "float64", "--level", "2", "--runs", "2"]
+    assert run([*words, "--certificate", str(tmp_path / "c.json")]) == 0
+    assert read_certificate(tmp_path / "c.json").runs == 2 and (tmp_path / "count").read_text() == "2"
+    racing.write_text(racing.read_text().replace("run == -1", "run == 3"))  # the second run of the verification
+    assert run(["verify", str(tmp_path / "c.json"), "--port", port(racing)]) == 1
+    assert (tmp_path / "count").read_text() == "4" and "differs from the certificate" in capsys.readouterr().out
+
+
+def test_a_certificate_of_one_run_needs_no_number_and_no_other_is_taken(written, tmp_path):
+    data = json.loads((written / "c.json").read_text())
+    assert data.pop("runs") == 1
+    (tmp_path / "old.json").write_text(json.dumps(data))
+    assert read_certificate(tmp_path / "old.json").runs == 1
+    (tmp_path / "none.json").write_text(json.dumps(data | {"runs": 0}))
+    with pytest.raises(InputError, match="runs: 0; use 1 to 1000"):
+        read_certificate(tmp_path / "none.json")
+
+
 def test_an_incomplete_level_has_no_certificate(tmp_path, capsys):
     wrong = tmp_path / "wrong.py"
     wrong.write_text(THREE.read_text().replace("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]"))

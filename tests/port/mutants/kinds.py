@@ -13,7 +13,7 @@ from itertools import pairwise
 from types import CodeType
 from typing import NamedTuple
 
-from mutation.mutator import Change, Mutant, _applied, _name, _sites, changes
+from mutation.mutator import Change, Mutant, applied, changes, name_of, sites
 
 OTHER_CALLS = {
     "sum": ("mean",), "mean": ("sum", "median"), "median": ("mean", "max"), "any": ("all",), "all": ("any",),
@@ -42,7 +42,7 @@ def wrong_versions(source: Source) -> Iterator[tuple[Callable, Mutant]]:
             continue
         seen: set[str] = set()
         for change in [*changes(tree), *habits(tree)]:
-            with _applied(change):
+            with applied(change):
                 text = ast.unparse(tree)
                 if text in seen:
                     continue
@@ -66,7 +66,7 @@ def habits(tree: ast.FunctionDef) -> list[Change]:
     seen: Counter[str] = Counter()
     neighbours = _neighbours(tree)
     bound: set[str] = {a.arg for a in (*tree.args.args, *tree.args.kwonlyargs)}
-    for statement, place, node in _sites(tree):
+    for statement, place, node in sites(tree):
         options = [*_expressions(node), *_named(node, neighbours), *_statements(node, bound)]
         if isinstance(node, ast.Assign):
             bound |= {n.id for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name)}
@@ -74,7 +74,7 @@ def habits(tree: ast.FunctionDef) -> list[Change]:
             options += _added(node)
         for kind, new in options:
             new = ast.fix_missing_locations(ast.copy_location(new, node))
-            name = _name(statement, node, new)
+            name = name_of(statement, node, new)
             seen[name] += 1
             found.append(Change(kind, name if seen[name] == 1 else f"{name} ({seen[name]})", place, new))
     return found

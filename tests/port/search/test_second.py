@@ -108,7 +108,7 @@ def test_a_lower_precision_or_a_sum_without_an_end_is_found(golden, tmp_path, ki
 )
 def test_independent_mistakes_are_explained_one_output_at_a_time(golden, tmp_path, edits, whole, alone):
     found = search_on(golden, tmp_path, "pose", *edits)
-    lines = apart(found, SECONDS)
+    lines = apart(found, sentences(found), SECONDS)
     assert bool(sentences(found)) == whole, found.hits
     assert all(" alone: as in the definition with `" in line for line in lines)
     assert {line.partition(" alone: ")[0] for line in lines} == alone

@@ -17,7 +17,7 @@ import msgspec
 
 from endotsr import __version__
 from endotsr.errors import INVISIBLE, InputError
-from endotsr.port.judge.format import Level, Precision, _Strict, read_struct, to_json
+from endotsr.port.judge.format import MOST_RUNS, Level, Precision, _Strict, read_struct, to_json
 from endotsr.port.judge.profiles import PROFILES, WITHOUT, ProfileClaim, claim_text
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report
@@ -83,6 +83,8 @@ class Certificate(_Strict, frozen=True, kw_only=True):
     """UTC, ISO 8601"""
     seconds: float
     """of the calls of the port"""
+    runs: int = 1
+    """with --runs, the number of runs, in each of which the level is complete"""
 
     def __post_init__(self) -> None:
         texts = [self.claim, self.vectors, self.manifest, self.judge, self.date, *self.without]
@@ -97,6 +99,8 @@ class Certificate(_Strict, frozen=True, kw_only=True):
             raise InputError(
                 f"without, cases, outputs, cores: more than {MOST_OPERATIONS} operations, or a count below 1"
             )
+        if not 1 <= self.runs <= MOST_RUNS:
+            raise InputError(f"runs: {self.runs}; use 1 to {MOST_RUNS}")
         if not (0 <= self.seconds < 1e9 and 0 <= self.tolerances.used <= 1):
             raise InputError("seconds, tolerances.used: not a time, or an output beyond its tolerance")
         _date(self.date)
@@ -126,6 +130,7 @@ def certified(golden: Golden, report: Report, port: Port) -> Certificate:
         without=tuple(missing), right=tuple(report.profiles), tolerances=_tolerances(golden, report),
         cases=len(cases), outputs=len(judged), port=port, machine=this_machine(),
         date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), seconds=round(report.seconds, 2),
+        runs=report.runs,
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ LEVELS = {
     5: "determinism",
 }
 Precision = Literal["float32", "float64"]
+MOST_RUNS = 1000  # of a port with races
 FLIP_BUDGET = "band"  # the name in the files of the rule that lets some entries flip
 
 

@@ -15,12 +15,11 @@ from endotsr.errors import InputError
 from endotsr.port.judge.call import called
 from endotsr.port.judge.command import KEPT, run_port
 from endotsr.port.judge.compare import largest
-from endotsr.port.judge.format import Case, Precision
+from endotsr.port.judge.format import MOST_RUNS, Case, Precision
 from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report, asked_of, judge, without_claim
 
-MOST_RUNS = 1000
 BITS = 5  # the level that asks for equal bits
 
 
@@ -58,7 +57,7 @@ def called_often(
         wrong += [] if report.accepted else [number]
         worst = min(worst, report, key=lambda one: (one.accepted, one.level, _right(one)))
         spread = _joined(spread, spread_of(golden, first, second, precision, level))
-    worst.seconds = seconds
+    worst.seconds, worst.runs = seconds, runs
     worst.notes += lines(runs, wrong, spread)
     return worst, first
 

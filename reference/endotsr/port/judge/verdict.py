@@ -125,6 +125,8 @@ class Report(msgspec.Struct, kw_only=True):
     """what is right, by profile"""
     seconds: float = 0.0
     """of the calls of the port"""
+    runs: int = 1
+    """calls of the port that were judged; the second call of level 5 belongs to the first"""
 
     first_wrong: str = ""
     """the first operation with a refused output"""

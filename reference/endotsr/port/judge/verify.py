@@ -3,16 +3,30 @@
 A certificate is a file of another person, so its command is shown and never run: the caller gives the command.
 """
 
+from functools import partial
 from pathlib import Path
 
 from endotsr import __version__
 from endotsr.errors import InputError
 from endotsr.port.judge.call import called
 from endotsr.port.judge.certificate import Certificate, certified, manifest_hash, port_of
+from endotsr.port.judge.runs import called_often
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report
 
-COMPARED = ("claim", "vectors", "manifest", "profile", "level", "precision", "without", "right", "cases", "outputs")
+COMPARED = (
+    "claim",
+    "vectors",
+    "manifest",
+    "profile",
+    "level",
+    "precision",
+    "without",
+    "right",
+    "cases",
+    "outputs",
+    "runs",
+)
 
 
 def same_vectors(golden: Golden, given: Certificate) -> None:
@@ -41,7 +55,8 @@ def verified(
         )
     same_vectors(golden, given)
     asked = {"level": given.level, "profile": given.profile, "timeout": timeout}
-    report, outputs = called(golden, command, root, given.precision, **asked)
+    call = called if given.runs == 1 else partial(called_often, runs=given.runs)
+    report, outputs = call(golden, command, root, given.precision, **asked)
     return report, outputs, differences(golden, given, report, command)
 
 

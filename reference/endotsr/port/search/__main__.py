@@ -31,7 +31,8 @@ def main(words: list[str]) -> int:
     except InputError:
         return 1
     inside, asked = looked(found.stage, found.cases)
-    causes = [*sentences(found), *apart(found, float(seconds) / 2)]
+    whole = sentences(found)
+    causes = [*whole, *apart(found, whole, float(seconds) / 2)]
     print(json.dumps({"causes": causes, "inside": inside, "asked": asked}))
     return 0
 

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from endotsr.port.judge.about import axes_of
 from endotsr.port.judge.compare import scale_of
+from endotsr.port.judge.diagnose import made_of
 from endotsr.port.judge.format import FLIP_BUDGET, Case
 from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.relate import FITS
 from endotsr.port.judge.store import Golden, in_precision
 from endotsr.port.judge.verdict import CaseReport
+from endotsr.port.search.places import executed
+from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.stage import Inputs, Outputs, Settings, Stage, tidy
 
 AFTER = 2  # iterations of a trajectory that are compared, from its first wrong one on
@@ -109,9 +112,9 @@ class Answered:
         rule = self.case.outputs[name].compare
         if value.shape != self.got[name].shape or value.dtype.kind == "c":
             return False
-        return self._off(name, value) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
+        return self.off(name, value) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
 
-    def _off(self, name: str, value: NDArray, until: int | None = None) -> int:
+    def off(self, name: str, value: NDArray, until: int | None = None) -> int:
         """Number of entries of an output that differ from the port's; of a trajectory, up to an iteration."""
         got = self.got[name]
         got, value = (got, value) if until is None else (got[:until], value[:until])
@@ -123,11 +126,11 @@ class Answered:
         """Number of outputs that passed, or were right at the start of a trajectory, and no longer are."""
         passed = sum(not self.same(found, [name]) for name in self.got if name not in self.refused)
         begun = ((name, self.wrong_from[name]) for name in self.refused if name in self.wrong_from)
-        return passed + sum(self._off(name, found[name], first) > 0 for name, first in begun)
+        return passed + sum(self.off(name, found[name], first) > 0 for name, first in begun)
 
     def wrong(self, names: Sequence[str]) -> int:
         """Number of entries of some outputs that a change must explain."""
-        return sum(self._off(name, self.right[name]) for name in self.refused.intersection(names))
+        return sum(self.off(name, self.right[name]) for name in self.refused.intersection(names))
 
     def distance(self, found: Mapping[str, NDArray], names: Sequence[str]) -> NDArray | None:
         """Differences of real outputs from the port's, in units of their scale; None if they are not numbers."""
@@ -171,3 +174,17 @@ def _lock(value: Any) -> None:
     elif isinstance(value, tuple | list):
         for part in value:
             _lock(part)
+
+
+def of_the_parts(operation: str, golden: Golden) -> set[str]:
+    """Functions of the definition executed by the parts of an operation, which are right."""
+    stages = definition_stages()
+    parts = made_of(operation) & stages.keys()
+    cases = {case.operation: case for case in golden.cases if case.operation in parts}
+    calls = {
+        part: lambda part=part: stages[part].compute(
+            in_precision(golden.inputs(cases[part]), "float64"), cases[part].settings
+        )
+        for part in parts & cases.keys()
+    }
+    return {place.name for place in executed(calls)}

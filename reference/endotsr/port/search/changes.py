@@ -1,8 +1,8 @@
 """The changes of the definition that are tried for one operation, likely ones first.
 
-First come numbers, then other texts, then other names of one expression, in the code of the operation before the code
-of its parts. Then come settings and inputs read differently, and at the end changes of two expressions, of a part of
-an array, and of the order.
+First come the conventions of other programs. Then come numbers, other texts and other names of one expression, in the
+code of the operation before the code of its parts, settings and inputs read differently, and decisions at another
+number. At the end come changes of two expressions, of a part of an array, and of the order.
 """
 
 import ast
@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.port.judge.diagnose import made_of
-from endotsr.port.judge.store import Golden, in_precision
-from endotsr.port.search.cases import Answered
+from endotsr.port.judge.store import Golden
+from endotsr.port.search.cases import Answered, of_the_parts
+from endotsr.port.search.decisions import try_conventions, try_thresholds
 from endotsr.port.search.numbers import START, said_number
 from endotsr.port.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
 from endotsr.port.search.requests import OtherReading, other_requests
 from endotsr.port.search.rewrites import rewrites, rounded, with_number
 from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts
 from endotsr.port.search.trial import LATEST, TELLING, Live, Trial
-from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # computing time of a search
@@ -40,13 +39,12 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
             "reverse": lambda: [one.reverse(stage, one.inputs, one.saved) for one in answered],
         }
         places = executed(calls)
-        inner = _inner(stage.name, golden)
+        inner = of_the_parts(stage.name, golden)
         glue = [place for place in places if inner and not place.is_constant and place.name not in inner]
-        _places(found, glue)
-        _requests(found)
-        _places(found, [place for place in places if not place.is_constant and place not in glue])
-        _places(found, [place for place in places if place.is_constant])
-        _second(found, [place for place in (glue or places) if not place.is_constant])
+        if not found.length:
+            try_conventions(found, places)
+        if not found.explains:  # a prepared description is the one to read, and single expressions need not be tried
+            _all_places(found, places, glue)
     for module in definition_modules():
         for name in ("_knob", "_seen", "_at", "_nth"):
             module.__dict__.pop(name, None)
@@ -54,18 +52,15 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
     return found
 
 
-def _inner(operation: str, golden: Golden) -> set[str]:
-    """Functions of the definition executed by the parts of an operation, which are right."""
-    stages = definition_stages()
-    parts = made_of(operation) & stages.keys()
-    cases = {case.operation: case for case in golden.cases if case.operation in parts}
-    calls = {
-        part: lambda part=part: stages[part].compute(
-            in_precision(golden.inputs(cases[part]), "float64"), cases[part].settings
-        )
-        for part in parts & cases.keys()
-    }
-    return {place.name for place in executed(calls)}
+def _all_places(trial: Trial, places: Sequence[Statement], glue: Sequence[Statement]) -> None:
+    """Changes of single expressions, then of more; those of the operation itself, `glue`, before its parts."""
+    functions = [place for place in places if not place.is_constant]
+    _places(trial, glue)
+    _requests(trial)
+    try_thresholds(trial, functions)
+    _places(trial, [place for place in functions if place not in glue])
+    _places(trial, [place for place in places if place.is_constant])
+    _second(trial, list(glue) or functions)
 
 
 def _places(trial: Trial, places: Sequence[Statement]) -> None:

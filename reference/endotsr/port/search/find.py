@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from endotsr.errors import InputError
@@ -39,8 +40,10 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
     return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
 
 
-def apart(trial: Trial, seconds: float) -> list[str]:
+def apart(trial: Trial, whole: Sequence[str], seconds: float) -> list[str]:
     """Explanations of single outputs: independent mistakes often spoil different ones.
+
+    whole   what `sentences` says of all outputs together
 
     Tried are all refused outputs if no change explains them together, and the gradients if one explains the forward
     outputs alone. An output is compared together with all outputs that are right, and without the other wrong ones.
@@ -48,7 +51,7 @@ def apart(trial: Trial, seconds: float) -> list[str]:
     """
     names = dict.fromkeys(name for one in trial.cases for name in _forward_first(one))
     left = list(names)
-    if sentences(trial) and trial.hits[0].whole == "forward":
+    if whole and trial.hits[0].whole == "forward":
         left = [name for name in names if any(name in one.gradient_names for one in trial.cases)]
     elif trial.hits:
         left = []

@@ -57,6 +57,7 @@ class Trial:
     def __init__(self, stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
         self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
         self.golden = golden
+        self.length = max((one.length for one in answered), default=0)  # of trajectories, which are slow
         self.hits: list[Hit] = []
         self.live: list[Live] = []
         self.counter = Counter()

@@ -1,0 +1,80 @@
+"""Decisions of other programs and other thresholds are found again, and nothing else is taken for one.
+
+The mistakes are those of `habits.toml`; `python tests/port/search/habits.py` judges all of them.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from endotsr.port.search.conventions import Convention, prepared
+from endotsr.port.search.decisions import Interval, threshold
+from endotsr.port.search.images import OF_IMAGES
+from endotsr.port.search.screen import OF_THE_SCREEN
+from endotsr.port.stages.definition import definition_stages
+
+sys.path.insert(0, str(Path(__file__).parent))
+from habits import EVERY, GOLDEN, MISTAKES, sentences_on
+
+CONVENTIONS = (*OF_THE_SCREEN, *OF_IMAGES)
+FOUND = {
+    "three_sigma_ellipse": "the ellipse of 3 sigma",
+    "tiles_of_8": "tiles of 8 pixels, not of 16",
+    "frustum_of_1.3": "1.3 times the field of view",
+    "quaternion_xyzw": "quaternions written x, y, z, w",
+    "ssim_reflect": "the image mirrored under the window",
+    "ssim_unbiased": "unbiased variances and covariance, times 121 / 120",
+    "pyr_up_without_factor": "as pyrUp does, without the factor 4",
+    "reverse_weight_not_decayed": "not dimmed by it",
+    "reverse_own_included": "including the Gaussian itself",
+}
+OTHERS = {  # mistakes that are no convention of the lists, and none may be said of them
+    "composite": ("dx, dy = columns - mean[0, n]", "dx, dy = 1.01 * (columns - mean[0, n])"),
+    "masked_ssim": ("a1, a2 = 2 * mu_x * mu_y + C1", "a1, a2 = 2 * mu_x * mu_y * (1 + 0.01 * mu_x) + C1"),
+    "laplacian": ("coarse = down[0] @ level @ down[1].T", "coarse = 0.99 * down[0] @ level @ down[1].T"),
+}  # fmt: skip
+
+
+def test_every_convention_fits_the_definition_and_is_said_once():
+    definition_stages()
+    said = [prepared(convention).said for convention in CONVENTIONS]
+    assert len(set(said)) == len(CONVENTIONS) >= 60
+
+
+def test_a_convention_whose_text_is_gone_is_an_error():
+    definition_stages()
+    with pytest.raises(ValueError, match=r"0 places in masked_ssim\.blurred, where 1 is expected: 'no such text'"):
+        prepared(Convention("nothing", (("masked_ssim.blurred", "no such text", ""),)))
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_a_convention_is_said_in_words_with_its_line(name):
+    said = sentences_on(MISTAKES[name])
+    assert FOUND[name] in said[0] and ", definition/" in said[0], said
+    assert said[-1].startswith("  (every "), said
+
+
+def test_another_threshold_is_said_with_its_interval():
+    said = sentences_on(MISTAKES["cutoff_1_over_200"])
+    assert "raster.alpha_cutoff fixed at 0.005 (any number from 0.00" in said[0], said
+
+
+@pytest.mark.parametrize("operation", OTHERS)
+def test_another_mistake_has_none_of_these_names(operation):
+    said = " ".join(sentences_on({"operation": operation, "edit": [OTHERS[operation]]}, seconds=2.0))
+    assert not any(convention.said in said for convention in CONVENTIONS), said
+
+
+def test_a_threshold_is_narrowed_by_counts():
+    values = np.random.default_rng(0).uniform(0, 1, 1000)
+    found = threshold(lambda k: int(((values > k) != (values > 0.3)).sum()), 0.5)
+    assert found is not None and found.low <= 0.3 <= found.high
+    assert not ((values > found.low) & (values <= found.high)).any() and 0.3 in found.numbers()
+    assert threshold(lambda k: 7, 0.5) is None
+    assert Interval(0.0039, 0.00391).numbers()[0] == 1 / 256
+
+
+def test_the_set_has_every_kind_and_fits_the_port():
+    assert len(MISTAKES) >= 60 and {one["operation"] for one in EVERY} <= {case.operation for case in GOLDEN.cases}
