@@ -101,11 +101,13 @@ def _screens() -> list[Spec]:
     near = 3.0 + 1e-3 * permutation(seeds.seed("order"), 8)
     text = f"3 + k / 1000, k = stable order of the words of {seeds.seed('order')}"
     inputs["depth"] = given(near, text, "scene unit")
+    halves = "A disc that ends in the second half of a tile: tiles of 8 px would cut it there"
     tiles = "A disc that reaches the next tile beyond three sigma alone is not drawn there"
     return [
         Spec("composite", "close_depths", "composite", "Overlapping Gaussians with depths a thousandth apart",
              ("order_by_index", "depths_in_steps"), raster_settings(PAPER), inputs),
         tile_case("next_tile", tiles, ("tiles_unbounded",), [7.45, 23.4, 30.0], [8.2, 7.4, 10.0], [9.0, 9.0, 4.0]),
+        tile_case("half_tile", halves, (), [10.25, 37.5, 30.0], [8.2, 7.4, 10.0], [20.0, 4.0, 4.0]),
     ]  # fmt: skip
 
 

@@ -22,6 +22,7 @@ CONVENTIONS = (*OF_THE_SCREEN, *OF_IMAGES)
 FOUND = {
     "three_sigma_ellipse": "the ellipse of 3 sigma",
     "tiles_of_8": "tiles of 8 pixels, not of 16",
+    "radius_not_rounded": "the radius of the tiles not rounded up",
     "frustum_of_1.3": "1.3 times the field of view",
     "quaternion_xyzw": "quaternions written x, y, z, w",
     "ssim_reflect": "the image mirrored under the window",

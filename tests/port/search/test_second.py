@@ -10,6 +10,7 @@ import pytest
 
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.search import changes
 from endotsr.port.search.find import apart, explained, sentences
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unseen" / "by_hand"))
@@ -83,7 +84,8 @@ def search_on(golden, folder, stage, *edits):
 
 
 @pytest.mark.parametrize("kind", MISTAKES)
-def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind):
+def test_every_kind_of_change_finds_a_mistake(golden, tmp_path, kind, monkeypatch):
+    monkeypatch.setattr(changes, "try_conventions", lambda *_: None)  # one of them is a mistake of this table
     stage, old, new, said = MISTAKES[kind]
     found = search_on(golden, tmp_path, stage, (old, new))
     text = "\n".join(sentences(found))
