@@ -120,7 +120,7 @@ def test_a_comparison_without_its_end_is_found(golden, tmp_path, monkeypatch):
         return without_end(gaussians, statistics, Fields(fields), *rest)
 
     monkeypatch.setattr(density_control, "densify", converted)
-    said = causes(golden, tmp_path, "density", seconds=16.0)
+    said = causes(golden, tmp_path, "density")
     assert "`(steepness) > (least)` where `steepness >= least` is right: equation (B11)" in said
 
 
