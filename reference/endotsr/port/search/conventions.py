@@ -23,7 +23,7 @@ class Convention(NamedTuple):
     """function or constant as `module.name`, its text, and the other text; the text stands there once"""
 
 
-class Prepared(NamedTuple):
+class ChangedDefinition(NamedTuple):
     """A convention as code, the line it changes first, and the functions it changes."""
 
     said: str
@@ -32,7 +32,7 @@ class Prepared(NamedTuple):
     names: frozenset[str]
 
 
-def prepared(convention: Convention) -> Prepared:
+def prepared(convention: Convention) -> ChangedDefinition:
     """The changed functions, compiled. Raises: ValueError if a text does not stand in its place exactly once."""
     texts: dict[str, str] = {}
     for name, old, new in convention.changes:
@@ -54,7 +54,7 @@ def prepared(convention: Convention) -> Prepared:
     line = statement.lineno + _source(first).partition(old)[0].count("\n")
     marked = ast.copy_location(ast.Pass(), statement)
     marked.lineno = line
-    return Prepared(convention.said, Spot(place, marked, ()), install, frozenset(texts))
+    return ChangedDefinition(convention.said, Spot(place, marked, ()), install, frozenset(texts))
 
 
 def _statement(name: str, node: Any) -> Statement:
