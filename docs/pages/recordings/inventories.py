@@ -12,14 +12,16 @@ from endotsr.cli.parts.related_options import RELATIONS
 from endotsr.cli.parts.relations import Needs, shown
 from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
 from endotsr.clips.sequences.inventory import Inventory
+from endotsr.clips.sequences.layouts import c3vd, hamlyn, scared, servct
 from endotsr.clips.sequences.layouts.nerfstudio import FIELDS, FRAME_FIELDS
 from endotsr.clips.sequences.matlab_calibrations import BOUGUET
 from endotsr.clips.sequences.matlab_calibrations import CAMERA as MATLAB
 from endotsr.clips.sequences.matlab_calibrations import PAIR as MATLAB_PAIR
-from endotsr.clips.sequences.picture_fields import JPEG, PNG, TIFF, WEBP
+from endotsr.clips.sequences.picture_fields import BMP, JPEG, PNG, TIFF, WEBP
 from endotsr.clips.sequences.point_files import CLOUD
 from endotsr.clips.sequences.pose_fields import COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF
 from endotsr.clips.sequences.slam_calibrations import EUROC, ORB
+from endotsr.clips.sequences.stream_marks import AVI, PROGRAM, TRANSPORT
 from endotsr.clips.sequences.trajectory_lines import FIELDS as TRAJECTORY
 from endotsr.clips.sequences.video_marks import MATROSKA, MP4
 from endotsr.results.export.ply import GAUSSIAN
@@ -29,7 +31,8 @@ from pages.store.marks import write_marked
 PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
 INVENTORIES = (
     FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, INI, ORB,
-    EUROC, MATLAB, MATLAB_PAIR, BOUGUET, PNG, JPEG, WEBP, TIFF, MP4, MATROSKA, CLOUD, GAUSSIAN,
+    EUROC, MATLAB, MATLAB_PAIR, BOUGUET, servct.FILES, servct.CAMERA, hamlyn.FILES, c3vd.FILES,
+    scared.FILES, scared.FRAME, PNG, JPEG, WEBP, TIFF, BMP, MP4, MATROSKA, AVI, TRANSPORT, PROGRAM, CLOUD, GAUSSIAN,
 )  # fmt: skip
 USES = {"used": "used", "refused": "refused", "told": "named in a note", "harmless": "harmless"}
 COMMANDS = ("prepare", "depth", "render", "export")  # of `train`, most related options are settings

@@ -74,6 +74,7 @@ from odd_inputs import ODD_ROWS
 from rig_inputs import RIG_ROWS
 from silent_inputs import SILENT_ROWS
 from squeezed_inputs import SQUEEZED_ROWS
+from stream_inputs import STREAM_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
 from time_inputs import BESIDE_ROWS, TIME_ROWS
@@ -295,6 +296,7 @@ ROWS = [
     *BESIDE_ROWS,
     *MATLAB_ROWS,
     *SQUEEZED_ROWS,
+    *STREAM_ROWS,
 ]  # fmt: skip
 
 

@@ -4,12 +4,15 @@ import pytest
 from field_inputs import FORMATS as NAMED
 from field_inputs import Format
 from file_formats import FILES
+from layout_formats import LAYOUTS
+from layout_formats import OTHER_NAMES as OF_FOLDERS
+from stream_formats import BY_PILLOW, STREAMS
 from video_formats import REPEATED, TRACKS
 
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.errors import InputError
 
-FORMATS = NAMED | FILES | TRACKS
+FORMATS = NAMED | FILES | TRACKS | LAYOUTS | STREAMS
 USED = [(name, field) for name, found in FORMATS.items() for field in found.changed]
 REFUSED = [(name, field) for name, found in FORMATS.items() for field in found.refused]
 
@@ -51,9 +54,9 @@ def test_a_refused_field_is_refused_by_name(name, field, tmp_path):
     assert isinstance(said, str) and field in said and found.inventory.reason(found.inventory.refused, field) in said
 
 
-@pytest.mark.parametrize(("name", "field"), [(name, field) for name, found in FILES.items() for field in found.told])
+@pytest.mark.parametrize(("name", "field"), [(name, field) for name, found in FORMATS.items() for field in found.told])
 def test_a_field_that_is_not_applied_is_told(name, field, tmp_path):
-    found = FILES[name]
+    found = FORMATS[name]
     said = outcome(found, tmp_path / "a", found.base | {field: found.told[field]})
     text = found.inventory.reason(found.inventory.told, field)
     assert isinstance(said, tuple) and any(f"{field}: {text}" in note for note in said[1]), said
@@ -66,8 +69,8 @@ def test_the_base_has_every_used_field_or_a_change_adds_it(name):
     patterns = [word for names in found.inventory.used for word in names.split()]
     tried = {*found.changed, *found.base}
     spelled = {"nerfstudio frame": {"camera_angle_x", "camera_angle_y"}, "ros": ALIASES, "ros echo": ALIASES,
-               "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, "matlab": {"FocalLength", "PrincipalPoint"},
-               "bouguet": {"fc", "cc", "kc"}, **REPEATED}.get(name, set())  # fmt: skip
+               "opencv": OTHER_NAMES, "tiff": BY_LIBTIFF, "bmp": BY_PILLOW, "matlab": {"FocalLength", "PrincipalPoint"},
+               "bouguet": {"fc", "cc", "kc"}, **REPEATED, **OF_FOLDERS}.get(name, set())  # fmt: skip
     for pattern in patterns:
         inventory = Inventory("", {pattern: "x"})
         known = pattern in spelled or any(inventory.reason(inventory.used, field) for field in tried)
@@ -126,6 +129,11 @@ def test_a_video_with_a_new_field_says_so(name, old, tmp_path):
         ("png", "PLTE"),
         ("gaussians", "rot_1"),
         ("mp4", "elst"),
+        ("servct camera", "P2"),
+        ("avi", "vprp"),
+        ("ts", "stream_type"),
+        ("hamlyn", "depth"),
+        ("scared frame", "camera-pose"),
     ],
 )
 def test_a_reader_that_drops_a_field_is_found(name, field, tmp_path):

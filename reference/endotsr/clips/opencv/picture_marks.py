@@ -24,6 +24,9 @@ ORIENTATION, EXIF_IFD, COLOUR_SPACE = 0x0112, 0x8769, 0xA001  # EXIF tags; orien
 OTHER_SPACES = (2, 65535)  # Adobe RGB; uncalibrated, as cameras state it for Adobe RGB
 GAMMA, PRIMARIES = 45455, (31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)  # of sRGB in a PNG
 SAME_GAMMA, SAME = 0.1, 1000  # relative difference of gamma; difference of primaries, in these steps
+BITMAP = ("bfType", "bfOffBits", "biSize", "biWidth", "biHeight", "biPlanes", "biBitCount", "biCompression",
+          "biSizeImage", "biClrUsed", "biClrImportant")  # fmt: skip
+SRGB_SPACES, CALIBRATED = (b"sRGB", b"Win "), b"\0\0\0\0"  # bV4CSType
 WIDE_RANGE = {16: "PQ", 18: "HLG"}  # transfer functions of cICP
 
 
@@ -46,6 +49,8 @@ def marks_of(data: bytes) -> dict[str, Any]:
             return _webp(data)
         if data[:4] in (b"II*\0", b"MM\0*"):
             return _tags(data)
+        if data[:2] == b"BM":
+            return _bitmap(data)
     except (struct.error, zlib.error, ValueError, IndexError, KeyError, OverflowError):
         pass  # the reader of the pixels reports the fault
     return {}
@@ -134,6 +139,25 @@ def _webp(data: bytes) -> dict[str, Any]:
             found |= _of_exif(content.removeprefix(EXIF_START))
         place += 8 + length + length % 2
     return found
+
+
+def _bitmap(data: bytes) -> dict[str, Any]:
+    """The fields of the header of a BMP that say something beside the pixels, by their names at Microsoft."""
+    found: dict[str, Any] = dict.fromkeys(BITMAP, True)
+    length = int.from_bytes(data[14:18], "little")
+    if length >= 40:
+        across, down = struct.unpack_from("<ii", data, 38)
+        found["biXPelsPerMeter"] = across != down and f"{down}:{across}"
+    if length >= 108:
+        space = data[14 + 56 : 14 + 60][::-1]
+        ends = struct.unpack_from("<9i3I", data, 14 + 60)
+        found["bV4CSType"] = space not in SRGB_SPACES and (space != CALIBRATED or any(ends)) and plain_space(space)
+    return found
+
+
+def plain_space(space: bytes) -> str:
+    """The name of a colour space in a BMP."""
+    return space.decode("latin-1") if space.isalpha() else "calibrated"
 
 
 def _is_srgb(profile: bytes) -> bool:

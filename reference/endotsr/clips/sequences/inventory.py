@@ -26,6 +26,16 @@ class Inventory(NamedTuple):
         """The text on a name in one of the groups; None if it is not there."""
         return next((text for names, text in use.items() if any(fnmatchcase(name, n) for n in names.split())), None)
 
+    @property
+    def listed(self) -> tuple[str, ...]:
+        """The patterns of all names that are used, told or harmless, such as those of files in a folder."""
+        return tuple(name for use in (self.used, self.told, self.harmless) for names in use for name in names.split())
+
+    def telling(self, names: Iterable[str], where: object) -> list[str]:
+        """Notes on names that are not applied; other names are passed over. For files, whose names are lowered."""
+        found = [(name, self.reason(self.told, name.lower())) for name in names]
+        return [f"{where}: {plain_line(name)[:60]}: {text}" for name, text in found if text is not None]
+
     def noted(self, fields: Mapping[str, object] | Iterable[str], where: object) -> list[str]:
         """Notes on the fields of a file that are not applied or not listed.
 

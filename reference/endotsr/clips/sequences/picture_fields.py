@@ -91,7 +91,18 @@ TIFF = Inventory(
         "ModelPixelScale* ModelTiepoint* ModelTransformation* Geo*": "a place on a map",
     },
 )
-FORMATS = {".png": PNG, ".jpg": JPEG, ".jpeg": JPEG, ".webp": WEBP, ".tif": TIFF, ".tiff": TIFF}
+BMP = Inventory(
+    "the header of BMP",
+    used={
+        "bfType bfOffBits biSize biWidth biHeight biBitCount biCompression biClrUsed": PIXELS,
+    },
+    told={
+        "biXPelsPerMeter": "the pixels are not square, as are fx and fy",
+        "bV4CSType": COLOURS,
+    },
+    harmless={"biPlanes biSizeImage biClrImportant": "it repeats other fields, or concerns old displays"},
+)
+FORMATS = {".bmp": BMP, ".png": PNG, ".jpg": JPEG, ".jpeg": JPEG, ".webp": WEBP, ".tif": TIFF, ".tiff": TIFF}
 
 
 def picture_notes(files: list[Path]) -> list[str]:

@@ -83,7 +83,7 @@ def video_facts(path: Path) -> VideoFacts:
 
     Raises:  InputError for a file that is not a decodable video, and for high dynamic range.
     """
-    noted = container_notes(path)
+    noted = [note.removeprefix(f"{path.name}: ") for note in container_notes(path)]
     with _opened(path) as (container, stream):
         codec, context = stream.codec_context.name, stream.codec_context
         shape = float(stream.sample_aspect_ratio or 1) or 1.0

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from endotsr.clips.sequences.inventory import Inventory
+from endotsr.clips.sequences.stream_marks import stream_notes
 from endotsr.untrusted.files import open_regular
 
 LARGEST_FILE = 1 << 40  # bytes
@@ -104,7 +105,7 @@ def container_notes(path: Path) -> list[str]:
             return MATROSKA.noted(_matroska_fields(file, length), path.name)
         if begin[4:8] in (b"ftyp", b"moov", b"free", b"skip", b"wide", b"mdat", b"pnot"):
             return MP4.noted(_mp4_fields(file, length), path.name)
-    return []
+        return stream_notes(file, begin, path.name)
 
 
 def _mp4_fields(file: BufferedReader, length: int) -> dict[str, object]:

@@ -16,6 +16,7 @@ from endotsr.clips.opencv.stereo import Maps, remapped
 from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matrix, inverse_pose, rows_of_motion
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -24,6 +25,18 @@ from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 
 POSES, COLOUR, DEPTH = "pose.txt", "_color.png", "_depth.tiff"
+FILES = Inventory(
+    "the folder of a sequence of C3VD",
+    used={
+        "*_color.png": "pictures, 1350x1080",
+        "*_depth.tif*": "depth, 65535 = 100 mm; 0 and 65535 mean none",
+        "pose.txt": "transposed camera-to-world matrices, millimetres",
+    },
+    harmless={
+        "*_normals.tif* *_flow.tif*": "they follow from depth and poses",
+        "*_occlusion.png coverage_mesh.obj": "they show what other frames see of the phantom",
+    },
+)
 STEP, NO_DEPTH = 100.0 / 65535.0, 65535  # mm per step; beyond the depth range
 WIDTH, HEIGHT = 1350, 1080
 # The camera CF-HQ190L as published by the authors; the first pixel centre is (0, 0).
@@ -123,13 +136,5 @@ LAYOUT = Layout(
     rank=2,
     recognises=recognises,
     describe=describe_c3vd,
-    reads=(
-        "*_color.png",
-        "*_depth.tif*",
-        "pose.txt",
-        "*_normals.tif*",
-        "*_flow.tif*",
-        "*_occlusion.png",
-        "coverage_mesh.obj",
-    ),
+    reads=FILES.listed,
 )

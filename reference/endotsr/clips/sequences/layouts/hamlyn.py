@@ -14,6 +14,7 @@ from endotsr.clips.sequences.camera import intrinsics_of_matrix
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -22,6 +23,15 @@ from endotsr.errors import InputError
 
 CAMERA = "intrinsics.txt"
 LEFT, RIGHT, DEPTH = ("color", "image01"), ("image02",), ("depth", "depth01")
+FILES = Inventory(
+    "the folder of a clip of Hamlyn",
+    used={
+        "color image01": "left pictures; the first of the two folders",
+        "image02": "right pictures",
+        "depth depth01": "depth, millimetres; the first of the two folders",
+        "intrinsics.txt": "K of the rectified pictures; a fourth column other than 0 is refused",
+    },
+)
 
 
 def recognises(path: Path) -> bool:
@@ -52,6 +62,7 @@ def describe_hamlyn(path: Path, options: SourceOptions) -> Clip:
         depth=depth_of(matching_files(left, depth), 1.0) if depth else None,
         intrinsics=intrinsics_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
         baseline=options.baseline,
+        read_here=tuple(folder.name for folder in (left_folder, right_folder, depth_folder) if folder is not None),
         rate=options.rate,
         notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout has no poses: the camera counts as static"],
     )
@@ -65,11 +76,5 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_hamlyn,
     takes=("masks", "depth", "baseline"),
-    reads=(
-        "intrinsics.txt",
-        "color",
-        "image01",
-        "image02",
-        "depth*",
-    ),
+    reads=(CAMERA,),
 )

@@ -14,9 +14,12 @@ from pathlib import Path
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.camera import checked_rotation, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.files import frame_numbers, shortened
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.unread import unread
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
@@ -25,6 +28,25 @@ from endotsr.untrusted.yaml import matrix
 
 CALIBRATIONS = ("endoscope_calibration.yaml", "camera_calibration.yaml")
 VIDEO, FOLDER, ARCHIVE = "data/rgb.mp4", "data/frame_data", "data/frame_data.tar.gz"
+FRAME = Inventory(
+    "the file of a frame of SCARED, in frame_data",
+    used={"camera-pose": "world-to-camera, millimetres"},
+    told={"camera-calibration": "the calibration of the keyframe is used for all frames"},
+    harmless={"timestamp": "the video states the times"},
+)
+FILES = Inventory(
+    "the folder of a keyframe of SCARED",
+    used={
+        "endoscope_calibration.yaml camera_calibration.yaml": "both cameras; the first of the two files",
+        "data": "rgb.mp4: the pairs; frame_data or frame_data.tar.gz: the poses",
+    },
+    told={
+        "left_depth_map.tif* right_depth_map.tif* point_cloud.obj scene_points scene_points.tar.gz": "structured light"
+        " of pictures that are not rectified is not read: endotsr depth matches the pairs",
+    },
+    harmless={"left_image.png right_image.png": "the first pair of the video"},
+)
+IN_DATA = ("rgb.mp4", "frame_data", "frame_data.tar.gz", "scene_points", "scene_points.tar.gz")
 LARGEST_FILE, MOST_FILES = 1 << 20, 1 << 17  # bytes of the JSON of a frame; frames
 
 
@@ -44,31 +66,47 @@ def describe_scared(path: Path, options: SourceOptions) -> Clip:
         raise InputError(f"{path}: allowed: a folder with {VIDEO} and {CALIBRATIONS[0]}")
     stated = replace(options, stereo="stacked", calibration=calibration)
     clip = describe_video(path / VIDEO, stated)
-    notes, poses = [*clip.notes], clip.poses
+    inside = sorted(entry.name for folder in (path, path / "data") for entry in folder.iterdir())
+    notes, poses = [*clip.notes, *FILES.telling(inside, path.name)], clip.poses
+    notes += unread(path / "data", IN_DATA, options, LAYOUT.takes)
     if options.calibration is None:
         notes.append(f"{calibration.name}: {HALF_A_PIXEL}; T in millimetres")
     if poses is None:
-        poses = _poses(path, clip.count)
+        poses = _poses(path, clip.count, notes)
         kinematics = (
             "camera-pose of the kinematics: read as world-to-camera, millimetres; its authors report errors in it"
         )
         notes.append(kinematics if poses else f"{FOLDER} is missing: the camera counts as static")
-    return replace(clip, layout="scared", where=path, poses=poses, unit="mm", notes=notes)
+    read = (calibration.name.lower(),) if options.calibration is None else ()
+    return replace(clip, layout="scared", where=path, poses=poses, unit="mm", notes=notes, read_here=read)
 
 
-def _poses(path: Path, count: int) -> list[CameraPose | None] | None:
-    """World-to-camera poses of the frames; None without files."""
+def _poses(path: Path, count: int, notes: list[str]) -> list[CameraPose | None] | None:
+    """World-to-camera poses of the frames; None without files.
+
+    One file for each frame belongs to them in order; otherwise a file belongs to the frame with its number.
+    """
     texts = _texts(path)
     if not texts:
         return None
-    found: list[CameraPose | None] = []
-    for name, content in texts[:count]:
+    numbers = frame_numbers([Path(name) for name, _ in texts])
+    in_order = len(texts) == count or numbers is None or len(numbers[0]) != 1
+    found: list[CameraPose | None] = [None] * count
+    unused, said = [], []
+    for k, (name, content) in enumerate(texts):
+        place = k if in_order or numbers is None else numbers[k][0]
         where = f"{path / FOLDER / name}: camera-pose"
         data = parsed(content, where)
+        said += FRAME.noted(data, FOLDER) if isinstance(data, dict) else []
+        if not 0 <= place < count:
+            unused.append(name)
+            continue
         stored = matrix(data.get("camera-pose") if isinstance(data, dict) else None, where, (4, 4))
         rotation, translation = rows_of_motion(stored, where)
-        found.append(CameraPose(checked_rotation(rotation, where), translation))
-    return found + [None] * (count - len(found))
+        found[place] = CameraPose(checked_rotation(rotation, where), translation)
+    notes += sorted(set(said))
+    notes += [f"{FOLDER}: of no frame, not used: {shortened(unused)}"] if unused else []
+    return found
 
 
 def _texts(path: Path) -> list[tuple[str, str | bytes]]:
@@ -99,8 +137,5 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_scared,
     takes=("calibration", "trajectory", "masks"),
-    reads=(
-        "data",
-        "endoscope_calibration.yaml",
-    ),
+    reads=tuple(name for name in FILES.listed if not name.endswith(".yaml")),
 )

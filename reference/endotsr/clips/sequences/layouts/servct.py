@@ -15,6 +15,7 @@ from endotsr.clips.sequences.camera import Intrinsics, intrinsics_of_matrix
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -24,6 +25,27 @@ from endotsr.untrusted.json import read_json
 from endotsr.untrusted.yaml import matrix
 
 LEFT, RIGHT, CAMERAS, DEPTH = "Left_rectified", "Right_rectified", "Rectified_calibration", "Ground_truth_CT/DepthL"
+CAMERA = Inventory(
+    "a camera file of SERV-CT",
+    used={
+        "P1": "left camera: intrinsics, pixel centres at integers; the fourth column is 0",
+        "P2": "right camera: the same intrinsics, and -fx times the baseline in millimetres",
+    },
+    harmless={"Q R1 R2 M1 M2 D1 D2 R T E F K1 K2 size image_size": "the pictures are rectified: P1 and P2 hold it"},
+)
+FILES = Inventory(
+    "the folder of an experiment of SERV-CT",
+    used={
+        "left_rectified right_rectified": "the pictures of a pair",
+        "rectified_calibration": "a camera file for each pair, all with one camera",
+        "ground_truth_ct": "DepthL: depth of the left picture, millimetres times 256",
+    },
+    told={
+        "left right": "pictures that are not rectified are not read",
+        "ground_truth_rgb reference_rgb reference*": "another reference is not read: --depth",
+    },
+)
+SAME = 1e-3  # pixels between the intrinsics of two rectified cameras
 STEP = 1.0 / 256.0  # mm per step of the stored depth
 
 
@@ -32,12 +54,18 @@ def recognises(path: Path) -> bool:
     return (path / LEFT).is_dir() and (path / CAMERAS).is_dir()
 
 
-def read_camera(path: Path, width: int, height: int) -> tuple[Intrinsics, float]:
-    """Intrinsics and baseline in millimetres of a pair. Raises InputError."""
+def read_camera(path: Path, width: int, height: int, notes: list[str]) -> tuple[Intrinsics, float]:
+    """Intrinsics and baseline in millimetres of a pair; fields that are not known are noted.
+
+    Raises:  InputError for two cameras whose intrinsics differ, and for a right camera that is not to the right.
+    """
     found = read_json(path)
+    notes += CAMERA.noted(found, path.name)
     left, right = (matrix(found.get(name), f"{path}: {name}", (3, 4)) for name in ("P1", "P2"))
     if right[0, 3] >= 0:
         raise InputError(f"{path}: P2: the fourth number is {right[0, 3]:g}; allowed: below 0, -f times the baseline")
+    if left[:, 3].any() or np.abs(right[:, :3] - left[:, :3]).max() > SAME:
+        raise InputError(f"{path}: P1 and P2: allowed: one camera, with 0 in the fourth column of P1")
     return intrinsics_of_matrix(left[:, :3], width, height, where=path), float(-right[0, 3] / right[0, 0])
 
 
@@ -47,7 +75,8 @@ def describe_servct(path: Path, options: SourceOptions) -> Clip:
     check_pairing(left, right)
     width, height = size_of(left)
     files = list_pictures(path / CAMERAS, (".json",))
-    cameras = [read_camera(file, width, height) for file in files]
+    notes: list[str] = []
+    cameras = [read_camera(file, width, height, notes) for file in files]
     numbers = np.array([[*intrinsics[:4], baseline] for intrinsics, baseline in cameras])
     apart = np.flatnonzero(np.abs(numbers - numbers[0]).max(axis=1) > 1e-3)
     if apart.size:
@@ -62,6 +91,8 @@ def describe_servct(path: Path, options: SourceOptions) -> Clip:
         intrinsics=cameras[0][0],
         baseline=cameras[0][1],
         notes=[
+            *sorted({note.split(": ", 1)[1] for note in notes}),
+            *FILES.telling(sorted(file.name for file in path.iterdir()), path.name),
             f"{CAMERAS}: {HALF_A_PIXEL}",
             "the pairs of SERV-CT are separate views without poses: use them for `endotsr depth` and its comparison"
             " with the reference, not for training one scene",
@@ -77,12 +108,5 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_servct,
     takes=("masks", "depth"),
-    reads=(
-        "left_rectified",
-        "right_rectified",
-        "rectified_calibration",
-        "*depth*",
-        "ground_truth*",
-        "reference*",
-    ),
+    reads=FILES.listed,
 )
