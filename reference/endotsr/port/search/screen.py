@@ -94,6 +94,12 @@ OF_THE_SCREEN: tuple[Convention, ...] = (
     Convention("the rotation matrix written w - y^2 and so on, without 2 (half of its products)", (
         ("covariance.rotation_of", "2 * outer + 2 * w * cross", "outer + w * cross"),
     )),
+    Convention("a white background, whatever the request asks for", (
+        ("compositing.composite_forward", "t * background[:, None, None]", "t * (0 * background + 1)[:, None, None]"),
+    )),
+    Convention("a black background, whatever the request asks for", (
+        ("compositing.composite_forward", "t * background[:, None, None]", "t * (0 * background)[:, None, None]"),
+    )),
     Convention("the depth divided by the opacity", (
         ("compositing.composite_forward", "Composite(image, depth,",
          "Composite(image, depth / np.where(opacity == 0, 1, opacity),"),
@@ -132,6 +138,15 @@ OF_THE_SCREEN: tuple[Convention, ...] = (
     )),
     Convention("what a Gaussian hides left out of the gradient by its alpha", (
         (_REVERSE, "(own - rest)", "own"),
+    )),
+    Convention("the layers from front to back, not from back to front, in the reverse pass", (
+        (_REVERSE, "in reversed(layers)", "in layers"),
+    )),
+    Convention("the gradient of the opacity image left out of the gradient by alpha", (
+        (_REVERSE, "projected.depth[i] * d_depth + d_opacity", "projected.depth[i] * d_depth"),
+    )),
+    Convention("the gradient of the depth image left out of the gradient by alpha", (
+        (_REVERSE, "+ projected.depth[i] * d_depth + d_opacity", "+ d_opacity"),
     )),
     Convention("the background left out of the gradient by alpha", (
         (_REVERSE, "rest = (background[:, None, None] * d_colour).sum(axis=0)",
