@@ -213,7 +213,7 @@ window.endotsrLive = {kept: {}, keep(name, base64) { this.kept[name] = base64; }
   const bar = make("div", {class: "live-bar"});
   start = make("button", {type: "button"}, "Run it here", bar);
   status = make("span", {role: "status", "aria-live": "polite"}, "", bar);
-  const note = make("p", {}, `The press reads ${megabytes.toFixed(0)} MB from the folder of this book or from ` +
+  const note = make("p", {}, `Pressing this button reads ${megabytes.toFixed(0)} MB from the folder of this book or from ` +
     "cdn.jsdelivr.net; then the chapter runs in this page.", bar);
   start.addEventListener("click", () => queue(async () => {
     if (!data) {
