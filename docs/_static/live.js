@@ -1,5 +1,6 @@
 // The button "Run it here" of a chapter, its editors and its outputs. Nothing is read before the press; then Pyodide
-// comes from the folder `_static/pyodide` of the book or, without one, from its usual host, each file checked by SHA-256.
+// comes from the folder `_static/pyodide` of the book or, without one, from its usual host. A file of the host is checked
+// by SHA-256; one of the folder was checked when it was filled, and is again where the browser offers `crypto.subtle`.
 "use strict";
 window.endotsrLive = {kept: {}, keep(name, base64) { this.kept[name] = base64; }};
 (() => {
