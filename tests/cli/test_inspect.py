@@ -8,6 +8,7 @@ from tiny import assert_refused, scene, train_words, written_folder
 from endotsr.cli.main import main
 from endotsr.cli.parts.options import explicit_settings
 from endotsr.cli.train import TrainOptions
+from endotsr.clips.sequences import layouts
 from endotsr.config import load_config
 
 STILL = ("breathing", "pulsation", "pull", "exposure", "brightening", "highlights", "instrument")  # off
@@ -30,6 +31,15 @@ def test_inspect_prints_verdicts_and_plan(capsys, tmp_path):
 def test_inspect_reads_a_folder(capsys, tmp_path):
     assert main(["inspect", str(written_folder(tmp_path)), "--frames", "0:6"]) == 0
     assert "plan:" in capsys.readouterr().out
+
+
+def test_inspect_describes_a_folder_once_and_names_what_nothing_reads(capsys, tmp_path, monkeypatch):
+    folder, described = written_folder(tmp_path), []
+    (folder / "times.txt").write_text("0\n")
+    listed = layouts.unread
+    monkeypatch.setattr(layouts, "unread", lambda *given: described.append(given) or listed(*given))
+    assert main(["inspect", str(folder), "--frames", "0:6"]) == 0
+    assert "not read: times.txt" in capsys.readouterr().out and len(described) == 1
 
 
 @pytest.mark.parametrize(

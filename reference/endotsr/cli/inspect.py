@@ -43,14 +43,14 @@ def run(words: list[str]) -> int:
     from endotsr.clips.effects.plan import make_plan, plan_record
     from endotsr.clips.simulator.settings import SimulatorSettings
     from endotsr.results.report.inspection import inspection_html, inspection_text
-    from endotsr.training.runs.sources import SIMULATED, load_sequence
+    from endotsr.training.runs.sources import load_sequence
 
     base, _ = base_settings(words)
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
     if not options.sequence:
         raise InputError("inspect: SEQUENCE is missing: a sequence folder, or the word `simulated`")
     sequence = load_sequence(options.sequence, options.settings, SimulatorSettings())
-    for said in () if options.sequence == SIMULATED else _not_read(options):
+    for said in sequence.not_read:
         print(f"note: {said}")
     inspection = inspect_sequence(sequence, options.frame_rate)
     plan = make_plan(inspection, options.settings)
@@ -61,10 +61,3 @@ def run(words: list[str]) -> int:
     if options.json:
         write_json(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})
     return 0
-
-
-def _not_read(options: InspectOptions) -> tuple[str, ...]:
-    """Notes on the entries of the folder that nothing reads."""
-    from endotsr.clips.sequences.layouts import describe_for_training
-
-    return describe_for_training(Path(options.sequence), options.settings.sequence).not_read

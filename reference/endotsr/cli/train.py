@@ -275,6 +275,6 @@ def _print_sequence(source: str, sequence: "Sequence") -> None:
         f"sequence: {source}, {sequence.count} frames of {sequence.width}x{sequence.height}, "
         f"{len(sequence.train_index)} for training, {len(sequence.test_index)} held out"
     )
-    for note in sequence.notes:
+    for note in (*sequence.notes, *sequence.not_read):
         print(f"  {note}")
     print(end="", flush=True)

@@ -162,6 +162,7 @@ def _allocated(clip: Clip, frames: range, config: SequenceConfig, notes: list[st
         test_index=test,
         notes=notes,
         duration=clip.duration(frames),
+        not_read=clip.not_read,
     )
     return sequence, store
 

@@ -50,6 +50,7 @@ class Sequence:
     source: str = IN_MEMORY  # the folder that was read, or `simulated`
     settings: SequenceConfig | None = None  # with which it was read; None: a training brings its own
     simulator: Section | None = None  # settings of a simulated sequence
+    not_read: tuple[str, ...] = ()  # notes on entries of the folder that nothing reads
 
     def __post_init__(self) -> None:
         n, _, height, width = self.images.shape
