@@ -11,6 +11,7 @@ from pathlib import Path
 from endotsr.cli.parts.related_options import RELATIONS
 from endotsr.cli.parts.relations import Needs, shown
 from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.sequences.depth_files import FILES as DEPTH
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import c3vd, hamlyn, scared, servct
 from endotsr.clips.sequences.layouts.nerfstudio import FIELDS, FRAME_FIELDS
@@ -32,7 +33,8 @@ PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
 INVENTORIES = (
     FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, INI, ORB,
     EUROC, MATLAB, MATLAB_PAIR, BOUGUET, servct.FILES, servct.CAMERA, hamlyn.FILES, c3vd.FILES,
-    scared.FILES, scared.FRAME, PNG, JPEG, WEBP, TIFF, BMP, MP4, MATROSKA, AVI, TRANSPORT, PROGRAM, CLOUD, GAUSSIAN,
+    scared.FILES, scared.FRAME, PNG, JPEG, WEBP, TIFF, BMP, MP4, MATROSKA, AVI, TRANSPORT, PROGRAM, DEPTH, CLOUD,
+    GAUSSIAN,
 )  # fmt: skip
 USES = {"used": "used", "refused": "refused", "told": "named in a note", "harmless": "harmless"}
 COMMANDS = ("prepare", "depth", "render", "export")  # of `train`, most related options are settings

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.clips.sequences.choices import Align, Pairing
 from endotsr.clips.sequences.stereo_depth import StereoSettings
 from endotsr.errors import InputError
 
@@ -36,9 +37,9 @@ class DepthOptions:
     """files of another program, one per frame: npy, pfm, tiff or png"""
     kind: Literal["disparity", "depth", "relative"] = "disparity"
     """content of these files: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
-    pairing: Literal["auto", "number", "source", "order"] = "auto"
+    pairing: Pairing = "auto"
     """how these files belong to frames: by number, by the number in the source of the clip, or in order"""
-    align: Literal["auto", "frame", "sequence"] = "auto"
+    align: Align = "auto"
     """with --kind relative: fit scale and shift per frame, or once (auto: per frame if the clip has depth)"""
     farthest_over_nearest: float = 3.0
     """with --kind relative and no reference depth: assumed ratio of the farthest to the nearest tissue"""

@@ -2,13 +2,26 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.related_options import PREPARE
 from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.clips.sequences.choices import (
+    Axes,
+    DepthOfPoints,
+    Direction,
+    ExcludedValue,
+    Gaps,
+    Orientation,
+    Other,
+    Pairing,
+    PictureKind,
+    StatedStereo,
+    Unit,
+)
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,7 +43,7 @@ class PrepareOptions:
     """folder to create"""
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
-    stereo: Literal["auto", "none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"] = "auto"
+    stereo: StatedStereo = "auto"
     """stereo pairs in one picture: side_by_side = left on the left, stacked = left on top; half = squeezed to half"""
     right: Annotated[Path | None, Option("PATH")] = None
     """right view of a pair: a second video, or a folder of pictures"""
@@ -44,27 +57,27 @@ class PrepareOptions:
     """baseline of an already rectified pair, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
     """poses: stamp tx ty tz qx qy qz qw as TUM and EuRoC have them, matrices of KITTI, or .npy"""
-    trajectory_direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
+    trajectory_direction: Direction = "camera_to_world"
     """direction of the poses"""
-    trajectory_axes: Literal["opencv", "opengl", "llff"] | None = None
+    trajectory_axes: Axes | None = None
     """axes of the camera: opencv = right, down, forward; opengl = right, up, backward; llff = down, right, backward"""
-    trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None
+    trajectory_unit: Unit | None = None
     """unit of the positions (TUM and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one per frame, or one file for all frames"""
-    excluded_value: Literal["white", "black", "nonzero"] = "white"
+    excluded_value: ExcludedValue = "white"
     """excluded value of these masks; white = above half of the largest value, nonzero = the numbers of objects"""
-    pairing: Literal["auto", "number", "source", "order"] = "auto"
+    pairing: Pairing = "auto"
     """how masks and depth belong to frames: by number, by the number in the source of a prepared clip, or in order"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
     """depth of every frame: png, tiff, npy, mat or pfm"""
-    depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
+    depth_unit: Unit = "mm"
     """unit of the depth"""
     depth_scale: float = 1.0
     """size of one stored depth level, in the unit of the depth"""
     trust_depth: bool = False
     """read these files as metric depth even if they look like disparity or relative depth"""
-    points: Literal["interpolated", "sparse", "none"] = "interpolated"
+    points: DepthOfPoints = "interpolated"
     """depth from the points of a reconstruction (COLMAP): interpolated, at the points only, or none"""
     model: Annotated[str, Option("NAME")] = ""
     """COLMAP model to read, such as sparse/1; without it, the one with the most pictures"""
@@ -80,15 +93,15 @@ class PrepareOptions:
     """frames per second to keep"""
     source_rate: float | None = None
     """frames per second of the source, if its files do not state it"""
-    orientation: Literal["turned", "stored"] | None = None
+    orientation: Orientation | None = None
     """for a video with rotation metadata: rotate pictures, intrinsics, masks and depth as players do, or not"""
     scale: float = 1.0
     """image scale, by area averaging; intrinsics are adapted"""
-    gaps: Literal["refuse", "drop", "fill"] = "refuse"
+    gaps: Gaps = "refuse"
     """single frames without mask or pose: drop omits them, fill interpolates"""
-    pictures: Literal["png", "jpg"] = "png"
+    pictures: PictureKind = "png"
     """format of the written pictures"""
-    also: tuple[Literal["nerfstudio", "colmap"], ...] = ()
+    also: tuple[Other, ...] = ()
     """also describe the folder for other programs: transforms.json, or a COLMAP model in sparse/0"""
     replace: bool = False
     """replace FOLDER if it is from `prepare`; it may be the source"""

@@ -10,6 +10,7 @@ from PIL import Image
 from endonerf_writer import write_endonerf
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.depth_files import FILES, read_plane
 from endotsr.clips.sequences.picture_fields import colours_differ
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
@@ -164,3 +165,19 @@ def test_every_folder_of_pictures_takes_them(ending, tmp_path):
         shape = (3, 48, 64)
         file = sorted((tmp_path / "clip/images").iterdir())[0]
         np.testing.assert_array_equal(read_render(file, shape), expected.images[0].astype(np.float32) / 255)
+
+
+def test_openexr_is_refused_with_a_remedy(tmp_path):
+    """Whether OpenCV reads it depends on its build and on a variable of the environment."""
+    file = written(tmp_path, b"v/1\x01\x02\0\0\0", "exr")
+    with pytest.raises(InputError, match=r"a\.exr: OpenEXR is not read; convert it"):
+        read_plane(file)
+    with pytest.raises(InputError, match=r"no picture by its name"):
+        read_picture(file)
+
+
+@pytest.mark.parametrize("ending", FILES.listed)
+def test_a_depth_file_of_every_listed_ending_has_a_reader(tmp_path, ending):
+    with pytest.raises(InputError) as refusal:
+        read_plane(written(tmp_path, b"0", ending[1:]))
+    assert "by its name" not in str(refusal.value)

@@ -1,4 +1,4 @@
-"""Picture files of a recording: PNG, JPEG, TIFF, WebP, BMP, and OpenEXR if OpenCV supports it.
+"""Picture files of a recording: PNG, JPEG, TIFF, WebP and BMP.
 
 In: a path. Out: RGB or grey pixels as stored. Every reader refuses files that OpenCV would silently repair: a truncated
 JPEG decodes to a picture whose lower part is grey. Sizes are checked before decoding.
@@ -25,7 +25,6 @@ from endotsr.untrusted.png import LARGEST_FILE
 
 JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")
-EXR_ENDINGS = (".exr",)
 PICTURE_ENDINGS = (".png", *JPEG_ENDINGS, *TIFF_ENDINGS, ".webp", ".bmp")  # of colour pictures and masks
 JPEG_END = b"\xff\xd9"
 STARTS = {  # extension -> file type, and its first bytes
@@ -33,7 +32,6 @@ STARTS = {  # extension -> file type, and its first bytes
     **dict.fromkeys(TIFF_ENDINGS, ("TIFF", (b"II*\0", b"MM\0*"))),
     ".webp": ("WebP", (b"RIFF",)),
     ".bmp": ("BMP", (b"BM",)),
-    ".exr": ("EXR", (b"v/1\x01",)),
 }
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 277, 339  # tags
@@ -43,7 +41,7 @@ NOT_DECODED = ("LA", "La", "PA", "LAB")  # OpenCV drops their transparency or re
 
 
 def read_picture(path: Path) -> Array:
-    """Pixels of a PNG, JPEG, TIFF, WebP, BMP or EXR file: (H, W) grey or (H, W, 3) RGB, in the stored type.
+    """Pixels of a PNG, JPEG, TIFF, WebP or BMP file: (H, W) grey or (H, W, 3) RGB, in the stored type.
 
     Raises:  InputError naming the file if it is missing, of another type, truncated, damaged, not opaque or rotated by
              its EXIF data, if it contains several pictures, or if it has more than 2^26 pixels.
@@ -55,10 +53,10 @@ def read_picture(path: Path) -> Array:
         _check_turn(marks_of(data).get("Orientation") or 1, path)
         return pixels
     if ending not in STARTS:
-        raise InputError(f"{path}: no picture by its name; allowed: {', '.join((*PICTURE_ENDINGS, *EXR_ENDINGS))}")
+        raise InputError(f"{path}: no picture by its name; allowed: {', '.join(PICTURE_ENDINGS)}")
     data = read_bytes(Path(path), LARGEST_FILE)
     kind = _check_start_and_end(data, ending, path)
-    pixels = None if kind == "EXR" else _by_pillow(data, kind, path)
+    pixels = _by_pillow(data, kind, path)
     if pixels is not None:
         return pixels
     return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")

@@ -5,7 +5,7 @@ it. Frames are decoded on demand. Conventions: those of `camera`; masks are True
 times are seconds.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -96,6 +96,7 @@ class Clip:
     faults: list[Finding] = field(default_factory=list)  # missing or unusable parts
     pose_faults: dict[int, str] = field(default_factory=dict)  # why a frame has no pose
     read_here: tuple[str, ...] = ()  # further names in the folder that were read, in lower case
+    inside: Mapping[Path, tuple[str, ...]] = field(default_factory=dict)  # folders that were read, see `unread`
     not_read: tuple[str, ...] = ()  # notes on entries of the folder that are not read; set for training
 
     @property

@@ -1,4 +1,4 @@
-"""Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .pfm, and OpenEXR if OpenCV supports it."""
+"""Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .npz, .mat or .pfm. OpenEXR is refused by name."""
 
 import re
 from pathlib import Path
@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import area_resize, write_png
-from endotsr.clips.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, no_data, read_picture, read_points
+from endotsr.clips.opencv.pictures import TIFF_ENDINGS, no_data, read_picture, read_points
 from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.depth_stacks import array_of, plane_of_stack
+from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.masks import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -19,7 +20,20 @@ from endotsr.untrusted.files import read_bytes
 CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
 LEAST_DEPTH_FRACTION = 0.05  # of a frame; the median of fewer pixels may be an outlier
-DEPTH_ENDINGS = (".png", ".npy", ".npz", ".mat", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
+FILES = Inventory(
+    "a depth file, by its ending",
+    used={
+        ".png": "8 or 16 bits, one channel",
+        ".tif .tiff": "integers or real numbers; of points x y z, the third",
+        ".npy .npz .mat": "the array with the shape of a picture",
+        ".pfm": "real numbers, the bottom row first",
+    },
+    refused={
+        ".exr": "OpenEXR is not read; convert it with the Python package OpenEXR:"
+        ' numpy.save("a.npy", OpenEXR.File("a.exr").channels()["Z"].pixels); the channel may also be V, Y or R'
+    },
+)
+DEPTH_ENDINGS = (".png", ".npy", ".npz", ".mat", ".pfm", *TIFF_ENDINGS, ".exr")  # listed in a folder of depth
 DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
@@ -35,8 +49,10 @@ def read_plane(path: Path) -> NDArray:
     if plane is not None:
         return plane
     ending = Path(path).suffix.lower()
+    if (why := FILES.reason(FILES.refused, ending)) is not None:
+        raise InputError(f"{path}: {why}")
     if ending not in DEPTH_ENDINGS:
-        raise InputError(f"{path}: no depth by its name; allowed: {', '.join(DEPTH_ENDINGS)}")
+        raise InputError(f"{path}: no depth by its name; allowed: {', '.join(FILES.listed)}")
     points = read_points(path)
     if points is not None:
         return np.ascontiguousarray(points[:, :, 2])

@@ -14,6 +14,7 @@ from endotsr.clips.sequences.clip import Depth, Masks, Picture, PicturePair, col
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.masks import tissue_masks
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
 T = TypeVar("T")
@@ -29,6 +30,7 @@ class FolderReader:
         self.faults: list[Finding] = []
         self.size: tuple[int, int] | None = None  # width and height of every file; None: unknown
         self.size_said = "the first image has"
+        self.inside: dict[Path, tuple[str, ...]] = {}  # folders that were read, see `unread`
 
     def tried(self, make: Callable[[], T], code: str, where: object) -> T | None:
         """The value, or None with a fault."""
@@ -74,6 +76,7 @@ class FolderReader:
         """The files of a folder, paired with the pictures; empty with a fault."""
         folder = self.path / name
         files = self.tried(partial(list_pictures, folder, endings), f"{what}-files", folder) or []
+        self.inside = together(self.inside, folders_of(files, endings))
         if files and self.images:
             self.tried(partial(check_pairing, self.images, files), "pairing", folder)
         return files

@@ -7,13 +7,14 @@ depth of some frames, for programs that start from points. `layouts.nerfstudio` 
 
 import json
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import write_png
 from endotsr.clips.sequences.camera import Intrinsics, camera_to_world
+from endotsr.clips.sequences.choices import Other
 from endotsr.clips.sequences.clip import REST, Clip
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES
@@ -21,7 +22,6 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.writing import replace_text
 
-Other = Literal["nerfstudio", "colmap"]
 KEPT, MODEL = "masks_kept", "sparse/0"
 POINTS, FRAMES_OF_POINTS = 2000, 16  # points per frame; frames with points
 THOUSANDTHS = 1e3  # nerfstudio reads depth in thousandths of the unit of its matrices

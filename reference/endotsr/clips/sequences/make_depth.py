@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.depth import LITTLE, depth_facts, mark_finding
+from endotsr.clips.sequences.choices import Align, Pairing
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.clips.sequences.depth_stacks import stack_planes
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts.common import describe_prepared
-from endotsr.clips.sequences.pairing import Pairing, every_frame
-from endotsr.clips.sequences.relative_depth import Align, MadeDepth, relative_depth
+from endotsr.clips.sequences.pairing import every_frame
+from endotsr.clips.sequences.relative_depth import MadeDepth, relative_depth
 from endotsr.clips.sequences.sequence_file import (
     DEPTH,
     FILE_NAME,

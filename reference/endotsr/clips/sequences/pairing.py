@@ -9,11 +9,11 @@ In: frames and files. Out: one file per frame or None, with a sentence where the
 from pathlib import Path
 from typing import Literal, NamedTuple, NoReturn
 
+from endotsr.clips.sequences.choices import Pairing
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import check_pairing, frame_numbers, shortened
 from endotsr.errors import InputError
 
-Pairing = Literal["auto", "number", "source", "order"]
 WAYS = {
     "number": "the number in the name of each frame",
     "source": "the number of each frame in the recording from which the clip was prepared",

@@ -8,7 +8,6 @@ complete.
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from endotsr.clips.sequences.checks.agreement import agreement_findings, agreeme
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
+from endotsr.clips.sequences.choices import DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
@@ -59,9 +59,9 @@ class PrepareSettings:
     drop: str = ""  # frames to omit, in the same syntax
     rate: float | None = None  # frames per second to keep
     scale: float = 1.0
-    gaps: Literal["refuse", "drop", "fill"] = "refuse"  # frames without mask or pose where others have one
-    pictures: Literal["png", "jpg"] = "png"
-    points: Literal["interpolated", "sparse", "none"] = "interpolated"
+    gaps: Gaps = "refuse"  # frames without mask or pose where others have one
+    pictures: PictureKind = "png"
+    points: DepthOfPoints = "interpolated"
 
 
 def prepare(

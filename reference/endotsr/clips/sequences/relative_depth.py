@@ -12,12 +12,13 @@ assumptions.
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.depth import light_correlation, light_finding
+from endotsr.clips.sequences.choices import Align
 from endotsr.clips.sequences.clip import Assumed, Clip
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.files import shortened
@@ -25,7 +26,6 @@ from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 
-Align = Literal["auto", "frame", "sequence"]
 FEWEST, MOST = 20, 400  # pixels with both values: needed for a line, and used for its robust estimate
 SPREAD = 3 * 1.4826  # median absolute residuals; pixels beyond are excluded from the last fit
 EXTREMES = (1.0, 99.0)  # percentiles of r for the farthest and the nearest tissue

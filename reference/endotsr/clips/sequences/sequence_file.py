@@ -45,6 +45,7 @@ import msgspec
 import numpy as np
 
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, scene_factor
+from endotsr.clips.sequences.choices import Axes, Direction, Unit
 from endotsr.clips.sequences.clip import Assumed
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
@@ -55,7 +56,6 @@ from endotsr.untrusted.toml import read_toml, toml_text
 FILE_NAME = "sequence.toml"
 FORMAT = "endotsr-sequence-1"
 IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
-Unit = Literal["um", "mm", "cm", "m", "arbitrary"]
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
@@ -102,8 +102,8 @@ class DepthEntry(Section, frozen=True, kw_only=True):
 class PoseEntry(Section, frozen=True, kw_only=True):
     """One pose per frame."""
 
-    direction: Literal["world_to_camera", "camera_to_world"] = "world_to_camera"
-    axes: Literal["opencv", "opengl", "llff"] = "opencv"
+    direction: Direction = "world_to_camera"
+    axes: Axes = "opencv"
     origin: str = "given"
     interpolated: list[int] = msgspec.field(default_factory=list)
     matrices: list[list[float]]

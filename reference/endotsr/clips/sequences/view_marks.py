@@ -6,11 +6,11 @@ packing of H.264 and H.265). In: the first picture. Out: a `ViewMarks`.
 
 import struct
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
+from endotsr.clips.sequences.choices import Stereo
 from endotsr.errors import InputError
 
-Stereo = Literal["none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"]
 # Numbers of FFmpeg for the arrangement of a pair.
 ARRANGED: dict[int, Stereo] = {1: "side_by_side", 2: "stacked"}
 OTHERS = {3: "alternating pictures", 4: "a checkerboard", 5: "side by side in a quincunx", 6: "alternating rows",

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.unread import unread
+from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
@@ -77,10 +78,18 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
     if clip.pose_faults and len(clip.pose_faults) == clip.count:
         raise InputError(next(iter(clip.pose_faults.values())))
     said = [*clip.notes, *clip.pose_faults.values()]
-    said += unread(path, (*layout.reads, *clip.read_here), options, layout.takes)
+    inside = together(clip.inside, _stated_folders(options))
+    said += unread(path, (*layout.reads, *clip.read_here), options, layout.takes, inside)
     if options.calibration is not None:
         said.append(f"{options.calibration.name}: {HALF_A_PIXEL}")
     return replace(clip, notes=said)
+
+
+def _stated_folders(options: SourceOptions) -> dict[Path, tuple[str, ...]]:
+    """The folders of stated files, see `unread`."""
+    pictures = [folder / "*" for folder in (options.masks, options.right) if folder is not None and folder.is_dir()]
+    depth = [options.depth / "*"] if options.depth is not None and options.depth.is_dir() else []
+    return together(folders_of(pictures), folders_of(depth, DEPTH_ENDINGS))
 
 
 def without_faults(clip: Clip) -> Clip:
@@ -112,4 +121,5 @@ def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     if not found.direct:
         raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` converts it")
     clip = found.describe(path, SourceOptions(settings=config))
-    return replace(clip, not_read=tuple(unread(path, (*found.reads, *clip.read_here), NOTHING, found.takes)))
+    left = unread(path, (*found.reads, *clip.read_here), NOTHING, found.takes, clip.inside)
+    return replace(clip, not_read=tuple(left))

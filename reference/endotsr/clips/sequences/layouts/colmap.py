@@ -19,6 +19,7 @@ from endotsr.clips.sequences.layouts.pictures import PAIRS
 from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import pictures_from_files, stated_masks
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
 
@@ -61,6 +62,9 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
         intrinsics=intrinsics,
         poses=[image.pose for image in images],
         rate=options.rate,
+        inside=together(
+            folders_of(files), {parent: IN_MODELS for parent in (folder, *folder.parents) if path in parent.parents}
+        ),
         notes=notes,
     )
 
@@ -76,6 +80,8 @@ def _one_side(images: list[ModelImage], notes: list[str]) -> list[ModelImage]:
     return left
 
 
+IN_MODELS = ("[0-9]*", "sparse", "images", "stereo", "cameras.*", "images.*", "points3d.*", "rigs.*", "frames.*",
+             "project.ini", "*.db", "run-colmap-*")  # fmt: skip
 LAYOUT = Layout(
     name="colmap",
     about="a folder with a COLMAP model and images/",

@@ -61,6 +61,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         size_said=STATES,
         faults=folder.faults,
         pose_faults=pose_faults,
+        inside=folder.inside,
         read_here=tuple(entry.folder.lower() for entry in (found.masks, found.depth) if entry is not None),
     )
     return with_stated(clip, options)

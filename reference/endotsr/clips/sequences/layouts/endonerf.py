@@ -74,6 +74,7 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
         notes=notes,
         stated_in=where,
         faults=folder.faults,
+        inside=folder.inside,
         read_here=("masks", "gt_masks") if options.settings else (),  # a setting of training selects one or none
         **({} if found is None else found._asdict()),
     )

@@ -33,7 +33,7 @@ from endotsr.clips.sequences.sources import (
 )
 from endotsr.clips.sequences.time_lists import TimedFile, nanosecond_list
 from endotsr.clips.sequences.trajectory import poses_at, read_trajectory
-from endotsr.clips.sequences.unread import unread
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.yaml import matrix, read_yaml
@@ -184,9 +184,7 @@ def describe_euroc(path: Path, options: SourceOptions) -> Clip:
     poses = _poses(body, options, seconds, notes)
     times = np.array([row.stamp - left[0].stamp for row in left], np.float64) * 1e-9
     rate = float(1 / np.median(np.diff(times))) if len(times) > 1 else None
-    notes += [] if body == path else unread(body, LAYOUT.reads, options, LAYOUT.takes)
-    for name in (*CAMERAS, TRUTH):
-        notes += unread(body / name, (LIST, SENSOR, "data"), options, LAYOUT.takes)
+    inside = {body: LAYOUT.reads, **dict.fromkeys((body / name for name in (*CAMERAS, TRUTH)), (LIST, SENSOR, "data"))}
     return Clip(
         layout="euroc",
         where=path,
@@ -201,6 +199,7 @@ def describe_euroc(path: Path, options: SourceOptions) -> Clip:
         poses=poses,
         rate=rate,
         times=times,
+        inside=together(inside, folders_of([*files, *right])),
         notes=[*picture_notes([*files, *right]), *notes, *camera.notes],
     )
 

@@ -19,6 +19,7 @@ from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, pictures_from_files, size_of, with_stated
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
 CAMERA = "intrinsics.txt"
@@ -63,6 +64,7 @@ def describe_hamlyn(path: Path, options: SourceOptions) -> Clip:
         intrinsics=intrinsics_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
         baseline=options.baseline,
         read_here=tuple(folder.name for folder in (left_folder, right_folder, depth_folder) if folder is not None),
+        inside=together(folders_of([*left, *right]), folders_of(depth, DEPTH_ENDINGS)),
         rate=options.rate,
         notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout has no poses: the camera counts as static"],
     )

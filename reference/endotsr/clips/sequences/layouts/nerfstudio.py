@@ -23,6 +23,7 @@ from endotsr.clips.sequences.camera import (
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.colmap_folders import unregistered
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import time_order
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
@@ -30,6 +31,7 @@ from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.point_files import read_cloud
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
@@ -158,6 +160,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         rate=options.rate,
         times=None if times is None else np.sort(times).astype(np.float64),
         read_here=_places(entries, data),
+        inside=_inside(file, files, masked, planes, _places(entries, data)),
         notes=[f"{file.name}: {len(files)} frames, unit of lengths {'unknown' if unit == ARBITRARY else unit}", *notes],
     )
 
@@ -218,6 +221,14 @@ def _places(entries: list[Keys], data: Keys) -> tuple[str, ...]:
     names = [data.get("ply_file_path"), *(entry.get(key) for entry in entries for key in PATHS)]
     paths = {str(name).replace("\\", "/").removeprefix("./") for name in names if name is not None}
     return tuple({path.split("/")[0].lower() for path in paths} | {f"{path.lower()}.*" for path in paths})
+
+
+def _inside(
+    file: Path, pictures: list[Path], masks: list[Path | None], planes: list[Path | None], places: tuple[str, ...]
+) -> dict[Path, tuple[str, ...]]:
+    """The folders of the file and of all files that it names, see `unread`."""
+    beside = {file.parent: (*LAYOUT.reads, *places)}
+    return together(beside, folders_of([*pictures, *masks]), folders_of(planes, DEPTH_ENDINGS))
 
 
 def _named(folder: Path, name: Any, where: str) -> Path | None:

@@ -31,6 +31,7 @@ from endotsr.clips.sequences.sources import (
     unit_of,
 )
 from endotsr.clips.sequences.time_lists import PictureTimes, picture_times
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
 PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
@@ -147,6 +148,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
             | {file.name.lower() for file in [*left, *right] if file.parent == path}
             | set(lists.files)
         ),
+        inside=together(folders_of([*left, *right]), {left[0].parent: lists.files}),
         notes=[*picture_notes([*left, *right]), *gaps, *lists.notes, *camera.notes, *notes],
     )
 

@@ -19,7 +19,6 @@ from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.unread import unread
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
@@ -68,7 +67,6 @@ def describe_scared(path: Path, options: SourceOptions) -> Clip:
     clip = describe_video(path / VIDEO, stated)
     inside = sorted(entry.name for folder in (path, path / "data") for entry in folder.iterdir())
     notes, poses = [*clip.notes, *FILES.telling(inside, path.name)], clip.poses
-    notes += unread(path / "data", IN_DATA, options, LAYOUT.takes)
     if options.calibration is None:
         notes.append(f"{calibration.name}: {HALF_A_PIXEL}; T in millimetres")
     if poses is None:
@@ -78,7 +76,10 @@ def describe_scared(path: Path, options: SourceOptions) -> Clip:
         )
         notes.append(kinematics if poses else f"{FOLDER} is missing: the camera counts as static")
     read = (calibration.name.lower(),) if options.calibration is None else ()
-    return replace(clip, layout="scared", where=path, poses=poses, unit="mm", notes=notes, read_here=read)
+    inside = {path / "data": IN_DATA, path / FOLDER: ("*.json",)}
+    return replace(
+        clip, layout="scared", where=path, poses=poses, unit="mm", notes=notes, read_here=read, inside=inside
+    )
 
 
 def _poses(path: Path, count: int, notes: list[str]) -> list[CameraPose | None] | None:

@@ -20,6 +20,7 @@ from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, pictures_from_files, size_of, with_stated
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.yaml import matrix
@@ -90,6 +91,7 @@ def describe_servct(path: Path, options: SourceOptions) -> Clip:
         depth=depth_of(matching_files(left, depth), STEP) if depth else None,
         intrinsics=cameras[0][0],
         baseline=cameras[0][1],
+        inside=together(folders_of([*left, *right]), folders_of(depth, DEPTH_ENDINGS), {path / CAMERAS: ("*.json",)}),
         notes=[
             *sorted({note.split(": ", 1)[1] for note in notes}),
             *FILES.telling(sorted(file.name for file in path.iterdir()), path.name),

@@ -17,6 +17,7 @@ from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import masks_of
+from endotsr.clips.sequences.unread import folders_of
 from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
 from endotsr.errors import InputError
 
@@ -51,14 +52,15 @@ def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
     notes = list(clip.notes)
     if stated.trajectory is None:
         notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
-    masks = clip.masks
+    masks, inside = clip.masks, {}
     if options.masks is None and (path / MASKS).is_dir():
         assert clip.calibration is not None
         files = matching_files(clip.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
+        inside = folders_of(files)
         masks = masks_of(files, "black", clip.calibration.left.width, clip.calibration.left.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
-    return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes)
+    return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes, inside=inside)
 
 
 LAYOUT = Layout(

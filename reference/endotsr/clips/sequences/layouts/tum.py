@@ -13,6 +13,7 @@ from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Depth
+from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.picture_fields import picture_notes
@@ -26,6 +27,7 @@ from endotsr.clips.sequences.sources import (
     stated_masks,
 )
 from endotsr.clips.sequences.trajectory import TICKS, poses_at, read_trajectory
+from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
@@ -112,6 +114,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
         poses = poses_at(found, times, LONGEST)
         notes.append(f"poses of {where.name}" + "".join(f"; not read: {file.name}" for file in given if file != where))
+    planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
     steps = np.diff(times)
     return Clip(
         layout="tum",
@@ -126,6 +129,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
         times=times if steps.size and (steps > 0).all() else None,
         read_here=tuple(file.name.lower() for file in [*given, *([settings] if settings else [])]),
+        inside=together(folders_of(files), folders_of(planes, DEPTH_ENDINGS)),
         notes=notes,
     )
 

@@ -47,7 +47,8 @@ def _sides(path: Path) -> tuple[Path, Path] | None:
 
 def describe_video(path: Path, options: SourceOptions) -> Clip:
     """The video as a clip. Raises InputError."""
-    path, right = _sides(path) or (path, options.right)
+    sides = _sides(path)
+    path, right = sides or (path, options.right)
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
@@ -79,6 +80,7 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         poses=poses,
         rate=rate,
         times=times,
+        read_here=tuple(file.name.lower() for file in sides or ()),
         notes=[*notes, *camera.notes, *note],
     )
 
@@ -175,5 +177,4 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_video,
     takes=STATEMENTS,
-    reads=("*",),
 )
