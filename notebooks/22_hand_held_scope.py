@@ -33,8 +33,8 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.clips.poses.bundle import adjoint
 from endotsr.clips.poses.levels import make_levels
+from endotsr.clips.poses.steps import adjoint
 from endotsr.clips.poses.views import Views, compose, inverse
 from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
 from endotsr.clips.simulator.simulate import simulate
@@ -183,7 +183,7 @@ for u, v in ((3.3, 2.7), (4.0, 3.0), (5.9, 3.5)):
 #     return RegistrationGrads(g @ saved.points.T, g.sum(axis=1), saved.rotation.T @ g, -d_residual * saved.seen)
 # ```
 #
-# <!-- definition: endotsr.clips.poses.bundle.adjoint -->
+# <!-- definition: endotsr.clips.poses.steps.adjoint -->
 # ```python
 # def adjoint(pose: CameraPose) -> FloatArray:
 #     """(6, 6): the change of a relative pose by a change (omega, tau) of its source, in target axes.

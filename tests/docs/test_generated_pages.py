@@ -60,6 +60,7 @@ GENERATED = {  # program -> its parts by name
     "ports.injected": fragments_of_record,
     "ports.unseen": fragments_of_record,
     "recordings.any_clip": of_record(ways="table"),
+    "recordings.pose_returns": lambda about: about.tables(read_json(about.FILE, "")),
     "recordings.hand_held": lambda about: about.tables(read_json(about.FILE, "")),
     "recordings.inputs_tried": of_record("table"),
     "recordings.inventories": lambda about: {"fields": about.fields(), "options": about.options()},

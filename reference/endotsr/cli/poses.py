@@ -67,5 +67,6 @@ def _write(options: PosesOptions, report: "PoseReport") -> None:
         options.json, sequence=options.sequence, written=True, movement=said, unit=report.unit, path=e.path,
         agreeing=e.agreeing, pixels_left=e.left, pixels_without_motion=e.still, tissue_motion=e.own,
         residual_before=e.before.scale, residual_after=e.after.scale, interpolated=found.interpolated, held=found.held,
+        returns=[{"source": one.source, "target": one.target, "agree": one.agree} for one in e.returns],
         poses=[{"rotation": c.rotation.tolist(), "translation": c.translation.tolist()} for c in found.cameras],
     )  # fmt: skip

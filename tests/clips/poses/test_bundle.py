@@ -6,9 +6,10 @@ import pytest
 from moving_clip import moving_views, path_error
 
 from endotsr.clips.poses import bundle
-from endotsr.clips.poses.bundle import adjoint, adjusted, fit_of, pairs_of
+from endotsr.clips.poses.bundle import adjusted, fit_of, pairs_of
 from endotsr.clips.poses.levels import make_levels, normalised
 from endotsr.clips.poses.pair_kernels import COST, RIGHT
+from endotsr.clips.poses.steps import adjoint, normal_equations
 from endotsr.clips.poses.views import compose, inverse
 from endotsr.method.equations.pose import pose_forward
 from endotsr.method.splatting.camera import CameraPose
@@ -64,7 +65,7 @@ def test_the_normal_equations_are_the_derivative_of_the_cost(scene):
     kept, scale = bundle.pair_scales(levels[1], pairs, start)
     unit = np.array([1, 1, 1, DEPTH, DEPTH, DEPTH])
     sums = bundle.pair_sums(levels[1], kept, scale, start)
-    _, right = bundle.normal_equations(sums, kept, start, unit)
+    _, right = normal_equations(sums, kept, start, unit)
     assert sums.shape == (1, 30) and RIGHT == 21
     for frame in (2, 4):
         for k in range(6):

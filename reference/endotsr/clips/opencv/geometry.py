@@ -28,10 +28,14 @@ class Consensus(NamedTuple):
 
 
 class Features(NamedTuple):
-    """Scale-invariant features of a picture."""
+    """Scale-invariant features of a picture, the strongest first."""
 
     place: FloatArray  # (F, 2) pixels
     descriptor: NDArray[np.float32]  # (F, 128)
+
+    def first(self, most: int) -> "Features":
+        """The strongest ones, at most this many."""
+        return Features(self.place[:most], self.descriptor[:most])
 
 
 def grey_of(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -91,21 +95,24 @@ def features_of(grey: NDArray[np.uint8], mask: BoolArray) -> Features:
     points, found = detector.detectAndCompute(grey, mask.astype(np.uint8))
     if not points or found is None:
         return Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
-    return Features(np.array([point.pt for point in points]) + 0.5, np.asarray(found, np.float32))
+    order = np.argsort([-point.response for point in points], kind="stable")
+    place, descriptor = np.array([point.pt for point in points]) + 0.5, np.asarray(found, np.float32)
+    return Features(place[order], np.ascontiguousarray(descriptor[order]))
 
 
 def matched_features(source: Features, target: Features) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Indices of features of two pictures that match one another best and distinctly."""
-    cv2, none = cv2_library(), np.zeros(0, np.intp)
+    """Indices of features of two pictures that match one another best and distinctly.
+
+    Descriptors are integers below 256: squared distances are exact in float32, and their order is the same everywhere.
+    """
     if len(source.place) < 2 or len(target.place) < 2:
-        return none, none
-    matcher = cv2.BFMatcher(cv2.NORM_L2)
-    there = matcher.knnMatch(source.descriptor, target.descriptor, 2)
-    back = {match.queryIdx: match.trainIdx for match in matcher.match(target.descriptor, source.descriptor)}
-    kept = [
-        (first.queryIdx, first.trainIdx)
-        for first, second in there
-        if first.distance < DISTINCT * second.distance and back.get(first.trainIdx) == first.queryIdx
-    ]
-    pairs = np.array(kept, np.intp).reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    one, other = source.descriptor, target.descriptor
+    squared = (one * one).sum(1)[:, None] + (other * other).sum(1) - 2 * (one @ other.T)
+    nearest, back = squared.argmin(axis=1), squared.argmin(axis=0)
+    rows = np.arange(len(one))
+    first = squared[rows, nearest]
+    squared[rows, nearest] = np.inf
+    second = squared.min(axis=1)
+    here = np.flatnonzero((first < DISTINCT**2 * second) & (back[nearest] == rows))
+    return here, nearest[here]

@@ -1,29 +1,19 @@
 """Direct bundle adjustment: all poses at once from the residuals (B19) of pairs of frames, with depth held fixed.
 
 In: poses near the solution, and the levels of a pyramid from coarse to fine. Out: the refined poses. A step is taken
-only if the cost falls. Every pair has its own robust scale, held fixed while steps are tried. The first pose is held
-fixed: a common motion of all cameras is unobservable. The normal equations are banded, so time is linear in the
-number of frames.
+only if the cost falls. Every pair has its own robust scale, held fixed while steps are tried. Pairs of frames that see
+one place at different times (`returns`) join the pairs with fixed gaps.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.poses.pair_kernels import (
-    COST,
-    RIGHT,
-    SEEN,
-    SUMS,
-    WEIGHT,
-    PyramidLevel,
-    scale_kernel,
-    sums_kernel,
-)
+from endotsr.clips.poses.pair_kernels import COST, SEEN, SUMS, WEIGHT, PyramidLevel, scale_kernel, sums_kernel
+from endotsr.clips.poses.steps import moved, solved_step
 from endotsr.clips.poses.views import between
-from endotsr.method.equations.pose import pose_forward
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.threads import parallel_for
 from endotsr.method.splatting.camera import CameraPose
@@ -34,7 +24,6 @@ FLOOR = 0.05  # least robust scale, local standard deviations
 SCALES, STEPS = 2, 3  # estimates of the scales at each level, and steps tried after each
 DAMPING, SOFTER, HARDER = 1e-4, 0.3, 10.0  # of the normal equations: at first, after a success, after a failure
 ENOUGH = 2e-5  # rad, and fraction of the depth: a shorter step ends a level
-LARGEST = 0.1  # the same units: longest step
 
 
 class PairFit(NamedTuple):
@@ -64,18 +53,22 @@ def pairs_of(count: int, gaps: tuple[int, ...] = GAPS) -> NDArray[np.intp]:
 
 
 def adjusted(
-    levels: list[PyramidLevel], poses: list[CameraPose], depth: float, on_step: Callable[[], object] = lambda: None
-) -> Bundle:
+    levels: list[PyramidLevel], poses: list[CameraPose], depth: float, on_step: Callable[[], object] = lambda: None,
+    returns: Sequence[tuple[int, int]] = (),
+) -> Bundle:  # fmt: skip
     """The poses that minimise the residuals of all pairs.
 
     levels    from coarse to fine
     poses     one per frame, near the solution
     depth     typical depth, scene units: the unit of a translation
     on_step   called after every tried step
+    returns   further pairs of frames, each used in both directions
 
     Edges:    without a pair that overlaps, the poses are returned unchanged.
     """
     pairs = pairs_of(len(poses))
+    again = np.array(returns, np.intp).reshape(-1, 2)
+    pairs = np.concatenate([pairs, again, again[:, ::-1]])
     before = after = fit_of(levels[-1], pairs, poses)
     for level in levels:
         taken = 0
@@ -106,7 +99,7 @@ def _descend(
     sums, damping, taken = pair_sums(level, pairs, scale, poses), DAMPING, 0
     for _ in range(STEPS):
         step = solved_step(sums, pairs, poses, depth, damping)
-        trial = [_moved(pose, part) for pose, part in zip(poses, step)]
+        trial = [moved(pose, part) for pose, part in zip(poses, step)]
         tried = pair_sums(level, pairs, scale, trial)
         on_step()
         if tried[:, COST].sum() < sums[:, COST].sum():
@@ -116,11 +109,6 @@ def _descend(
         if np.abs(step / np.array([1, 1, 1, depth, depth, depth])).max() < ENOUGH:
             break
     return poses, taken
-
-
-def _moved(pose: CameraPose, step: FloatArray) -> CameraPose:
-    rotation, translation, _ = pose_forward(*pose, step[:3], step[3:])
-    return CameraPose(rotation, translation)
 
 
 def _relative(pairs: NDArray[np.intp], poses: list[CameraPose]) -> FloatArray:
@@ -146,60 +134,3 @@ def pair_sums(level: PyramidLevel, pairs: NDArray[np.intp], scale: FloatArray, p
     out = np.empty((len(pairs), SUMS))
     parallel_for(sums_kernel, len(pairs), level, pairs, _relative(pairs, poses), scale, out)
     return out
-
-
-def solved_step(
-    sums: FloatArray, pairs: NDArray[np.intp], poses: list[CameraPose], depth: float, damping: float
-) -> FloatArray:  # fmt: skip
-    """(n, 6) rotation vectors and offsets; those of the first frame are 0."""
-    from scipy.linalg import solveh_banded
-
-    unit = np.array([1, 1, 1, depth, depth, depth])
-    lower, right = normal_equations(sums, pairs, poses, unit)
-    lower[:, :6], right[:6] = 0.0, 0.0  # the first frame stays
-    diagonal = lower[0]
-    lower[0] = diagonal * (1 + damping) + np.where(diagonal > 0, 1e-3, 1.0)
-    step = -solveh_banded(lower, right, lower=True).reshape(len(poses), 6)
-    longest = np.abs(step).max()
-    return step * min(1.0, LARGEST / longest if longest > 0 else 1.0) * unit
-
-
-def normal_equations(
-    sums: FloatArray, pairs: NDArray[np.intp], poses: list[CameraPose], unit: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """The lower band of the matrix (6 (gap + 1), 6 n), and the right side (6 n)."""
-    gap, count = int(np.abs(pairs[:, 0] - pairs[:, 1]).max()), len(poses)
-    lower, right = np.zeros((6 * (gap + 1), 6 * count)), np.zeros((count, 6))
-    upper = np.triu_indices(6)
-
-    def add(i: int, j: int, block: FloatArray) -> None:
-        """Add a block whose row is frame i and whose column is frame j <= i."""
-        row, column = 6 * i + np.arange(6)[:, None], 6 * j + np.arange(6)[None, :]
-        below = row >= column
-        lower[(row - column)[below], np.broadcast_to(column, (6, 6))[below]] += block[below]
-
-    for (source, target), part in zip(pairs, sums):
-        matrix = np.zeros((6, 6))
-        matrix[upper] = part[:RIGHT]
-        matrix = (matrix + np.triu(matrix, 1).T) * unit[:, None] * unit
-        moved = adjoint(between(poses, source, target)) * unit / unit[:, None]
-        mixed = matrix @ moved
-        g = part[RIGHT:COST] * unit
-        add(target, target, matrix)
-        add(source, source, moved.T @ mixed)
-        add(target, source, -mixed) if target > source else add(source, target, -mixed.T)
-        right[target] += g
-        right[source] -= moved.T @ g
-    return lower, right.ravel()
-
-
-def adjoint(pose: CameraPose) -> FloatArray:
-    """(6, 6): the change of a relative pose by a change (omega, tau) of its source, in target axes.
-
-    For small changes, T Exp(xi) T^-1 = Exp(adjoint(T) xi).
-    """
-    r, (x, y, z) = pose
-    found = np.zeros((6, 6))
-    found[:3, :3] = found[3:, 3:] = r
-    found[3:, :3] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ r  # (22.6)
-    return found

@@ -1,4 +1,4 @@
-"""The poses of a clip from pictures and depth: a chain of flow and resection, then the direct bundle adjustment.
+"""The poses of a clip from pictures and depth: a chain, returns to places seen before, the direct bundle adjustment.
 
 In: `Views`. Out: `PathEstimate`. Poses are world to camera; the world is the camera of the first frame with a pose.
 Frames that show too little remain without a pose; `chain` names the limits.
@@ -16,6 +16,7 @@ from endotsr.clips.poses.levels import make_levels
 from endotsr.clips.poses.matches import Matcher, matcher_of
 from endotsr.clips.poses.movement import LEAST_MATCHES, FramePair, Movement, movement, pairs_that_move
 from endotsr.clips.poses.resection import left_over
+from endotsr.clips.poses.returns import Return, closed, returns_of
 from endotsr.clips.poses.views import Views, between, known_depth, small_views
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
@@ -36,6 +37,7 @@ class PathEstimate(NamedTuple):
     path: float  # length of the path of the camera
     left: float  # median pixels that the poses leave of the flow between frames, at the size of the flow
     still: float  # median pixels that no motion leaves
+    returns: list[Return]  # to places seen before
     own: float  # median motion of the tissue beside the rigid one, between frames `APART` apart
 
     @property
@@ -64,12 +66,14 @@ def estimated(
     on_step: Callable[[], object] = lambda: None,
     begun: Chain | None = None,
     known: tuple[Matcher, list[FramePair], Movement] | None = None,
+    with_returns: bool = True,
 ) -> PathEstimate:
     """Estimate the pose of every frame.
 
     on_frame  called with the chain after each frame; `begun` continues an interrupted one
     on_step   called after each step of the bundle adjustment, at most `ADJUSTMENTS` times
     known     from `movement_of`, if it was called
+    with_returns   whether places that are seen again hold the path against drift
 
     Raises:  InputError for a clip of one frame, without depth, or with a gap that is too long.
     """
@@ -82,13 +86,16 @@ def estimated(
     kept = [k for k, pose in enumerate(chain.poses) if pose is not None]
     seen = Views(views.images[kept], views.tissue[kept], views.depth[kept], views.camera)
     depth = float(np.median(seen.depth[known_depth(seen.depth) > 0]))
-    bundle = adjusted(make_levels(seen, LEVELS), [chain.poses[k] for k in kept], depth, on_step)  # type: ignore[misc]
+    returns = returns_of(matcher, chain.poses) if with_returns else []
+    place = {k: i for i, k in enumerate(kept)}
+    inside = [found._replace(source=place[found.source], target=place[found.target]) for found in returns]
+    start = closed([chain.poses[k] for k in kept], inside, depth)  # type: ignore[misc]
+    bundle = adjusted(make_levels(seen, LEVELS), start, depth, on_step, [found[:2] for found in inside])
     poses: list[CameraPose | None] = [None] * views.count
     for k, pose in zip(kept, bundle.poses):
         poses[k] = pose
-    left, still = _leftover(matcher, pairs, poses)
-    own = _own_motion(matcher, poses)
-    return PathEstimate(poses, chain.links, moves, bundle.before, bundle.after, _path(bundle.poses), left, still, own)
+    length, (left, still), own = _path(bundle.poses), _leftover(matcher, pairs, poses), _own_motion(matcher, poses)
+    return PathEstimate(poses, chain.links, moves, bundle.before, bundle.after, length, left, still, returns, own)
 
 
 def _path(poses: list[CameraPose]) -> float:

@@ -18,6 +18,7 @@ from endotsr.method.splatting.camera import Camera, backproject
 POINTS, LEAST_STEP = 600, 4  # number of grid points of a picture, and their least distance in pixels
 RETURN, RETURN_FRACTION = 1.0, 0.03  # accepted error of flow there and back: pixels, and fraction of the flow
 SMOOTH = 2.0  # pixels: standard deviation of the blur before pictures are compared
+STRONGEST = 800  # features of a frame in `by_strongest`
 LEAST_SUPPORT = 0.35  # neighbouring frames have over 0.8, pictures of two simulated scenes under 0.25
 
 
@@ -95,7 +96,13 @@ class Matcher:
 
     def by_features(self, source: int, target: int) -> Matches:
         """Features of the source frame in the target frame; for frames that are too far apart for flow."""
-        one, other = (self._features_of(k) for k in (source, target))
+        return self._matched(source, target, *(self._features_of(k) for k in (source, target)))
+
+    def by_strongest(self, source: int, target: int) -> Matches:
+        """The same for the strongest features of both alone: the time grows with the product of their numbers."""
+        return self._matched(source, target, *(self._features_of(k).first(STRONGEST) for k in (source, target)))
+
+    def _matched(self, source: int, target: int, one: Features, other: Features) -> Matches:
         here, there = matched_features(one, other)
         place = one.place[here].T
         column, row = np.floor(place).astype(np.intp)

@@ -208,6 +208,10 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
         f"path {e.path:.4g} {unit}; {e.agreeing:.0%} of the matches agree; the poses leave {e.left:.2f} pixels of the"
         f" {e.still:.2f} that the picture moves"
     )
+    if e.returns:
+        lines.append(
+            f"the scope sees earlier places again: {len(e.returns)} pairs of frames hold the path against drift"
+        )
     if found.interpolated:
         lines.append(f"without matches, the pose is interpolated: {_named(found.interpolated)}")
     if found.held:

@@ -59,6 +59,7 @@ def _residual(found: EstimatedPoses) -> str:
             ("agreeing points, before", parts.cell(e.before.agreeing)),
             ("after", parts.cell(e.after.agreeing)),
             ("pairs of frames", parts.cell(e.after.pairs)),
+            ("returns to places seen before", parts.cell(len(e.returns))),
             ("pixels that the poses leave", f"{parts.cell(e.left)} of {parts.cell(e.still)}"),
         ]
     )
