@@ -1,7 +1,7 @@
 """Steps of all poses at once: sparse normal equations over pairs of frames, solved with the first pose held fixed.
 
-A common motion of all cameras is unobservable: the first pose stays. In: for every pair, a quadratic of the change of
-its relative pose in target axes, as `pair_kernels` sums it. Out: the step of every pose. The direct bundle adjustment
+A common motion of all cameras is unobservable: the first pose stays. In: pairs of frames, each with a
+quadratic of the change of its relative pose in target axes, as `pair_kernels` sums it. Out: one step per pose. The direct bundle adjustment
 and the pose graph share these equations. A pair may join any two frames.
 """
 
