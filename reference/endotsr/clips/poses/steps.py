@@ -1,8 +1,8 @@
 """Steps of all poses at once: sparse normal equations over pairs of frames, solved with the first pose held fixed.
 
-A common motion of all cameras is unobservable: the first pose stays. In: pairs of frames, each with a
-quadratic of the change of its relative pose in target axes, as `pair_kernels` sums it. Out: one step per pose. The direct bundle adjustment
-and the pose graph share these equations. A pair may join any two frames.
+A common motion of all cameras is unobservable: the first pose stays. In: pairs of frames, each with a quadratic of the
+change of its relative pose in target axes, as `pair_kernels` sums it. Out: one step per pose. The direct bundle
+adjustment and the pose graph share these equations. A pair may join any two frames.
 """
 
 from typing import TYPE_CHECKING
