@@ -255,6 +255,102 @@ def _packed(entries: dict[str, np.ndarray]) -> bytes:
     return out.getvalue()
 
 
+def mat(rng: random.Random, data: bytes) -> bytes:
+    """The content of an element of a MAT-file changed, which is packed again, or its length and kind."""
+    elements, place = [], 128
+    while place + 8 <= len(data):
+        kind, size = struct.unpack_from("<II", data, place)
+        elements.append([kind, data[place + 8 : place + 8 + size]])
+        place += 8 + size
+    one = rng.choice(elements)
+    content = zlib.decompress(one[1]) if one[0] == 15 else one[1]
+    if rng.randrange(3):
+        content = _one_word(rng, content)
+    else:
+        content = plain(rng, content)
+    one[1] = zlib.compress(content) if one[0] == 15 else content
+    if not rng.randrange(4):
+        elements.insert(rng.randrange(len(elements)), list(rng.choice(elements)))
+    return data[:128] + b"".join(struct.pack("<II", kind, len(part)) + part for kind, part in elements)
+
+
+def _one_word(rng: random.Random, data: bytes) -> bytes:
+    """One aligned word replaced: lengths, kinds, flags, dimensions and halves of numbers are words."""
+    at = 4 * rng.randrange(max(len(data) // 4, 1))
+    word = rng.choice((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 14, 15, 16, 17, 0xFF, 1 << 16, 0x7FF00000, 0xFFFFFFFF))
+    return data[:at] + struct.pack("<I", word) + data[at + 4 :]
+
+
+def riff(rng: random.Random, data: bytes) -> bytes:
+    """A chunk of an AVI file changed, removed, repeated or renamed; the lengths of the lists around it fit again."""
+
+    def changed(part: bytes, depth: int) -> bytes:
+        chunks, place = [], 0
+        while place + 8 <= len(part):
+            size = struct.unpack_from("<I", part, place + 4)[0]
+            chunks.append([part[place : place + 4], part[place + 8 : place + 8 + size]])
+            place += 8 + size + size % 2
+        k = rng.randrange(len(chunks)) if chunks else 0
+        kind = rng.randrange(5)
+        if chunks and chunks[k][0] in (b"RIFF", b"LIST") and depth < 4 and rng.randrange(8):
+            chunks[k][1] = chunks[k][1][:4] + changed(chunks[k][1][4:], depth + 1)
+        elif chunks and kind < 2:
+            chunks[k][1] = plain(rng, chunks[k][1]) if kind else _one_word(rng, chunks[k][1])
+        elif chunks and kind == 2:
+            del chunks[k]
+        elif chunks and kind == 3:
+            chunks.insert(k, list(chunks[k]))
+        elif chunks:
+            chunks[k][0] = rng.choice(
+                (b"LIST", b"strh", b"strf", b"vprp", b"idx1", b"JUNK", b"00dc", b"indx", b"\0\0\0\0")
+            )
+        return b"".join(n + struct.pack("<I", len(c)) + c + b"\0" * (len(c) % 2) for n, c in chunks)
+
+    return changed(data, 0)
+
+
+def packets(rng: random.Random, data: bytes) -> bytes:
+    """Packets of a transport stream removed, repeated, exchanged, or changed behind their first byte."""
+    found = [data[k : k + 188] for k in range(0, len(data), 188)]
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        k, other = rng.randrange(len(found)), rng.randrange(len(found))
+        kind = rng.randrange(6)
+        if kind == 0 and len(found) > 1:
+            del found[k]
+        elif kind == 1:
+            found.insert(other, found[k])
+        elif kind == 2:
+            found[k], found[other] = found[other], found[k]
+        else:
+            at = rng.randrange(1, rng.choice((5, 24, 188)))
+            found[k] = (found[k][:at] + bytes([rng.choice((0, 1, 0x40, 0x7F, 0xFF, rng.randrange(256)))]))[
+                :188
+            ] + found[k][at + 1 :]
+    return b"".join(found)
+
+
+def parts(rng: random.Random, data: bytes) -> bytes:
+    """Parts of an MPEG stream, which begin with 0 0 1, removed, repeated, exchanged, renumbered or changed."""
+    found = data.split(b"\0\0\1")
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        k, other = rng.randrange(1, len(found)), rng.randrange(1, len(found))
+        kind = rng.randrange(5)
+        if kind == 0 and len(found) > 2:
+            del found[k]
+        elif kind == 1:
+            found.insert(other, found[k])
+        elif kind == 2:
+            found[k], found[other] = found[other], found[k]
+        elif kind == 3:
+            found[k] = (
+                bytes([rng.choice((0, 1, 0xB3, 0xB5, 0xB8, 0xB9, 0xBA, 0xBB, 0xBC, 0xBD, 0xBE, 0xE0, 0xFF))])
+                + found[k][1:]
+            )
+        else:
+            found[k] = plain(rng, found[k][:24]) + found[k][24:]
+    return b"\0\0\1".join(found)
+
+
 def ply(rng: random.Random, data: bytes) -> bytes:
     """Lines of the header changed, or numbers of the body."""
     head, mark, body = data.partition(b"end_header\n")

@@ -9,7 +9,7 @@ import json
 import random
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -316,6 +316,13 @@ READERS = {
     "pfm": Reader("a.pfm", recordings.pfm_seeds, mutate.plain, recordings.read_depth),
     "depth (npy)": Reader("a.npy", pose_seeds, mutate.npy, recordings.read_depth),
     "video (mp4)": Reader("a.mp4", recordings.video_seeds, mutate.plain, recordings.read_video),
+    "video (mkv)": Reader("a.mkv", partial(recordings.stream_seeds, "mkv"), mutate.plain, recordings.read_video),
+    "video (avi)": Reader("a.avi", partial(recordings.stream_seeds, "avi"), mutate.riff, recordings.read_video),
+    "video (ts)": Reader("a.ts", partial(recordings.stream_seeds, "ts"), mutate.packets, recordings.read_video),
+    "video (mpg)": Reader("a.mpg", partial(recordings.stream_seeds, "mpg"), mutate.parts, recordings.read_video),
+    "calibration (mat)": Reader("a.mat", recordings.matlab_seeds, mutate.mat, recordings.read_rig),
+    "depth (mat)": Reader("a.mat", recordings.matlab_depth_seeds, mutate.mat, recordings.read_depth),
+    "times of pictures": Reader("times.csv", recordings.times_seeds, mutate.lines, recordings.read_times),
     "sequence.toml": Reader(
         "sequence.toml", recordings.sequence_file_seeds, mutate.lines, recordings.read_sequence_file
     ),

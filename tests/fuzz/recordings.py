@@ -77,6 +77,30 @@ def video_seeds() -> list[bytes]:
         return [file.read_bytes() for file in files]
 
 
+@cache
+def stream_seeds(ending: str) -> list[bytes]:
+    """Three pictures as .avi, .ts, .mpg or .mkv, in two codecs."""
+    import tempfile
+
+    import av
+
+    pictures = np.random.default_rng(0).integers(0, 255, (3, 32, 48, 3), np.uint8)
+    codecs = {"avi": ("mjpeg", "mpeg4"), "mkv": ("ffv1", "libx264")}.get(ending, ("mpeg2video", "mpeg1video"))
+    found = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for codec in codecs:
+            file = Path(scratch) / f"{codec}.{ending}"
+            with av.open(str(file), "w") as container:
+                stream = container.add_stream(codec, rate=25)
+                stream.width, stream.height = 48, 32
+                stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+                for pixels in pictures:
+                    container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+                container.mux(stream.encode())
+            found.append(file.read_bytes())
+    return found
+
+
 def read_video(path: Path) -> object:
     """As `prepare` does, of at most three pictures."""
     from endotsr.clips.sequences.video_file import video_facts, video_pictures
@@ -167,6 +191,62 @@ def read_trajectory(path: Path) -> object:
 
     poses = poses_of_frames(read(path, "m", axes="opengl"), 4, 25.0)[0]
     return filled(poses) if any(pose is not None for pose in poses) else poses
+
+
+@cache
+def matlab_seeds() -> list[bytes]:
+    """One camera and two of MATLAB, and the variables of Bouguet's toolbox; packed and not."""
+    from scipy.io import savemat
+
+    matrix = np.array([[60.0, 0, 0], [0, 61, 0], [32, 24, 1]])
+    camera = {"IntrinsicMatrix": matrix, "RadialDistortion": [[0.1, 0.01]], "ImageSize": [[48, 64]]}
+    pair = {"CameraParameters1": camera, "CameraParameters2": camera, "RotationOfCamera2": np.eye(3),
+            "TranslationOfCamera2": [[-4.2, 0, 0.1]], "WorldUnits": "mm"}  # fmt: skip
+    bouguet = {"fc": [[60.0], [61.0]], "cc": [[32.0], [24.0]], "kc": np.zeros((5, 1)), "nx": 64.0, "ny": 48.0}
+    found = []
+    for variables in ({"cameraParams": camera}, {"stereoParams": pair}, bouguet):
+        for packed in (False, True):
+            out = io.BytesIO()
+            savemat(out, variables, do_compression=packed)
+            found.append(out.getvalue())
+    return found
+
+
+@cache
+def matlab_depth_seeds() -> list[bytes]:
+    """A frame in real and in whole numbers."""
+    from scipy.io import savemat
+
+    found = []
+    for kind in (np.float32, np.uint16):
+        out = io.BytesIO()
+        savemat(out, {"depth": np.arange(1, 64, dtype=kind).reshape(7, 9)}, do_compression=kind is np.uint16)
+        found.append(out.getvalue())
+    return found
+
+
+def times_seeds() -> list[bytes]:
+    """Times of four pictures: seconds, nanoseconds by the head line, names and dates."""
+    days = "\n".join(f"2011-09-26 13:02:25.{100 + 40 * k}389445" for k in range(4))
+    names = "\n".join(f"clip\\{k:04d}.png,{1.3e9 + 0.04 * k:.3f}" for k in range(4))
+    return [
+        b"0.00e+00\n4.0e-02\n8.0e-02\n1.2e-01\n",
+        b"#timestamp [ns]\r\n1403636579763555584\r\n1403636579803555584\r\n1403636579843555584\r\n"
+        b"1403636579883555584\r\n",
+        f"filename,timestamp\n{names}\n".encode(),
+        f"{days}\n".encode(),
+    ]
+
+
+def read_times(path: Path) -> object:
+    """As a folder of four pictures does; times that are used ascend and are finite."""
+    from endotsr.clips.sequences.time_lists import picture_times
+
+    found = picture_times([path.parent], [path.parent / f"{k:04d}.png" for k in range(4)], None)
+    assert found.notes and not any(set(note) & set("\n\r\x1b") for note in found.notes), found.notes
+    seconds = found.seconds
+    assert seconds is None or (np.isfinite(seconds).all() and (np.diff(seconds) > 0).all()), seconds
+    return found
 
 
 def list_seeds() -> list[bytes]:

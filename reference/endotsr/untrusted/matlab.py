@@ -1,13 +1,12 @@
 """MAT-files of MATLAB, version 5: numbers, texts, structs and cells as plain values.
 
-SciPy parses the file. Before that, it is unpacked here up to a size, and its nesting is checked: a hostile file may
-claim any size and depth. Objects of MATLAB's classes have a form that is not public, and version 7.3 is HDF5: both
+SciPy parses the file. Before that, it is unpacked here up to a size, and `matlab_elements` checks it: a hostile file
+may claim any size and depth. Objects of MATLAB's classes have a form that is not public, and version 7.3 is HDF5: both
 are refused with the command that exports them.
 """
 
 import io
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,10 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.matlab_elements import COMPRESSED, DEEPEST, HEADER, Order, check_elements, elements
 from endotsr.untrusted.names import plain_line
 
 LARGEST_FILE = 1 << 30  # bytes, unpacked
-HEADER, TAG = 128, 8  # bytes before the first element, and of the tag of an element
-COMPRESSED, MATRIX = 15, 14  # kinds of elements
-DEEPEST, MOST_ELEMENTS = 16, 1 << 16  # structs and cells within one another; all of them
 SAVE = "save it in MATLAB with save('FILE.mat', ..., '-v7')"
 EXPORT = "s = toStruct(OBJECT); save('FILE.mat', '-struct', 's', '-v7') in MATLAB stores it as plain values"
 
@@ -85,47 +82,19 @@ def _unpacked(path: Path, largest: int) -> bytes:
         raise InputError(f"{path}: a MAT-file of version 7.3 (HDF5) is not read; {SAVE}")
     if len(data) < HEADER or data[126:128] not in (b"IM", b"MI"):
         raise InputError(f"{path}: not a MAT-file of version 5; {SAVE}")
-    order = "little" if data[126:128] == b"IM" else "big"
-    parts, size = [data[:HEADER]], HEADER
-    for kind, start, end in _elements(data, HEADER, len(data), order):
-        part = data[start - TAG : end]
-        if kind == COMPRESSED:
+    order: Order = "little" if data[126:128] == b"IM" else "big"
+    parts, size, place = [data[:HEADER]], HEADER, HEADER
+    for element in elements(data, HEADER, len(data), order):
+        part, place = data[place : element.after], element.after
+        if element.kind == COMPRESSED:
             try:
-                part = zlib.decompressobj().decompress(data[start:end], largest - size + 1)
+                part = zlib.decompressobj().decompress(data[element.start : element.end], largest - size + 1)
             except zlib.error as error:
                 raise InputError(f"{path}: damaged MAT-file: {error}") from None
         size += len(part)
         if size > largest:
             raise InputError(f"{path}: more than {largest} bytes when unpacked; allowed: a smaller file")
         parts.append(part)
-    whole = b"".join(parts)
-    _check_nesting(whole, order, path)
+    whole = b"".join([*parts, data[place:]])
+    check_elements(whole, order, path)
     return whole
-
-
-def _elements(data: bytes, start: int, end: int, order: Any) -> Iterator[tuple[int, int, int]]:
-    """Kind, first byte and end of the content of the elements between two places, as far as they are whole."""
-    while start + TAG <= end:
-        kind, size = (int.from_bytes(data[k : k + 4], order) for k in (start, start + 4))
-        if kind >> 16:  # the content lies in the tag
-            yield kind & 0xFFFF, start + 4, start + TAG
-            start += TAG
-            continue
-        start += TAG
-        if size > end - start:
-            return
-        yield kind, start, start + size
-        start += size if kind == COMPRESSED else -(-size // TAG) * TAG
-
-
-def _check_nesting(data: bytes, order: Any, path: Path) -> None:
-    """Raises InputError for matrices that are nested too deeply or too many: a parser that recurses would crash."""
-    waiting, count = [(HEADER, len(data), 0)], 0
-    while waiting:
-        start, end, depth = waiting.pop()
-        for kind, first, last in _elements(data, start, end, order):
-            if kind == MATRIX:
-                waiting.append((first, last, depth + 1))
-                count += 1
-        if depth > DEEPEST or count > MOST_ELEMENTS:
-            raise InputError(f"{path}: structs and cells within one another; use at most {DEEPEST} levels")

@@ -227,7 +227,8 @@ TOOLBOX_CHANGES = {"nx": 64, "ny": 48, "R": np.array([[1.0, 0, 0], [0, 0, -1], [
 
 FORMATS = {
     "nerfstudio": Format(nerfstudio.FIELDS, CAMERA, write_transforms, lambda folder: result(describe(folder)),
-                         OTHER | {"frames": [entry(1), entry(2)], "ply_file_path": "cloud.ply"},
+                         OTHER | {"frames": [entry(1), entry(2)], "ply_file_path": "cloud.ply",
+                                  "applied_scale": 2.0},
                          NOT_PINHOLE | {"from_mitsuba": True, "integer_depth_scale": 0.001,
                                         "n_extra_learnable_dims": 4}),
     "nerfstudio frame": Format(nerfstudio.FRAME_FIELDS, {name: lambda i, n=name: entry(i)[n] for name in entry(0)}

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+from careless_inputs import CARELESS_ROWS
 from input_kinds import (
     MATRIX,
     OPENCV,
@@ -289,6 +290,7 @@ ROWS = [
     *(Row(f"export to {name}", exported(name, *words), "refused", "allowed: FILE.ply")
       for name, *words in (("a.spz",), ("a.splat",), ("a.obj", "--content", "mesh"), ("a.gltf", "--content", "mesh"))),
     *ODD_ROWS,
+    *CARELESS_ROWS,
     *LEFT_ROWS,
     *SILENT_ROWS,
     *RIG_ROWS,

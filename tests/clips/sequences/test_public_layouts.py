@@ -199,3 +199,16 @@ def test_out_to_other_programs_and_back(tmp_path, capsys):
             assert (
                 500 < len(points) and found.depth(0).min() <= depth.min() and depth.max() <= found.depth(0).max() + 1e-6
             )
+
+
+@pytest.mark.parametrize("with_depth", [True, False])
+def test_depth_and_points_of_nerfstudio_follow_applied_scale(with_depth, tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    found = []
+    for k, applied in enumerate((1.0, 0.25)):
+        folder = tmp_path / str(k)
+        made.nerfstudio(folder, with_depth, ply_file_path="cloud.ply", applied_scale=applied)
+        (folder / "cloud.ply").write_text(head + "1 2 3\n")
+        clip = describe(folder)
+        found.append(clip.depth(0) if clip.depth else clip.points(0))
+    np.testing.assert_allclose(found[1], 0.25 * found[0], rtol=1e-6)

@@ -23,6 +23,8 @@ from endotsr.errors import InputError
 
 LEAST_TISSUE_FRACTION = 0.05
 MOST_SOFT_FRACTION = 0.05  # of a frame; a picture with more pixels between black and white is not a mask
+LEAST_WHITE = 32  # smaller numbers than this, with one above 1, are those of objects and no grey levels
+OBJECTS = "or with endotsr prepare --masks FOLDER --excluded-value nonzero the numbers of several objects"
 LEAST_MISSING_FRACTION = 0.01  # of all pixels; less missing depth is no evidence of polarity
 MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
@@ -40,8 +42,8 @@ def threshold_masks(
     out      (n, H, W) array to fill and return; None = a new array
     returns  (n, H, W) bool, True = white: at least half of full white
 
-    `notes` receives the count of intermediate values. Raises InputError naming a picture with more than 5 % of them, or
-    a picture of another bit depth than most if white is 65535.
+    `notes` receives the count of intermediate values. Raises InputError naming a picture with more than 5 % of them, a
+    picture of small numbers with one above 1, or a picture of another bit depth than most if white is 65535.
     """
     largest = max(int(picture.max()) for picture in raw)
     white = 1 if largest <= 1 else 255 if largest <= 255 else 65535
@@ -58,6 +60,8 @@ def threshold_masks(
                 f"{names[i]}: {soft / picture.size:.1%} of the pixels are neither 0 nor {white}: this is not a mask"
                 " (another kind of picture in the mask folder, or masks written with different scales?)"
             )
+        if 1 < picture.max() < LEAST_WHITE:
+            raise InputError(f"{names[i]}: numbers up to {picture.max()}: allowed: 0 and {white}, {OBJECTS}")
     if soft_total:
         notes.append(
             f"{soft_total} mask pixels are between 0 and {white}; values from {(white + 1) // 2} count as white"

@@ -18,7 +18,7 @@ from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePai
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.depth_stacks import stack_planes
 from endotsr.clips.sequences.files import list_pictures
-from endotsr.clips.sequences.masks import MOST_SOFT_FRACTION
+from endotsr.clips.sequences.masks import LEAST_WHITE, MOST_SOFT_FRACTION
 from endotsr.clips.sequences.pairing import paired
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -129,7 +129,8 @@ def masks_of(files: list[Path | None], excluded_value: str, width: int, height: 
             return nearest_pixels(np.logical_not(numbered), width, height, path)
         plane = grey_plane(pixels, path)
         values = np.unique(plane)
-        if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT_FRACTION:
+        soft = np.isin(plane, values[[0, -1]]).mean() >= 1 - MOST_SOFT_FRACTION and values[-1] >= LEAST_WHITE
+        if len(values) > 2 and not soft:
             raise InputError(
                 f"{path}: {len(values)} different values: this is not a mask; allowed: two values, or with"
                 " --excluded-value nonzero the numbers of several objects"

@@ -188,7 +188,7 @@ def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]
     """
     with _opened(path) as (container, stream):
         stream.thread_type = "AUTO"
-        pictures = enumerate(_progressive(_decoded(container.decode(stream), path)))
+        pictures = enumerate(_decoded(_progressive(_decoded(container.decode(stream), path)), path))
         size, position = None, -1
         for number in wanted:
             while position < number:
@@ -205,7 +205,18 @@ def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]
                     f"{path}: picture {position}: {frame.width}x{frame.height} pixels, those before have"
                     f" {size[0]}x{size[1]}; allowed: one size"
                 )
-            yield np.ascontiguousarray(frame.to_ndarray(format="rgb24", interpolation="BICUBIC"))
+            yield _as_rgb(frame, path, position)
+
+
+def _as_rgb(frame: Any, path: Path, position: int) -> NDArray[np.uint8]:
+    """The picture (H, W, 3). Raises InputError for marks of colour or pixels that FFmpeg cannot convert."""
+    import av.error
+
+    try:
+        return np.ascontiguousarray(frame.to_ndarray(format="rgb24", interpolation="BICUBIC"))
+    except (av.error.FFmpegError, ValueError, MemoryError) as error:
+        said = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: picture {position} cannot be converted to RGB: {plain_line(said)}") from None
 
 
 def _progressive(frames: Iterable[Any]) -> Iterator[Any]:
@@ -260,6 +271,8 @@ def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
         for item in items:
             yield item
             position += 1
+    except InputError:
+        raise  # of a decoder among the items
     except av.error.EOFError:
         return
     except (av.error.FFmpegError, ValueError, MemoryError) as error:

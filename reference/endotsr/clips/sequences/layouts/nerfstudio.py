@@ -1,8 +1,8 @@
 """nerfstudio, instant-ngp and Blender: `transforms.json` or `transforms_train.json`.
 
 The file holds intrinsics, camera-to-world matrices and names of pictures. Camera axes are OpenGL's, pixel edges are at
-integers, masks are black on excluded pixels, and depth files store thousandths of the unit of the matrices, which no
-field states. `FIELDS` lists all fields.
+integers, masks are black on excluded pixels, and depth files store thousandths of the unit of the matrices before
+`applied_scale`, which no field states. `FIELDS` lists all fields.
 """
 
 from pathlib import Path
@@ -63,14 +63,15 @@ OTHER_CAMERA = {
 SAME = "is part of the matrices already, and the unit of lengths is free"
 FIELDS = Inventory(
     "transforms.json of nerfstudio, instant-ngp and Blender",
-    used=CAMERA | {"frames": "one entry per picture", "ply_file_path": "points of a reconstruction, as prior depth"},
+    used=CAMERA | {"frames": "one entry per picture", "ply_file_path": "points of a reconstruction, as prior depth",
+                   "applied_scale": "lengths of the matrices over those of the depth files and points"},
     refused=OTHER_CAMERA
     | {"from_mitsuba": "these axes are not supported: convert the matrices to OpenGL's",
        "integer_depth_scale": "depth of instant-ngp is not read: write depth_file_path in thousandths of the unit",
        "n_extra_learnable_dims": "latent codes per picture are not supported"},
     harmless={
         "aabb aabb_scale render_aabb offset scale up": "the scene of another program has bounds; here it has none",
-        "applied_transform applied_scale orientation_override": SAME,
+        "applied_transform orientation_override": SAME,
         "train_filenames val_filenames test_filenames": "the split is a setting here (sequence.split)",
         "white_transparent black_transparent sharpen is_hdr": "a setting of another program's pictures",
         "enable_depth_loading enable_ray_loading": "a switch of another program",
@@ -83,7 +84,7 @@ FRAME_FIELDS = Inventory(
         "file_path": "the picture; its ending may be missing",
         "transform_matrix": "camera-to-world, OpenGL axes",
         "mask_path": "mask, black = excluded",
-        "depth_file_path": "depth in thousandths of the unit of the matrices",
+        "depth_file_path": "depth in thousandths of the unit of the matrices before applied_scale",
         "time": "time of the picture; with --source-rate only its spacing counts",
     },
     refused=OTHER_CAMERA | {"depth_path": "depth of instant-ngp is not read: write it as depth_file_path"},
@@ -142,8 +143,8 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     if masks is None and any(masked):
         masks = masks_of(masked, "black", width, height)
     unit = options.trajectory_unit or ARBITRARY
-    factor = scene_factor(unit)
-    depth = depth_of(planes, DEPTH_STEP * factor) if any(planes) else None
+    factor, applied = scene_factor(unit), _applied_scale(data, file, notes)
+    depth = depth_of(planes, DEPTH_STEP * factor * applied) if any(planes) else None
     cloud = None if depth is not None else _cloud(folder, data, file, notes)
     notes += _of_files(file, files)
     return Clip(
@@ -153,7 +154,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         pictures=pictures_from_files(files, []),
         masks=masks,
         depth=depth,
-        points=None if cloud is None else lambda i: cloud * factor,
+        points=None if cloud is None else lambda i: cloud * (factor * applied),
         unit=ARBITRARY if unit == ARBITRARY else "mm",
         intrinsics=shared_intrinsics(cameras, file, notes),
         poses=[_pose(entry, options, factor, f"{file}: frame {i}") for i, entry in enumerate(entries)],
@@ -214,6 +215,14 @@ def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray
     notes += unused
     notes.append(f"{len(cloud)} points: the file does not state their visibility")
     return cloud
+
+
+def _applied_scale(data: Keys, file: Path, notes: list[str]) -> float:
+    """Lengths of the matrices over those of depth files and points, which nerfstudio multiplies by it; noted."""
+    applied = number(data.get("applied_scale", 1.0), f"{file}: applied_scale", 1e-9, 1e9)
+    if applied != 1.0:
+        notes.append(f"applied_scale: depth files and points are multiplied by {applied:g}, as the matrices were")
+    return applied
 
 
 def _places(entries: list[Keys], data: Keys) -> tuple[str, ...]:

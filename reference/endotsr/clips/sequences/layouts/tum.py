@@ -97,6 +97,8 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
     notes = _unlisted(path, files)
+    if pairs := sorted(file.name for file in path.glob("associat*.txt")):
+        notes.append(f"{shortened(pairs)}: not read; pictures, depth and poses are paired by their times")
     width, height = size_of(files)
     intrinsics = stated_camera(options, width, height, path).intrinsics
     notes += picture_notes(files)
