@@ -1,7 +1,7 @@
 """The elements of a MAT-file of version 5, checked before a parser sees them.
 
-SciPy trusts the kind, the number and the lengths of the elements of an array: a wrong one ends the process. Here every
-array has the elements of its class, and they fill it.
+SciPy trusts the kind, the number and the lengths of the elements of an array: a wrong one ends the process. Here an
+array is refused unless it has the elements of its class and they fill it.
 """
 
 import math
