@@ -470,3 +470,20 @@ def test_the_commands_of_the_page_have_the_options_that_exist():
     lines = [line for line in text.splitlines() if line.startswith("endotsr ablate ")]
     names = {field.name for field in fields_of(AblateOptions)}
     assert lines and all(word in names for line in lines for word in line.split() if word.startswith("--"))
+
+
+def test_the_table_of_held_out_frames_does_not_mix_clips():
+    def row(clip, psnr, blend):
+        baselines = {"two_neighbours": {"mean": {"psnr_tissue": blend}}}
+        return {
+            "configuration": "A+S+L", "split": "every_eighth", "preset": "paper", "sequence": clip, "baselines": baselines,
+            "psnr_tissue": psnr, "training_psnr_tissue": 44.0, "cross_fade_psnr_tissue": 38.0,
+        }  # fmt: skip
+
+    pulling = {"rows": [row("endonerf_pulling", 37.0, 38.7)]}
+    cutting = {"rows": [row("endonerf_cutting", 39.0, 41.4), row("endonerf_cutting", 40.0, 41.4)]}
+    found = protocols([cutting, pulling], []).splitlines()[2:]
+    assert found == [
+        "| endonerf_pulling | every_eighth, paper | 1 | 44.00 | 37.00 | 38.00 | 38.70 | - |",
+        "| endonerf_cutting | every_eighth, paper | 2 | 44.00 | 39.50 | 38.00 | 41.40 | - |",
+    ]

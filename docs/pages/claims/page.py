@@ -60,6 +60,7 @@ PICTURE = "![Differences between configurations on cutting with their intervals]
 NO_FRAMES = "The metrics of single frames are not recorded in these runs (`endotsr ablate --collect` records them)."
 COST = "sweep_cost.json"  # by docs/pages/claims/sweep_cost.py
 RUNS = "pulling*.json"  # records of single runs, by docs/pages/full_size/record.py
+CUTTING = "cutting*.json"  # of the other clip
 
 
 def read(folder: Path) -> dict[str, Any]:
@@ -89,9 +90,9 @@ def without_frames(record: Any, left_out: set[int]) -> Any:
     return compared({**record, "rows": rows})
 
 
-def read_runs(folder: Path) -> list[dict[str, Any]]:
+def read_runs(folder: Path, name: str = RUNS) -> list[dict[str, Any]]:
     """The records of single runs in the same folder."""
-    return [read_json(path, "docs/pages/full_size/record.py") for path in sorted(folder.glob(RUNS))]
+    return [read_json(path, "docs/pages/full_size/record.py") for path in sorted(folder.glob(name))]
 
 
 def parts(folder: Path = RESULTS) -> dict[str, str]:
@@ -115,7 +116,9 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
         "pulling_half_fixed": claims_parts.tables(found["pulling_half_fixed"]),
         "simulated": claims_parts.tables(found["simulated"]),
         "simulated_paper": claims_parts.tables(found["simulated_paper"]),
-        "protocols": claims_parts.protocols([found["pulling"], found["cutting"], *half], runs),
+        "protocols": claims_parts.protocols(
+            [found["pulling"], found["cutting"], *half], [*runs, *read_runs(folder, CUTTING)]
+        ),
         "cost": claims_parts.cost(found["pulling"], runs),
         "divided": claims_parts.divided(read_json(cost, "docs/pages/claims/sweep_cost.py") if cost.exists() else None),
     }

@@ -36,11 +36,12 @@ def differences(found: Record, split: str) -> str:
 
 
 def protocols(ablations: list[Record | None], runs: list[Record]) -> str:
-    """Held-out PSNR on tissue for every split: training frames, the model, its cross-fade and the baselines."""
-    rows = [_protocol_row(split, members) for split, members in _by_split(ablations, runs).items()]
+    """Held-out PSNR on tissue by clip and split: training frames, the model, its cross-fade and the baselines."""
+    rows = [[*key, *_protocol_cells(members)] for key, members in sorted(_by_split(ablations, runs).items(), key=_clip)]
     if not rows:
         return NOT_YET
     heads = (
+        "clip",
         "held out, preset",
         "runs",
         "training frames",
@@ -52,18 +53,24 @@ def protocols(ablations: list[Record | None], runs: list[Record]) -> str:
     return markdown(heads, rows)
 
 
-def _by_split(ablations: list[Record | None], runs: list[Record]) -> dict[str, list[Record]]:
-    """Rows with the keys of a sweep, by split, preset and size: of the ablations, else of recorded runs."""
-    groups: dict[str, list[Record]] = {}
+def _clip(group: tuple[tuple[str, str], list[Record]]) -> bool:
+    """Order of the clips: pulling comes first."""
+    return "pulling" not in group[0][0]
+
+
+def _by_split(ablations: list[Record | None], runs: list[Record]) -> dict[tuple[str, str], list[Record]]:
+    """Rows with the keys of a sweep by clip and split, preset and size: of the ablations, else of recorded runs."""
+    groups: dict[tuple[str, str], list[Record]] = {}
     for row in (row for found in ablations if found is not None for row in found["rows"]):
         if row["configuration"] == FULL:
             size = "" if row.get("width", WIDTH) == WIDTH else f" at {row['width']}x{row['height']}"
-            groups.setdefault(f"{row['split']}, {row['preset']}{size}", []).append(row)
+            groups.setdefault((row["sequence"], f"{row['split']}, {row['preset']}{size}"), []).append(row)
     ablated = set(groups)
     for run in runs:
         sequence, preset = run["run"]["settings"]["sequence"], run["run"]["settings"]["preset"]
         split = sequence["split"] + (f" {sequence['block_length']}" if sequence["split"] in ("blocks", "end") else "")
-        if f"{split}, {preset}" in ablated:  # the same runs, or runs of the same kind without their pairs
+        key = run["run"]["input"]["source"], f"{split}, {preset}"
+        if key in ablated:  # the same runs, or runs of the same kind without their pairs
             continue
         faded = (run.get("cross_fade") or {}).get("mean") or {}
         row = {
@@ -72,11 +79,11 @@ def _by_split(ablations: list[Record | None], runs: list[Record]) -> dict[str, l
             "cross_fade_psnr_tissue": faded.get("psnr_tissue"),
             "baselines": run["baselines"],
         }
-        groups.setdefault(f"{split}, {preset}", []).append(row)
+        groups.setdefault(key, []).append(row)
     return groups
 
 
-def _protocol_row(split: str, rows: list[Record]) -> list[str]:
+def _protocol_cells(rows: list[Record]) -> list[str]:
     def mean(key: str) -> str:
         values = [row[key] for row in rows if row.get(key) is not None]
         return f"{np.mean(values):.2f}" if values else "-"
@@ -86,7 +93,7 @@ def _protocol_row(split: str, rows: list[Record]) -> list[str]:
         return "-" if value is None else f"{value:.2f}"
 
     model = [mean(key) for key in ("training_psnr_tissue", "psnr_tissue", "cross_fade_psnr_tissue")]
-    return [split, str(len(rows)), *model, baseline("two_neighbours"), baseline("flow_interpolation")]
+    return [str(len(rows)), *model, baseline("two_neighbours"), baseline("flow_interpolation")]
 
 
 def divided(found: Record | None) -> str:
