@@ -476,8 +476,8 @@ def test_the_table_of_held_out_frames_does_not_mix_clips():
     def row(clip, psnr, blend):
         baselines = {"two_neighbours": {"mean": {"psnr_tissue": blend}}}
         return {
-            "configuration": "A+S+L", "split": "every_eighth", "preset": "paper", "sequence": clip, "baselines": baselines,
-            "psnr_tissue": psnr, "training_psnr_tissue": 44.0, "cross_fade_psnr_tissue": 38.0,
+            "configuration": "A+S+L", "split": "every_eighth", "preset": "paper", "sequence": clip,
+            "baselines": baselines, "psnr_tissue": psnr, "training_psnr_tissue": 44.0, "cross_fade_psnr_tissue": 38.0,
         }  # fmt: skip
 
     pulling = {"rows": [row("endonerf_pulling", 37.0, 38.7)]}
