@@ -1,6 +1,7 @@
 """TIFF, WebP and BMP pictures: files have their pixels, and damaged, huge, double or transparent ones are refused."""
 
 import io
+import logging
 import struct
 
 import numpy as np
@@ -181,3 +182,14 @@ def test_a_depth_file_of_every_listed_ending_has_a_reader(tmp_path, ending):
     with pytest.raises(InputError) as refusal:
         read_plane(written(tmp_path, b"0", ending[1:]))
     assert "by its name" not in str(refusal.value)
+
+
+def test_pillow_prints_nothing_about_a_damaged_file(tmp_path, monkeypatch, capfd):
+    """Its log reaches standard error where the program has no other place for it, as in a command."""
+    data = saved(COLOUR, "tiff")
+    tag = struct.pack("<HHI", 277, 3, 1)  # samples per pixel
+    assert tag in data
+    monkeypatch.setattr(logging.root, "handlers", [])
+    with pytest.raises(InputError, match="damaged TIFF"):
+        read_picture(written(tmp_path, data.replace(tag + b"\3\0", tag + b"\1\1"), "tiff"))
+    assert capfd.readouterr().err == ""

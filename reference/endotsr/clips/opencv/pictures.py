@@ -6,6 +6,7 @@ JPEG decodes to a picture whose lower part is grey. Sizes are checked before dec
 
 import importlib
 import io
+import logging
 import struct
 import warnings
 from functools import cache
@@ -130,6 +131,7 @@ def _plugin(kind: str) -> Any:
     """Pillow's class for a file type, without the limit of `Image.open`, which prints a warning."""
     name = PLUGINS[kind]
     warnings.filterwarnings("ignore", module=r"PIL\.")  # about metadata, without a file name
+    logging.getLogger("PIL").addHandler(logging.NullHandler())  # it would print errors, without a file name either
     return getattr(importlib.import_module(f"PIL.{name}Plugin"), f"{name}File")
 
 
