@@ -44,7 +44,7 @@ def test_the_metadata_is_complete(wheel):
     assert found["Name"] == "endotsr" and found["License-Expression"] == "Apache-2.0" and found["Requires-Python"]
     assert found["Summary"] and found["Author"] and len(found.get_all("Classifier")) > 5
     assert found["Description-Content-Type"] == "text/markdown" and "## Two commands" in found.get_payload()
-    assert {"test", "docs", "mesh", "peers", "cluster"} == {*found.get_all("Provides-Extra")}
+    assert {"test", "docs", "mesh", "sfm", "peers", "cluster"} == {*found.get_all("Provides-Extra")}
 
 
 # Distributions whose import has another name.

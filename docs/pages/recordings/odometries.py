@@ -4,9 +4,7 @@ In: a `Sequence` with depth. Out: `Found`, one pose per frame or None. All of th
 usable pixels and, except pycolmap, the same depth. pycolmap is used if it is installed.
 """
 
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,49 +89,13 @@ def by_opencv(sequence: Sequence, kind: str) -> Found:
 
 
 def by_pycolmap(sequence: Sequence) -> Found:
-    """Structure from motion from the pictures and masks, with the true intrinsics held fixed. Raises ImportError."""
-    import pycolmap  # type: ignore[import-not-found]  # optional
+    """`endotsr poses --sfm` without depth. Raises ImportError without pycolmap."""
+    import pycolmap  # type: ignore[import-not-found]  # noqa: F401  # optional: its row is left out
 
-    from endotsr.clips.opencv import write_png
+    from endotsr.clips.poses.structure import reconstructed
 
-    pycolmap.logging.minloglevel = 2  # errors only
-    poses: list[CameraPose | None] = [None] * sequence.count
-    camera = sequence.cameras[0]
-    with tempfile.TemporaryDirectory() as place:
-        root, tissue = Path(place), usable(sequence)
-        for name in ("images", "masks", "out"):
-            (root / name).mkdir()
-        for k in range(sequence.count):
-            name = f"{k:06d}.png"
-            write_png(root / "images" / name, np.ascontiguousarray(sequence.images[k].transpose(1, 2, 0)))
-            write_png(root / "masks" / f"{name}.png", (tissue[k] * 255).astype(np.uint8))
-        models = _mapped(pycolmap, root, f"{camera.fx},{camera.fy},{camera.cx},{camera.cy}")
-        best = max(models.values(), key=lambda model: model.num_reg_images(), default=None)
-        for image in best.images.values() if best is not None else ():
-            if image.has_pose:
-                placed = image.cam_from_world().matrix()
-                poses[int(Path(image.name).stem)] = CameraPose(placed[:, :3].copy(), placed[:, 3].copy())
-    return Found(poses, scaled=True)
-
-
-def _mapped(pycolmap: Any, root: Path, parameters: str) -> Any:
-    """The models that pycolmap reconstructs, on one thread."""
-    database = root / "database.db"
-    reader = pycolmap.ImageReaderOptions(
-        camera_model="PINHOLE", camera_params=parameters, mask_path=str(root / "masks")
-    )
-    extraction = pycolmap.FeatureExtractionOptions()
-    matching = pycolmap.FeatureMatchingOptions()
-    mapping = pycolmap.IncrementalPipelineOptions()
-    extraction.use_gpu = matching.use_gpu = False
-    extraction.num_threads = matching.num_threads = mapping.num_threads = 1
-    mapping.ba_refine_focal_length = mapping.ba_refine_principal_point = mapping.ba_refine_extra_params = False
-    pycolmap.extract_features(
-        database, root / "images", reader_options=reader, extraction_options=extraction,
-        camera_mode=pycolmap.CameraMode.SINGLE,
-    )  # fmt: skip
-    pycolmap.match_exhaustive(database, matching_options=matching)
-    return pycolmap.incremental_mapping(database, root / "images", root / "out", options=mapping)
+    found = reconstructed(Views(sequence.images, sequence.masks, sequence.depth, sequence.cameras[0]))
+    return Found([None] * sequence.count if found is None else found.poses, scaled=True)
 
 
 METHODS: dict[str, Callable[[Sequence], Found]] = {

@@ -1,15 +1,19 @@
-"""`endotsr poses`: poses of a moving scope, from pictures and depth."""
+"""`endotsr poses`: poses of a moving scope, from pictures and depth, or from pictures alone."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 
 if TYPE_CHECKING:
+    from endotsr.clips.poses.movement import Movement
     from endotsr.clips.sequences.make_poses import PoseReport
+    from endotsr.clips.sequences.make_structure import StructureReport
+    from endotsr.method.splatting.camera import Camera
 
 
 @dataclass
@@ -21,10 +25,16 @@ class PosesOptions:
     and so is a clip whose depth is a plane (`endotsr depth --flat`). Motion of the whole tissue, as in breathing,
     cannot be told from motion of the scope. An interrupted command continues where it was. Exit code 1: nothing
     written, for one of these two reasons.
+
+    --sfm needs no depth: structure from motion by pycolmap (`pip install 'endotsr[sfm]'`). Its path has the unit of the
+    depth of the clip. Without depth, the unit becomes arbitrary, and the depth of the points is written. An interrupted
+    --sfm begins anew.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
     """folder with sequence.toml"""
+    sfm: bool = False
+    """structure from motion, from pictures and masks"""
     replace: bool = False
     """replace existing poses"""
     force: bool = False
@@ -38,27 +48,59 @@ class PosesOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(PosesOptions, words, "poses")
+    from endotsr.untrusted.writing import replace_text
+
+    written, lines, page = _structure(options) if options.sfm else _estimate(options)
+    for line in lines:
+        print(line)
+    if written:
+        print(f"written: {options.sequence}; next: endotsr train {options.sequence} --out RUN")
+    if options.html is not None:
+        replace_text(options.html, page())
+        print(f"report: {options.html}")
+    return 0 if written else 1
+
+
+Said = tuple[bool, list[str], Callable[[], str]]  # whether poses are written, the sentences, and the page
+
+
+def _estimate(options: PosesOptions) -> Said:
+    """Poses from pictures and depth."""
     from endotsr.cli.parts.progress import StepBar
     from endotsr.clips.sequences.make_poses import PoseProgress, enter_poses, lines_of
     from endotsr.results.report.poses_page import poses_page
-    from endotsr.untrusted.writing import replace_text
 
     with StepBar("poses") as bar:
         report = enter_poses(options.sequence, options.replace, options.force, PoseProgress(bar.begin, bar.step))
-    for line in lines_of(report, options.sequence):
-        print(line)
-    if report.written:
-        print(f"written: {options.sequence}; next: endotsr train {options.sequence} --out RUN")
-    if options.html is not None:
-        replace_text(options.html, poses_page(options.sequence.name, report, lines_of(report, options.sequence)))
-        print(f"report: {options.html}")
     _write(options, report)
-    return 0 if report.written else 1
+    lines = lines_of(report, options.sequence)
+    return report.written, lines, lambda: poses_page(options.sequence.name, report, lines)
+
+
+def _structure(options: PosesOptions) -> Said:
+    """Poses by structure from motion."""
+    from endotsr.cli.parts.progress import StepBar
+    from endotsr.clips.sequences.make_poses import PoseProgress
+    from endotsr.clips.sequences.make_structure import enter_structure, structure_lines
+    from endotsr.results.report.poses_page import structure_page
+
+    with StepBar("poses") as bar:
+        report = enter_structure(options.sequence, options.replace, options.force, PoseProgress(bar.begin, bar.step))
+    _write_structure(options, report)
+    lines = structure_lines(report, options.sequence)
+    return report.written, lines, lambda: structure_page(options.sequence.name, report, lines)
+
+
+def _movement(moves: "Movement") -> dict[str, Any]:
+    return {"answer": moves.answer, "left": moves.left, "flow": moves.flow, "pairs": moves.pairs}
+
+
+def _rows(cameras: Iterable["Camera"]) -> list[dict[str, Any]]:
+    return [{"rotation": c.rotation.tolist(), "translation": c.translation.tolist()} for c in cameras]
 
 
 def _write(options: PosesOptions, report: "PoseReport") -> None:
-    moves = report.movement
-    said = {"answer": moves.answer, "left": moves.left, "flow": moves.flow, "pairs": moves.pairs}
+    said = _movement(report.movement)
     if report.found is None:
         write_result(options.json, sequence=options.sequence, written=False, movement=said)
         return
@@ -68,5 +110,19 @@ def _write(options: PosesOptions, report: "PoseReport") -> None:
         agreeing=e.agreeing, pixels_left=e.left, pixels_without_motion=e.still, tissue_motion=e.own,
         residual_before=e.before.scale, residual_after=e.after.scale, interpolated=found.interpolated, held=found.held,
         returns=[{"source": one.source, "target": one.target, "agree": one.agree} for one in e.returns],
-        poses=[{"rotation": c.rotation.tolist(), "translation": c.translation.tolist()} for c in found.cameras],
+        poses=_rows(found.cameras),
+    )  # fmt: skip
+
+
+def _write_structure(options: PosesOptions, report: "StructureReport") -> None:
+    said = _movement(report.movement) | {"drift": report.movement.drift}
+    found, scale = report.structure, report.scale
+    if found is None:
+        write_result(options.json, sequence=options.sequence, written=False, movement=said)
+        return
+    told = {} if scale is None else {"factor": scale.factor, "spread": scale.spread, "inside": scale.inside}
+    write_result(
+        options.json, sequence=options.sequence, written=True, movement=said, unit=report.unit, path=report.path,
+        points=len(found.points), pixels_off=found.error, other_models=found.others, scale=told or None,
+        interpolated=list(report.interpolated), held=list(report.held), poses=_rows(report.cameras),
     )  # fmt: skip

@@ -4,7 +4,6 @@ In: a folder in the common format, or a `Sequence` in memory. Out: one pose for 
 is interpolated. An interrupted call leaves its frames in `poses.partial.json`, and the next one continues there.
 """
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Callable
@@ -19,13 +18,9 @@ from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, PathEstimate, estim
 from endotsr.clips.poses.matches import Matcher
 from endotsr.clips.poses.movement import FramePair, Movement, with_assumed_depth
 from endotsr.clips.poses.views import Views
-from endotsr.clips.sequences.camera import scene_factor
-from endotsr.clips.sequences.files import shortened
-from endotsr.clips.sequences.layouts.common import describe_prepared
+from endotsr.clips.sequences.pose_record import cameras_of, gap_lines, open_for_poses, pose_entry, resting_views
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, sequence_text
-from endotsr.clips.sequences.trajectory import filled
-from endotsr.clips.sequences.view_frames import views_of
+from endotsr.clips.sequences.sequence_file import FILE_NAME, sequence_text
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose
 from endotsr.untrusted.json import read_json, typed
@@ -97,25 +92,20 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
 
     Raises:   InputError, leaving the folder unchanged but for the partial result.
     """
-    file, clip = read_sequence_file(folder), describe_prepared(folder)
-    if file.poses and not replace:
-        raise InputError(f"{folder}: has poses already ({file.poses.origin}); --replace estimates new ones")
+    file, clip = open_for_poses(folder, replace)
     if clip.depth is None:
-        raise InputError(f"{folder}: no depth, and poses are estimated from it; run endotsr depth {folder} first")
-    if any(file.camera.distortion):
-        raise InputError(f"{folder}: the pictures are distorted; endotsr prepare {folder} --out NEW straightens them")
-    views, unit = views_of(clip, dataclasses.replace(clip, poses=None).cameras([0])[0]), clip.unit_in_words
-    if views.count < 2:
-        raise InputError(f"{folder}: one frame: there is no motion to estimate")
+        raise InputError(
+            f"{folder}: no depth, and poses are estimated from it; run endotsr depth {folder} first, or endotsr poses"
+            f" {folder} --sfm, which needs none: structure from motion"
+        )
+    views, unit = resting_views(clip), clip.unit_in_words
     matcher, pairs, moves = movement_of(views)
     known = matcher, pairs, with_assumed_depth(moves, clip.depth.assumed)
     # On a real rigid clip, poses fitted to a plane gave a scene that is worse than a copy of the nearest frame.
     if (known[2].answer == "still" or clip.depth.assumed == "shape") and not force:
         return PoseReport(False, known[2], None, unit)
     found = _resumed(folder, views, known, watch)
-    factor = scene_factor(file.unit)
-    rows = [np.column_stack([c.rotation, c.translation / factor]).ravel().tolist() for c in found.cameras]
-    entry = PoseEntry(origin=ORIGIN, interpolated=sorted(found.interpolated + found.held), matrices=rows)
+    entry = pose_entry(found.cameras, file.unit, ORIGIN, sorted(found.interpolated + found.held))
     replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(file, poses=entry)))
     (folder / PARTIAL).unlink(missing_ok=True)
     return PoseReport(True, known[2], found, unit)
@@ -147,17 +137,8 @@ def _resumed(
 
 def _with_cameras(found: PathEstimate, first: Camera) -> EstimatedPoses:
     """A camera for each frame: gaps are interpolated, and both ends are held."""
-    known = [k for k, pose in enumerate(found.poses) if pose is not None]
-    held = [k for k in found.without if k < known[0] or k > known[-1]]
-    poses = filled(found.poses)
-    cameras = [
-        first._replace(
-            rotation=pose.rotation @ first.rotation,
-            translation=pose.rotation @ first.translation + pose.translation,
-        )
-        for pose in poses
-    ]
-    return EstimatedPoses(cameras, [k for k in found.without if k not in held], held, found)
+    cameras, interpolated, held = cameras_of(found.poses, first)
+    return EstimatedPoses(cameras, interpolated, held, found)
 
 
 def _mark(views: Views) -> str:
@@ -212,10 +193,7 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
         lines.append(
             f"the scope sees earlier places again: {len(e.returns)} pairs of frames hold the path against drift"
         )
-    if found.interpolated:
-        lines.append(f"without matches, the pose is interpolated: {_named(found.interpolated)}")
-    if found.held:
-        lines.append(f"before the first or after the last pose, which is held: {_named(found.held)}")
+    lines += gap_lines(found.interpolated, found.held)
     lines.append(
         f"beside the rigid motion, tissue moves by {e.own:.2g} {unit} (median, over {APART} frames); what the whole"
         " tissue does in common, as in breathing, no method can tell from motion of the scope: it is in the path"
@@ -227,8 +205,3 @@ def _why_left(moves: Movement) -> str:
     if moves.assumed and moves.answer != "still":
         return "the shape of the depth is assumed, and poses are as wrong as the depth that they are fitted to"
     return "still"
-
-
-def _named(frames: list[int]) -> str:
-    word = "frame" if len(frames) == 1 else f"{len(frames)} frames"
-    return f"{word} {shortened([str(k) for k in frames])}"

@@ -1,9 +1,12 @@
 """The poses that `endotsr poses` estimated, as one self-contained page."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from endotsr.clips.sequences.make_poses import EstimatedPoses, PoseReport
-from endotsr.method.splatting.camera import camera_centre, degrees_between
+from endotsr.clips.sequences.make_structure import StructureReport
+from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
 from endotsr.results.report import parts
 from endotsr.results.report.line_chart import ChartCurve, chart_svg
 
@@ -15,19 +18,34 @@ def poses_page(name: str, report: PoseReport, lines: list[str]) -> str:
     body = [f'<p class="eyebrow">endotsr poses</p><h1>{parts.text(head)}</h1>', parts.section("Result", said)]
     if report.found is not None:
         body += [
-            parts.section("Path", _path(report.found, report.unit)),
+            parts.section("Path", _path(report.found.cameras, report.unit)),
             parts.section("Frames", _frames(report.found)),
         ]
         body.append(parts.section("Residual", _residual(report.found)))
     return parts.page(f"endotsr poses: {name}", "\n".join(part for part in body if part))
 
 
-def _path(found: EstimatedPoses, unit: str) -> str:
+def structure_page(name: str, report: StructureReport, lines: list[str]) -> str:
+    """The page of `endotsr poses --sfm` as text: its sentences, the path, and the points of every frame."""
+    head = f"{name}: {'poses are written' if report.written else 'no poses are written'}"
+    said = "".join(f"<p>{parts.text(line)}</p>" for line in lines)
+    body = [f'<p class="eyebrow">endotsr poses --sfm</p><h1>{parts.text(head)}</h1>', parts.section("Result", said)]
+    if (found := report.structure) is not None:
+        seen = ChartCurve("points", [float(k) for k in range(len(found.seen))], [float(len(row)) for row in found.seen])
+        charts = parts.figure("points of the reconstruction that a frame sees", _chart("points", [seen]))
+        body += [
+            parts.section("Path", _path(list(report.cameras), report.unit)),
+            parts.section("Frames", f'<div class="charts">{charts}</div>', _gaps(report.interpolated, report.held)),
+        ]
+    return parts.page(f"endotsr poses: {name}", "\n".join(part for part in body if part))
+
+
+def _path(cameras: list[Camera], unit: str) -> str:
     """Position and turn of the scope against the first frame."""
-    first, frames = found.cameras[0], [float(k) for k in range(len(found.cameras))]
-    centres = np.array([first.rotation @ camera_centre(c) + first.translation for c in found.cameras])
+    first, frames = cameras[0], [float(k) for k in range(len(cameras))]
+    centres = np.array([first.rotation @ camera_centre(c) + first.translation for c in cameras])
     curves = [ChartCurve(f"{axis}, {unit}", frames, centres[:, k].tolist()) for k, axis in enumerate("xyz")]
-    turns = [degrees_between(camera.rotation, first.rotation) for camera in found.cameras]
+    turns = [degrees_between(camera.rotation, first.rotation) for camera in cameras]
     charts = [
         parts.figure("position of the scope, axes of the first frame", _chart("position", curves)),
         parts.figure("angle to the first frame", _chart("angle", [ChartCurve("degrees", frames, turns)])),
@@ -44,9 +62,13 @@ def _frames(found: EstimatedPoses) -> str:
     flow = ChartCurve("pixels of flow", frames, [link.still for _, link in links])
     charts = parts.figure("matches that agree with one rigid motion", _chart("agreeing", [agreeing]))
     charts += parts.figure("first registration, against its source frame", _chart("left", [left, flow]))
-    named = [("interpolated", found.interpolated), ("before the first or after the last pose", found.held)]
-    rows = parts.definitions((text, ", ".join(map(str, frames)) or "none") for text, frames in named)
-    return f'<div class="charts">{charts}</div>{rows}'
+    return f'<div class="charts">{charts}</div>{_gaps(found.interpolated, found.held)}'
+
+
+def _gaps(interpolated: Iterable[int], held: Iterable[int]) -> str:
+    """The frames without a pose of their own."""
+    named = [("interpolated", interpolated), ("before the first or after the last pose", held)]
+    return parts.definitions((text, ", ".join(map(str, frames)) or "none") for text, frames in named)
 
 
 def _residual(found: EstimatedPoses) -> str:
