@@ -207,6 +207,6 @@ def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
     if stereo:
         return f"next: endotsr depth {out}"
     return (
-        f"next: endotsr depth {out} --given FILES --kind relative (inverse depth of a network), or --flat;"
-        " training needs depth"
+        f"next: endotsr poses {out} --sfm (a moving camera), or endotsr depth {out} --given FILES --kind relative"
+        " (inverse depth of a network), or --flat; training needs depth"
     )

@@ -95,8 +95,8 @@ def test_without_depth_the_option_is_named_and_the_unit_becomes_arbitrary(tmp_pa
     assert both.mean() > 0.7
     assert np.median(np.abs(factor * depth[both] / views.depth[both] - 1)) < 0.01
     capsys.readouterr()
-    assert main(["check", str(folder), "--sequence.allow-tissue-fraction"]) == 0
-    assert "poses, depth and pictures agree" in capsys.readouterr().out
+    assert main(["check", str(folder), "--sequence.allow-tissue-fraction", "--json", str(data)]) == 0
+    assert "poses, depth and pictures agree (" in data.read_text("utf-8") and "pose-" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("unit, assumed", [("mm", ""), ("arbitrary", "scale and shift")])

@@ -1,7 +1,7 @@
 """The scale of a reconstruction, from depth at the pixels where its points are seen.
 
-In: for every frame, the depth of the clip over the depth of the points. Out: `PathScale`. The median of a frame is its
-scale. A reconstruction has one scale, so the frames have to agree; if they do not, the depth has another scale or shape
+In: for each frame, the depth of the clip over the depth of the points. Out: `PathScale`. The median of a frame is its
+scale. All frames of a reconstruction share one scale; if theirs differ, the depth has another scale or shape
 from frame to frame, and no scale of the path is right.
 """
 

@@ -21,7 +21,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 
-REGISTERED = 0.8  # ruling: share of the frames that needs a pose of its own; more is a guess than the path can bear
+REGISTERED = 0.8  # ruling: share of the frames that has to have a pose of its own
 LEAST_MODEL = 3  # pictures of a model
 MOST_MODELS = 10
 EXHAUSTIVE = 100  # frames of which every pair is matched: 4950 pairs

@@ -1,4 +1,4 @@
-"""What every estimate of poses does with a folder: open it, complete the poses, and record them.
+"""What an estimate of poses does with a folder: open it, complete the poses, and record them.
 
 In: a folder in the common format, and poses of which some may be missing. Out: `SequenceFile` and `Clip`, one camera
 for each frame, the section [poses], and sentences on the gaps.

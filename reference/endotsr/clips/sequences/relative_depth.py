@@ -177,7 +177,7 @@ def _refuse_known_scale(clip: Clip) -> None:
         raise InputError(
             f"{clip.where}: the camera moves, and its poses fix the scale of the depth, which relative numbers do"
             " not have; allowed: a clip with some depth, such as that of the points of a COLMAP model (`endotsr prepare"
-            " MODEL --points sparse`)"
+            " MODEL --points sparse`) or of `endotsr poses --sfm`"
         )
 
 

@@ -11,7 +11,7 @@ REFUSED = "training refuses it"
 LEAVE_OUT = "leave the frame out: endotsr prepare CLIP --out CLIP --replace --drop FRAME"
 ONE_CAMERA = (
     "one camera: endotsr depth --given FILES --kind relative (inverse depth of a network, not metric), a COLMAP model,"
-    " or endotsr depth --flat"
+    " endotsr poses --sfm for a moving camera, or endotsr depth --flat"
 )
 SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
 
