@@ -87,6 +87,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "claims.power": Setting("pages.claims.power:POWER", scale=100),
     "sfm.registered": Setting("endotsr.clips.poses.structure:REGISTERED", scale=100),
     "sfm.spread": Setting("endotsr.clips.poses.path_scale:LARGEST_SPREAD", scale=100),
+    "sfm.frames": Setting("endotsr.clips.poses.path_scale:MOST_FRAMES"),
     "sfm.inside": Setting("endotsr.clips.poses.path_scale:LARGEST_INSIDE", scale=100),
     "registration.mad": Setting("endotsr.clips.poses.pair_kernels:MAD", "{:.4f}"),
     "registration.floor": Setting("endotsr.clips.poses.bundle:FLOOR", "{:.2f}"),
