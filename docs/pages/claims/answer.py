@@ -54,7 +54,11 @@ def components(found: Record, clip: str) -> str:
         if whole is not None
         else ""
     )
-    return f"{text}; the step of A is {step.mean:+.2f} dB of it (published +0.29 dB)." if step else f"{text}."
+    if step is None:
+        return f"{text}."
+    fewer = whole is not None and len(step.values) < len(whole.values)
+    seeds = f"{seeds_of(len(step.values))}; " if fewer else ""
+    return f"{text}; the step of A is {step.mean:+.2f} dB of it ({seeds}published +0.29 dB)."
 
 
 def _median(whole: Estimate) -> str:
@@ -72,7 +76,8 @@ def level(folder: Path, found: Record, clip: str) -> str:
     if limits is None:
         text, half = f"Whether the {said} is reached is not decided: one seed has {mean:.2f} dB.", 0.0
     else:
-        verdict, half = "is not reached" if limits[1] < published else "is reached", limits[1] - mean
+        inside = "is exceeded" if limits[0] > published else "lies in the interval"
+        verdict, half = "is not reached" if limits[1] < published else inside, limits[1] - mean
         text = f"The {said} {verdict}: {shown(values, 2)} dB."
     return f"{text} {beaten(folder, clip, mean, 'The reproduction is', half)}".strip()
 

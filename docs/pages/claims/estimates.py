@@ -32,6 +32,12 @@ class Estimate(NamedTuple):
     median: float
     paired: Interval
     common: Interval
+    fewest: int | None = None  # seeds of the clip with the fewest; None: `values` are of one clip
+
+    @property
+    def seeds(self) -> int:
+        """Number of seeds on which a verdict rests: of several clips, that of the clip with the fewest."""
+        return len(self.values) if self.fewest is None else self.fewest
 
 
 class Spread(NamedTuple):
@@ -99,7 +105,8 @@ def averaged(of_clips: list[Estimate]) -> Estimate:
     low, high = welch.student_low, welch.student_high
     paired = (low, high) if low is not None and high is not None else None
     values = tuple(value for e in of_clips for value in e.values)
-    return Estimate(values, mean, median, paired, _quadrature(mean, [e.common for e in of_clips]))
+    common = _quadrature(mean, [e.common for e in of_clips])
+    return Estimate(values, mean, median, paired, common, min(e.seeds for e in of_clips))
 
 
 def _quadrature(mean: float, limits: list[Interval]) -> Interval:

@@ -131,7 +131,7 @@ def _row(claim: list[str], estimate: Estimate | None, metric: Metric, verdict: A
     if estimate is None:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
     shown, improved, paired, common = _cells(estimate, metric)
-    count = len(estimate.values)
+    count = estimate.seeds
     of_common = "-" if estimate.common is None else verdict(estimate.common, count)
     return [*claim, shown, improved, paired, verdict(estimate.paired, count), common, of_common]
 
@@ -230,7 +230,7 @@ def _largest_row(records: list[Record], key: str) -> list[str]:
     known = [estimate for estimate in leads if estimate is not None]
     if len(known) < len(leads):
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
-    count = min(len(estimate.values) for estimate in known)
+    count = min(estimate.seeds for estimate in known)
     cells = ["; ".join(of) for of in zip(*(_cells(estimate, metric) for estimate in known), strict=True)]
     decide = lambda limits: largest_verdict(limits, count, metric.larger)
     of_paired, of_common = decide([e.paired for e in known]), decide([e.common for e in known])
