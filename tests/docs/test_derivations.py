@@ -16,7 +16,7 @@ OPTIONS = (
     "training/fitting/coarse_start",
     "studies/windows/scene",
     "studies/windows/carry",
-    "clips/poses/bundle",
+    "clips/poses/steps",
     "clips/poses/pair_kernels",
 )
 FILES = [*sorted((SOURCE / "definition").glob("*.py")), *(SOURCE / f"{name}.py" for name in OPTIONS)]
