@@ -32,6 +32,7 @@ class Format(NamedTuple):
     changed: Keys  # name of a used field -> another value; None: the field is left out
     refused: Keys  # name of a refused field -> a value that is refused
     told: Keys = NO_KEYS  # name of a field that is not applied -> a value that a note tells
+    start: Keys = NO_KEYS  # a used field that takes the place of others -> the value with which `changed` is compared
 
 
 def result(clip: Clip) -> object:
@@ -58,6 +59,7 @@ def pictures(folder: Path, inner: str) -> None:
         write_png(folder / "planes" / f"{i:03d}.png", rng.integers(1, 999, (HEIGHT, WIDTH)).astype(np.uint16))
     head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
     (folder / "cloud.ply").write_text(head + "1 2 3\n")
+    (folder / "other.ply").write_text(head + "1 2 4\n")
 
 
 def entry(i: int) -> Keys:
@@ -230,7 +232,8 @@ FORMATS = {
                          OTHER | {"frames": [entry(1), entry(2)], "ply_file_path": "cloud.ply",
                                   "applied_scale": 2.0},
                          NOT_PINHOLE | {"from_mitsuba": True, "integer_depth_scale": 0.001,
-                                        "n_extra_learnable_dims": 4}),
+                                        "n_extra_learnable_dims": 4},
+                         start={"camera_angle_x": 1.0, "camera_angle_y": 0.7, "ply_file_path": "other.ply"}),
     "nerfstudio frame": Format(nerfstudio.FRAME_FIELDS, {name: lambda i, n=name: entry(i)[n] for name in entry(0)}
                                | CAMERA, write_entry, lambda folder: result(describe(folder)), FRAME_CHANGES,
                                NOT_PINHOLE | {"depth_path": "planes/000.png"}),

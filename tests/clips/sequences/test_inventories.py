@@ -29,7 +29,8 @@ def outcome(found: Format, folder, keys) -> object:
 
 def matters(found: Format, field: str, folder) -> bool:
     """Whether another value of a field gives another result."""
-    before = outcome(found, folder / "a", found.base)
+    start = {field: found.start[field]} if field in found.start else {}
+    before = outcome(found, folder / "a", found.base | start)
     return outcome(found, folder / "b", found.base | {field: found.changed[field]}) != before
 
 
@@ -119,6 +120,7 @@ def test_a_video_with_a_new_field_says_so(name, old, tmp_path):
     ("name", "field"),
     [
         ("nerfstudio", "k1"),
+        ("nerfstudio", "camera_angle_x"),
         ("nerfstudio frame", "time"),
         ("kalibr", "T_cn_cnm1"),
         ("opencv", "D2"),
@@ -139,7 +141,8 @@ def test_a_video_with_a_new_field_says_so(name, old, tmp_path):
 def test_a_reader_that_drops_a_field_is_found(name, field, tmp_path):
     """The proof of a used field fails for a reader that does not look at it."""
     found = FORMATS[name]
-    blind = found._replace(write=lambda folder, keys: found.write(folder, keys | {field: found.base[field]}))
+    value = (found.base | found.start)[field]
+    blind = found._replace(write=lambda folder, keys: found.write(folder, keys | {field: value}))
     assert not matters(blind, field, tmp_path)
 
 
