@@ -1,5 +1,6 @@
 """Entries that nothing reads: named in the folder of a clip and in the folders of its files, without thumbnails."""
 
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -114,3 +115,17 @@ def test_a_name_that_looks_like_a_pattern_is_read(tmp_path):
     for k in range(3):
         write_png(tmp_path / f"clip [{k}].png", np.full((48, 64, 3), 40 * k + 40, np.uint8))
     assert said(describe(tmp_path).notes) == []
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize(
+    "make", [getattr(os, "mkfifo", None), lambda path: path.symlink_to("nowhere")], ids=["pipe", "dangling link"]
+)
+def test_a_list_of_times_that_is_no_regular_file_is_named(make, tmp_path):
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    for k, shown in enumerate(pictures(3)):
+        write_png(folder / f"{k}.png", shown)
+    make(folder / "times.csv")
+    clip = describe(folder, SourceOptions())
+    assert any("not read: times.csv" in note for note in clip.notes), clip.notes

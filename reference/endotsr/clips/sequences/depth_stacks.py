@@ -3,6 +3,7 @@
 A plane of such a file has the name `FILE/000003`, so that planes are listed, paired and read like files.
 """
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.untrusted.arrays import RefusedArray, open_npz, read_npy
+from endotsr.untrusted.files import open_regular
 from endotsr.untrusted.matlab import read_mat
 
 ENDINGS = (".npz", ".npy")
@@ -38,9 +40,10 @@ def plane_of_stack(path: Path) -> NDArray | None:
 def array_of(path: Path) -> NDArray:
     """The array of an .npz or .npy file, (n, H, W) or (H, W), or of a .mat file, (H, W); axes of length 1 are dropped.
 
-    Raises:  InputError for a file without exactly one such array.
+    Raises:  InputError for a file without exactly one such array, and for what is no regular file.
     """
-    status = path.stat()
+    with open_regular(path, LARGEST_FILE) as file:
+        status = os.fstat(file.fileno())
     return _array(path, status.st_mtime_ns, status.st_size)
 
 
