@@ -54,14 +54,16 @@ STEREO = ("--stereo", "side_by_side")
 
 
 @lru_cache(maxsize=1)
-def simulated(kind: str, size: tuple[int, int], seed: int) -> Sequence:
+def simulated(
+    kind: str, size: tuple[int, int], seed: int, frames: int = FRAMES, shift: float = SHIFT, cycles: float = CYCLES
+) -> Sequence:
     """A simulated hand-held clip with true poses."""
     from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
     from endotsr.clips.simulator.simulate import simulate
 
-    plain = SimulatorSettings(width=size[0], height=size[1], frames=FRAMES, seed=seed)
+    plain = SimulatorSettings(width=size[0], height=size[1], frames=frames, seed=seed)
     settings = with_effects(plain, *SEEN, *KINDS[kind])
-    path = {"path": "hand", "amplitude": SHIFT, "cycles": CYCLES}
+    path = {"path": "hand", "amplitude": shift, "cycles": cycles}
     return simulate(with_settings(settings, camera_motion=path)).sequence
 
 

@@ -13,12 +13,11 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from endotsr.config import with_settings
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import machine
-from pages.recordings.hand_held import KINDS, SEEN, SMALL
+from pages.recordings.hand_held import SMALL, simulated
 from pages.recordings.path_errors import path_errors
 from pages.store.intervals import shown
 from pages.store.marks import read_json, write_marked
@@ -37,14 +36,10 @@ def measured(kind: str, seed: int) -> list[dict[str, Any]]:
 
     from endotsr.clips.poses.estimate import estimated
     from endotsr.clips.poses.views import Views
-    from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
-    from endotsr.clips.simulator.simulate import simulate
 
     cv2.setNumThreads(1)
     numba.set_num_threads(1)
-    plain = SimulatorSettings(width=SMALL[0], height=SMALL[1], frames=FRAMES, seed=seed)
-    path = {"path": "hand", "amplitude": SHIFT, "cycles": CYCLES}
-    clip = simulate(with_settings(with_effects(plain, *SEEN, *KINDS[kind]), camera_motion=path)).sequence
+    clip = simulated(kind, SMALL, seed, FRAMES, SHIFT, CYCLES)
     true = [CameraPose(camera.rotation, camera.translation) for camera in clip.cameras]
     views, rows = Views(clip.images, clip.masks, clip.depth, clip.cameras[0]), []
     for name, with_returns in WAYS.items():

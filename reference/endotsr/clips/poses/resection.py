@@ -10,8 +10,8 @@ import numpy as np
 
 from endotsr.clips.opencv.geometry import pose_by_consensus
 from endotsr.clips.poses.matches import Matches
+from endotsr.clips.poses.steps import moved
 from endotsr.clips.poses.views import IDENTITY
-from endotsr.method.equations.pose import pose_forward
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, CameraPose, project
 
@@ -55,8 +55,7 @@ def resection(
     for _ in range(ROUNDS):
         error, distance, weight = _errors(pose, matches, camera)
         step = _step(pose, x, error, weight, camera, unit)
-        turned, moved, _ = pose_forward(*pose, step[:3], step[3:])
-        pose = CameraPose(turned, moved)
+        pose = moved(pose, step)
         if max(np.abs(step[:3]).max(), np.abs(step[3:]).max() / unit) < ENOUGH:
             break
     _, distance, weight = _errors(pose, matches, camera)

@@ -3,7 +3,7 @@
 from typing import Literal
 
 Stereo = Literal["none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"]  # of two views in one picture
-StatedStereo = Literal["auto", "none", "side_by_side", "stacked", "half_side_by_side", "half_stacked"]
+StatedStereo = Literal["auto", Stereo]
 Direction = Literal["camera_to_world", "world_to_camera"]  # of a pose
 Axes = Literal["opencv", "opengl", "llff"]  # of a camera
 Unit = Literal["um", "mm", "cm", "m", "arbitrary"]

@@ -13,30 +13,34 @@ from endotsr.results.report.line_chart import ChartCurve, chart_svg
 
 def poses_page(name: str, report: PoseReport, lines: list[str]) -> str:
     """The page as text: the sentences of the command, the path, and the quality of every frame."""
-    head = f"{name}: {'poses are written' if report.written else 'no poses are written'}"
-    said = "".join(f"<p>{parts.text(line)}</p>" for line in lines)
-    body = [f'<p class="eyebrow">endotsr poses</p><h1>{parts.text(head)}</h1>', parts.section("Result", said)]
+    sections = []
     if report.found is not None:
-        body += [
+        sections = [
             parts.section("Path", _path(report.found.cameras, report.unit)),
             parts.section("Frames", _frames(report.found)),
+            parts.section("Residual", _residual(report.found)),
         ]
-        body.append(parts.section("Residual", _residual(report.found)))
-    return parts.page(f"endotsr poses: {name}", "\n".join(part for part in body if part))
+    return _page("endotsr poses", name, report.written, lines, sections)
 
 
 def structure_page(name: str, report: StructureReport, lines: list[str]) -> str:
     """The page of `endotsr poses --sfm` as text: its sentences, the path, and the points of every frame."""
-    head = f"{name}: {'poses are written' if report.written else 'no poses are written'}"
-    said = "".join(f"<p>{parts.text(line)}</p>" for line in lines)
-    body = [f'<p class="eyebrow">endotsr poses --sfm</p><h1>{parts.text(head)}</h1>', parts.section("Result", said)]
+    sections = []
     if (found := report.structure) is not None:
         seen = ChartCurve("points", [float(k) for k in range(len(found.seen))], [float(len(row)) for row in found.seen])
         charts = parts.figure("points of the reconstruction that a frame sees", _chart("points", [seen]))
-        body += [
+        sections = [
             parts.section("Path", _path(list(report.cameras), report.unit)),
             parts.section("Frames", f'<div class="charts">{charts}</div>', _gaps(report.interpolated, report.held)),
         ]
+    return _page("endotsr poses --sfm", name, report.written, lines, sections)
+
+
+def _page(command: str, name: str, written: bool, lines: list[str], sections: list[str]) -> str:
+    """What the pages of both commands have in common: the head and the sentences."""
+    head = f"{name}: {'poses are written' if written else 'no poses are written'}"
+    said = "".join(f"<p>{parts.text(line)}</p>" for line in lines)
+    body = [f'<p class="eyebrow">{command}</p><h1>{parts.text(head)}</h1>', parts.section("Result", said), *sections]
     return parts.page(f"endotsr poses: {name}", "\n".join(part for part in body if part))
 
 
