@@ -65,6 +65,7 @@ GENERATED = {  # program -> its parts by name
     "recordings.inputs_tried": of_record("table"),
     "recordings.inventories": lambda about: {"fields": about.fields(), "options": about.options()},
     "recordings.masks": of_record(iou="table"),
+    "recordings.masks_drawn": of_record("table"),
     "recordings.masks_training": of_record("table"),
     "recordings.masks_keys": of_record("table", drafts="draft_table"),
     "recordings.one_camera": of_record("table"),

@@ -192,7 +192,8 @@ def _row(kind: str, size: str, name: str, runs: list[dict[str, Any]]) -> list[st
     place = f"{kind}, {size}" if size else f"`{kind}`"
     total = sum(run["frames"] for run in runs)
     cells = [place, name, *(shown([run[key] for run in runs if key in run], digits) for key, digits in COLUMNS)]
-    cells[3] = shown([100 * run["of_path"] for run in runs if "of_path" in run], 2) + " %"
+    of_path = [100 * run["of_path"] for run in runs if "of_path" in run]
+    cells[3] = f"{shown(of_path, 2)} %" if of_path else "-"
     return [*cells, f"{sum(run['registered'] for run in runs)} of {total}", str(len(runs))]
 
 

@@ -41,7 +41,7 @@ class MasksOptions:
     margin: int = 2
     """with --keys: px by which the masks grow; 0 = the carried outline itself"""
     replace: bool = False
-    """replace existing masks"""
+    """replace existing masks; with --out, those of an earlier call"""
     json: JsonFile = None
     """also write the result as JSON"""
 
@@ -52,6 +52,7 @@ def run(words: list[str]) -> int:
     from endotsr.clips.sequences.files import shortened
     from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.make_masks import OVERLAY, enter_masks, from_keys, write_proposal
+    from endotsr.clips.sequences.sequence_file import MASKS
     from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.untrusted.writing import refuse_existing
 
@@ -64,9 +65,10 @@ def run(words: list[str]) -> int:
     if options.out is None:
         proposal, place = enter_masks(options.sequence, options.replace, propose), options.sequence
     else:
-        refuse_existing(options.out)
+        if not options.replace:
+            refuse_existing(options.out)  # before the motion of the clip is computed
         clip = describe(options.sequence, SourceOptions(layout=options.layout))
-        proposal, place = write_proposal(clip, options.out, propose), options.out
+        proposal, place = write_proposal(clip, options.out, propose, options.replace), options.out
     fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)
     write_result(
         options.json, folder=place, found=proposal.found, reason=proposal.reason, excluded_fraction=fraction,
@@ -81,6 +83,9 @@ def run(words: list[str]) -> int:
         print(f"warning: hardly any tissue is left in {len(proposal.without_tissue)} frames: {named}")
     print(*said, sep="\n", end="\n" if said else "")
     print(f"these masks are proposals: inspect {place / OVERLAY} before training")
+    if options.out is not None:
+        source, masks = shlex.quote(str(options.sequence)), shlex.quote(str(options.out / MASKS))
+        print(f"next: endotsr prepare {source} --masks {masks} --out SEQUENCE")
     return 0
 
 
@@ -94,7 +99,7 @@ def _draw(options: MasksOptions, page: Path) -> int:
     check_draw_page(page)
     clip = describe(options.sequence, SourceOptions(layout=options.layout))
     drawing = drawing_for(clip, options.keys, options.key_frames)
-    command = f"endotsr masks {shlex.quote(str(options.sequence))} --keys keys.json --replace"
+    command = carrying_command(options.sequence)
     write_draw_page(page, drawing, f"Masks of {options.sequence.absolute().name}", command)
     drafts = [frame for frame in drawing.frames if frame.draft]
     write_result(
@@ -104,3 +109,15 @@ def _draw(options: MasksOptions, page: Path) -> int:
     kind = f" ({drafts[0].draft.origin})" if drafts and drafts[0].draft else ""
     print(f"{page}: {len(drawing.frames)} frames to draw, {len(drafts)} of them with a draft{kind}")
     return 0
+
+
+def carrying_command(source: Path) -> str:
+    """The command that carries the drawn masks, for the page.
+
+    A folder with `sequence.toml` receives the masks. Those of any other source go to a new folder next to the page,
+    which `prepare --masks` takes.
+    """
+    from endotsr.clips.sequences.sequence_file import FILE_NAME
+
+    place = "--replace" if (source / FILE_NAME).is_file() else f"--out {shlex.quote(f'{source.stem}_masks')} --replace"
+    return f"endotsr masks {shlex.quote(str(source))} --keys keys.json {place}"

@@ -10,6 +10,7 @@ from common_folder import written
 
 from data_folder import data_folder
 from endotsr.cli.main import main
+from endotsr.cli.masks import carrying_command
 from endotsr.clips.opencv import grown, read_png, write_png
 from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carried_once, carry_masks
 from endotsr.clips.sequences.clip_flows import ClipFlows, motion_of
@@ -168,6 +169,35 @@ def test_the_command_carries_the_masks_of_a_folder(tmp_path, capsys):
     assert "none: cannot be read" in capsys.readouterr().err
     assert main(["masks", str(folder), "--margin", "5"]) == 2
     assert "--margin has no effect without --keys" in capsys.readouterr().err
+
+
+def test_a_source_that_is_not_prepared_gets_its_masks_in_a_folder(tmp_path, capsys):
+    """The command that the page names is the one that works, also in the second round."""
+    (tmp_path / "my clip").mkdir()
+    pictures, keys = tmp_path / "my clip" / "images", tmp_path / "keys"
+    pictures.mkdir()
+    keys.mkdir()
+    rng = np.random.default_rng(0)
+    for name in "abc":
+        write_png(pictures / f"{name}.png", rng.integers(60, 200, (48, 64, 3), np.uint8))
+    mask = np.zeros((48, 64), np.uint8)
+    mask[:24, :20] = 255
+    write_png(keys / "a.png", mask)
+    command = carrying_command(tmp_path / "my clip")
+    assert command.endswith(" --keys keys.json --out 'my clip_masks' --replace")
+    out = tmp_path / "my clip_masks"
+    words = ["masks", str(tmp_path / "my clip"), "--keys", str(keys), "--margin", "0", "--out", str(out)]
+    for more in ([], ["--replace"]):
+        assert main([*words, *more]) == 0
+        assert f"next: endotsr prepare '{tmp_path / 'my clip'}' --masks '{out / 'masks'}'" in capsys.readouterr().out
+    np.testing.assert_array_equal(read_png(out / "masks" / "a.png"), mask)
+    assert main(words) == 2 and "exists already" in capsys.readouterr().err
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "file").touch()
+    assert main([*words[:-1], str(tmp_path / "other"), "--replace"]) == 2
+    assert "is not replaced: it holds no proposal.json" in capsys.readouterr().err
+    assert main(words[:-2]) == 2
+    assert "has no sequence.toml; use a folder that `endotsr prepare" in capsys.readouterr().err
 
 
 def rows_of_the_page(column: int) -> dict[int, tuple[float, float]]:

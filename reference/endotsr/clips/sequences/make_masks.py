@@ -181,17 +181,18 @@ def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = N
     return proposal
 
 
-def write_proposal(clip: Clip, out: Path, propose: Propose | None = None) -> Proposal:
+def write_proposal(clip: Clip, out: Path, propose: Propose | None = None, replace: bool = False) -> Proposal:
     """Write masks, overlay and mark into the new folder `out`. Without a proposal nothing is written.
 
     propose   where the masks come from; None = by colour and motion
+    replace   whether `out` may be the folder of an earlier proposal, which the new one replaces
 
     Raises:  InputError, leaving nothing behind.
     """
     proposal = (propose or _proposed)(clip)
     if not proposal.found:
         return proposal
-    with new_folder(out) as place:
+    with new_folder(out, PROPOSAL if replace else "") as place:
         (place / MASKS).mkdir()
         _write_masks(place / MASKS, clip.names, proposal)
         write_png(place / OVERLAY, overlays(clip, proposal))

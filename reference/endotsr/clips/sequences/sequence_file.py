@@ -146,6 +146,8 @@ def read_sequence_file(folder: Path) -> SequenceFile:
     Raises:  InputError naming the file, the key and what is allowed.
     """
     path = Path(folder) / FILE_NAME
+    if Path(folder).is_dir() and not path.exists():
+        raise InputError(f"{folder}: has no {FILE_NAME}; use a folder that `endotsr prepare SOURCE --out FOLDER` wrote")
     data = read_toml(path)
     if data.get("format") != FORMAT:
         raise InputError(f"{path}: format = {data.get('format')!r} is not allowed; allowed: {FORMAT!r}")

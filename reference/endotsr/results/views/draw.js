@@ -9,6 +9,7 @@ const {width, height, frames} = about;
 const TINT = {instrument: "#00c98d", never: "#e8a317"};
 // px of the screen: to hit a corner, to begin a drag, between its points, to the border of the picture
 const CLOSE = 9, FREEHAND = 4, SPACING = 2, SNAP = 5;
+const AROUND = 310; // px of the window for the title above the picture, and for the text and the frames below it
 const MOST_ZOOM = 16, MOST_UNDO = 300, LEAST_NODES = 12;
 const ORIGINS = {colour: "Draft by colour", carried: "Draft carried from the drawn frames"};
 const canvas = element("picture"), context = canvas.getContext("2d");
@@ -83,7 +84,8 @@ const draftOf = () => (state.frames[at].key || !frames[at].draft ? null : frames
 
 function paint() {
   const factor = window.devicePixelRatio || 1, {clientWidth} = canvas;
-  const tall = Math.min(clientWidth * height / width, 0.78 * window.innerHeight);
+  const room = Math.max(0.5 * window.innerHeight, window.innerHeight - AROUND); // the frames below stay in the window
+  const tall = Math.min(clientWidth * height / width, room);
   canvas.style.height = tall + "px";
   if (canvas.width !== Math.round(clientWidth * factor) || canvas.height !== Math.round(tall * factor)) {
     canvas.width = Math.round(clientWidth * factor);
