@@ -69,7 +69,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "kill.cost": Setting("endotsr.training.runs.training:LARGEST_FRACTION", scale=100),
     "depth.farther": Setting("endotsr.clips.sequences.depth_outliers:FARTHER", "{:.1f}"),
     "mask.tissue": Setting("endotsr.clips.sequences.masks:LEAST_TISSUE_FRACTION", scale=100),
-    "mask.soft": Setting("endotsr.clips.sequences.masks:MOST_SOFT_FRACTION", scale=100),
+    "mask.soft": Setting("endotsr.clips.sequences.mask_values:MOST_SOFT_FRACTION", scale=100),
     "mask.missing": Setting("endotsr.clips.sequences.masks:LEAST_MISSING_FRACTION", scale=100),
     "mask.opposite": Setting("endotsr.clips.sequences.masks:OPPOSITE_FRACTION", scale=100),
     "camera.spread": Setting("endotsr.clips.sequences.camera:SPREAD", "{:.1f}", 100),

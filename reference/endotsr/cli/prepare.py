@@ -64,9 +64,9 @@ class PrepareOptions:
     trajectory_unit: Unit | None = None
     """unit of the positions (TUM and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
-    """masks of another program, one per frame, or one file for all frames"""
+    """masks of another program, one per frame, one file for all frames, or a video of masks"""
     excluded_value: ExcludedValue = "white"
-    """excluded value of these masks; white = above half of the largest value, nonzero = the numbers of objects"""
+    """excluded value of these masks; white = from half of full white on, nonzero = the numbers of objects"""
     pairing: Pairing = "auto"
     """how masks and depth belong to frames: by number, by the number in the source of a prepared clip, or in order"""
     depth: Annotated[Path | None, Option("FOLDER")] = None

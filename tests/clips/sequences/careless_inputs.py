@@ -23,9 +23,9 @@ def labels(small: int) -> np.ndarray:
 
 
 def small_label(plane: np.ndarray) -> np.ndarray:
-    """A mask in which one object has the number 2, on few pixels."""
+    """A mask in which two objects have the numbers 1 and 2, on few pixels."""
     found = np.zeros_like(plane)
-    found[:4, :4] = 2
+    found[:4, :4], found[8:12, :4] = 2, 1
     return found
 
 

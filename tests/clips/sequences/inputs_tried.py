@@ -70,6 +70,7 @@ from input_kinds import (
 )
 from left_inputs import LEFT_ROWS
 from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
+from mask_inputs import MASK_ROWS
 from matlab_inputs import MATLAB_ROWS
 from odd_inputs import ODD_ROWS
 from rig_inputs import RIG_ROWS
@@ -299,6 +300,7 @@ ROWS = [
     *MATLAB_ROWS,
     *SQUEEZED_ROWS,
     *STREAM_ROWS,
+    *MASK_ROWS,
 ]  # fmt: skip
 
 

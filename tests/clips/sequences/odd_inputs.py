@@ -216,7 +216,7 @@ ODD_ROWS = [
     Row("masks, jpg", masked([mask()] * 12, change=lambda folder: rewritten(folder, lambda opened, _: opened, "jpg",
         quality=40)), "right", "", half_excluded),
     Row("masks, classes of instruments", masked([mask(1) + mask(1) * (np.arange(WIDTH) < 20)] * 12), "refused",
-        "3 different values"),
+        "numbers up to 2 in all pictures"),
     Row("masks, coloured labels", masked([mask()] * 12, change=labels), "refused", "one grey channel expected"),
     *(Row(f"depth, {value:g} where there is none", depth(marked(value)), "right", "", hole_is_empty)
       for value in (np.nan, np.inf, -1.0)),

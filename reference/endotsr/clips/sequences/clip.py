@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.kinds import Finding
+from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, CameraPose
@@ -44,6 +45,7 @@ class Masks:
     proposed: bool = False  # a program made the masks, and no person has checked them
     origin: str = ""  # where the excluded pixels come from, in words; "": not stated
     paired: str = ""  # how files of another program belong to the frames, where this deserves a note
+    levels: Callable[[], MaskLevels] | None = None  # what the numbers of the files mean; None: the reader knows
 
     def __call__(self, i: int) -> NDArray[np.bool_] | None:
         return self.read(i)

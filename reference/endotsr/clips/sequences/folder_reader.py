@@ -1,11 +1,10 @@
 """The files of a folder that training reads directly: listed in time order, paired, and decoded on demand."""
 
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
@@ -13,6 +12,7 @@ from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.clip import Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.files import check_pairing, list_pictures
+from endotsr.clips.sequences.mask_values import levels_of_set
 from endotsr.clips.sequences.masks import tissue_masks
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
@@ -55,11 +55,12 @@ class FolderReader:
             return None
         files = self._listed(name, PICTURE_ENDINGS, "masks")
 
-        def mask(i: int) -> NDArray[np.bool_]:
-            plane = grey_plane(self._sized(read_picture(files[i]), files[i]), files[i])
-            return tissue_masks([plane], [str(files[i])], excluded_value)[0]
+        def plane(i: int) -> NDArray:
+            return grey_plane(self._sized(read_picture(files[i]), files[i]), files[i])
 
-        return Masks(mask, files, excluded_value, stated_in, proposed) if files else None
+        levels = cache(lambda: levels_of_set(plane, files, folder))
+        mask = lambda i: tissue_masks([plane(i)], [str(files[i])], excluded_value, levels=levels())[0]
+        return Masks(mask, files, excluded_value, stated_in, proposed, levels=levels) if files else None
 
     def depth(self, name: str, scale: float) -> Depth | None:
         """The depth in a folder, one file per frame; None with a fault."""

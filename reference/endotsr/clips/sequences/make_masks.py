@@ -21,7 +21,7 @@ from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, Key
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.mask_shapes import shapes_of
-from endotsr.clips.sequences.masks import threshold_masks
+from endotsr.clips.sequences.masks import mask_levels, threshold_masks
 from endotsr.clips.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.sources import PROPOSAL
@@ -125,7 +125,8 @@ def _folder_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
             raise InputError(f"{file}: is not the name of a frame; use names such as {clip.names[0]}.png")
     pictures = [read_png(file) for file in files]
     planes = [picture if picture.ndim == 2 else picture.max(axis=2) for picture in pictures]
-    return {place[f.stem]: threshold_masks([plane], [f.name], [])[0] for f, plane in zip(files, planes)}
+    levels = mask_levels(planes, [str(file) for file in files])
+    return {place[f.stem]: threshold_masks([p], [str(f)], [], levels=levels)[0] for f, p in zip(files, planes)}
 
 
 def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:

@@ -19,12 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.mask_values import MaskLevels, is_coded, levels_of, numbers_of, white_pixels
 from endotsr.errors import InputError
 
 LEAST_TISSUE_FRACTION = 0.05
-MOST_SOFT_FRACTION = 0.05  # of a frame; a picture with more pixels between black and white is not a mask
-LEAST_WHITE = 32  # smaller numbers than this, with one above 1, are those of objects and no grey levels
-OBJECTS = "or with endotsr prepare --masks FOLDER --excluded-value nonzero the numbers of several objects"
 LEAST_MISSING_FRACTION = 0.01  # of all pixels; less missing depth is no evidence of polarity
 MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
@@ -34,39 +32,39 @@ ALLOW = "--sequence.allow-tissue-fraction (TOML: [sequence] allow_tissue_fractio
 
 
 def threshold_masks(
-    raw: list[NDArray], names: list[str], notes: list[str], out: NDArray[np.bool_] | None = None
+    raw: list[NDArray],
+    names: list[str],
+    notes: list[str],
+    out: NDArray[np.bool_] | None = None,
+    levels: MaskLevels | None = None,
 ) -> NDArray[np.bool_]:
-    """White pixels of mask pictures.
+    """White pixels of the mask pictures of one set.
 
-    raw      n pictures (H, W) of integers: {0, 1} if no value exceeds 1, else {0, 255} or {0, 65535}
+    raw      n pictures (H, W) of integers
     out      (n, H, W) array to fill and return; None = a new array
+    levels   meaning of the numbers; None: by these pictures, as `mask_values.levels_of`
     returns  (n, H, W) bool, True = white: at least half of full white
 
-    `notes` receives the count of intermediate values. Raises InputError naming a picture with more than 5 % of them, a
-    picture of small numbers with one above 1, or a picture of another bit depth than most if white is 65535.
+    `notes` receives the count of intermediate values. Raises InputError as `white_pixels`, for numbers of objects, or
+    for a picture of another bit depth than most if white is 65535.
     """
-    largest = max(int(picture.max()) for picture in raw)
-    white = 1 if largest <= 1 else 255 if largest <= 255 else 65535
-    if white == 65535:
-        _check_one_bit_depth(names, [picture.dtype for picture in raw])
-    soft_total = 0
+    levels = levels or mask_levels(raw, names)
     result = np.empty((len(raw), *raw[0].shape), bool) if out is None else out
-    for i, picture in enumerate(raw):
-        np.greater_equal(picture, (white + 1) // 2, out=result[i])
-        soft = picture.size - np.count_nonzero(picture == 0) - np.count_nonzero(picture == white)
-        soft_total += soft
-        if soft > MOST_SOFT_FRACTION * picture.size:
-            raise InputError(
-                f"{names[i]}: {soft / picture.size:.1%} of the pixels are neither 0 nor {white}: this is not a mask"
-                " (another kind of picture in the mask folder, or masks written with different scales?)"
-            )
-        if 1 < picture.max() < LEAST_WHITE:
-            raise InputError(f"{names[i]}: numbers up to {picture.max()}: allowed: 0 and {white}, {OBJECTS}")
-    if soft_total:
-        notes.append(
-            f"{soft_total} mask pixels are between 0 and {white}; values from {(white + 1) // 2} count as white"
-        )
+    soft = sum(white_pixels(picture, levels, names[i], result[i])[1] for i, picture in enumerate(raw))
+    if soft:
+        notes.append(f"{soft} mask pixels are between {levels.named}; values from {levels.least} count as white")
     return result
+
+
+def mask_levels(raw: list[NDArray], names: list[str]) -> MaskLevels:
+    """What the numbers in these pictures mean. Raises InputError as `levels_of`, or for mixed bit depths."""
+    values: set[int] = set()
+    for picture in raw:
+        values |= numbers_of(picture)
+    if max(values) > 255:
+        _check_one_bit_depth(names, [picture.dtype for picture in raw])
+    where = names[0] if len(names) == 1 else Path(names[0]).parent
+    return levels_of(values, where, any(is_coded(Path(name)) for name in names))
 
 
 def tissue_masks(
@@ -75,12 +73,13 @@ def tissue_masks(
     excluded_value: str,
     notes: list[str] | None = None,
     out: NDArray[np.bool_] | None = None,
+    levels: MaskLevels | None = None,
 ) -> NDArray[np.bool_]:
     """Tissue masks (n, H, W), True = tissue, from mask pictures as in `threshold_masks`.
 
     excluded_value   `white` or `black`: the value of excluded pixels
     """
-    white = threshold_masks(raw, names, [] if notes is None else notes, out)
+    white = threshold_masks(raw, names, [] if notes is None else notes, out, levels)
     return np.logical_not(white, out=white) if excluded_value == "white" else white
 
 

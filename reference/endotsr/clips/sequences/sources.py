@@ -5,6 +5,7 @@ In: paths and the statements of `SourceOptions`. Out: the fields of a `Clip`.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,12 @@ from endotsr.clips.opencv import stretched
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, scene_factor
-from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
+from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.depth_stacks import stack_planes
 from endotsr.clips.sequences.files import list_pictures
-from endotsr.clips.sequences.masks import LEAST_WHITE, MOST_SOFT_FRACTION
+from endotsr.clips.sequences.mask_values import levels_of_set, refuse_coded_objects, white_pixels
+from endotsr.clips.sequences.mask_videos import coloured_plane_of, mask_files, plane_of
 from endotsr.clips.sequences.pairing import paired
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -112,30 +114,25 @@ def pictures_from_files(
 def masks_of(files: list[Path | None], excluded_value: str, width: int, height: int, proposed: bool = False) -> Masks:
     """Masks from files, one per frame; None where a frame has none.
 
-    A mask of another size but equal aspect ratio is resized by nearest-neighbour sampling. Values above half of the
-    largest are white: masks of 0 and 1 are valid, and intermediate JPEG values are rounded. The polarity states which
-    side is excluded.
+    A mask of another size but equal aspect ratio is resized by nearest-neighbour sampling. The meaning of the numbers
+    follows from all files together, see `mask_values`. The polarity states which side is excluded.
 
     Raises:  InputError for another aspect ratio, or a picture that is not a mask.
     """
+    given = sorted({path for path in files if path is not None})
+    where = given[0].parent if len(given) > 1 else given[0] if given else ""
+    levels = cache(lambda: levels_of_set(lambda k: plane_of(given[k]), given, where))
+    numbered = lambda path: np.atleast_3d(coloured_plane_of(path)).max(axis=2)  # numbers or colours of objects
+    checked = cache(lambda: refuse_coded_objects(lambda k: numbered(given[k]), len(given), where))
 
     def mask(i: int) -> NDArray[np.bool_] | None:
         path = files[i]
         if path is None:
             return None
-        pixels = read_picture(path)
-        if excluded_value == "nonzero":  # numbers or colours of objects
-            numbered = np.atleast_3d(pixels).max(axis=2) > 0
-            return nearest_pixels(np.logical_not(numbered), width, height, path)
-        plane = grey_plane(pixels, path)
-        values = np.unique(plane)
-        soft = np.isin(plane, values[[0, -1]]).mean() >= 1 - MOST_SOFT_FRACTION and values[-1] >= LEAST_WHITE
-        if len(values) > 2 and not soft:
-            raise InputError(
-                f"{path}: {len(values)} different values: this is not a mask; allowed: two values, or with"
-                " --excluded-value nonzero the numbers of several objects"
-            )
-        white = plane > values[-1] / 2
+        if excluded_value == "nonzero":
+            checked()
+            return nearest_pixels(numbered(path) == 0, width, height, path)
+        white, _ = white_pixels(plane_of(path), levels(), path)
         tissue = ~white if excluded_value == "white" else white
         return nearest_pixels(tissue, width, height, path)
 
@@ -163,7 +160,7 @@ def stated_masks(
     """
     if options.masks is None:
         return None
-    files = files_of(options.masks, PICTURE_ENDINGS)
+    files = mask_files(options.masks) or files_of(options.masks, PICTURE_ENDINGS)
     mark = options.masks.parent / PROPOSAL
     both = paired(frames, files, options.pairing, source_names)
     found = masks_of(both.files, options.excluded_value, width, height, mark.is_file())

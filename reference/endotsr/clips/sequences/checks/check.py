@@ -40,6 +40,7 @@ from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
+from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.splits import parse_frame_range, split_frames
@@ -176,6 +177,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
     """Read every frame once. Returns the size of the first readable picture."""
     masks, depth = (_paired(clip.images, part.files if part else []) for part in (clip.masks, clip.depth))
     sampled = set(np.linspace(0, len(clip.images) - 1, min(SAMPLED, len(clip.images))).astype(int).tolist())
+    levels = _mask_levels(clip, run)
     size = None
     for i, file in enumerate(clip.images):
         picture = run.sized(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i, size)
@@ -184,7 +186,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
             continue
         size = size or picture.shape[:2]
         run.frames.append(frame_facts(file.name, picture))
-        tissue = _mask(clip, run, masks[i], i, size)
+        tissue = _mask(clip, run, masks[i], i, size, levels)
         run.masks.add(i, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         if i in sampled:
@@ -204,14 +206,25 @@ def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
         return [None] * len(images)  # reported by the check of the pairing
 
 
-def _mask(clip: Clip, run: _Pass, file: Path | None, i: int, size: Size) -> NDArray[np.bool_] | None:
+def _mask_levels(clip: Clip, run: _Pass) -> MaskLevels | None:
+    """What the numbers of the masks mean; None without masks, or with a finding."""
+    if clip.masks is None or clip.masks.levels is None or not clip.masks.files:
+        return None
+    return run.tried(clip.masks.levels, "mask-values", clip.masks.files[0].parent)
+
+
+def _mask(
+    clip: Clip, run: _Pass, file: Path | None, i: int, size: Size, levels: MaskLevels | None
+) -> NDArray[np.bool_] | None:
     if file is None or clip.masks is None:
         return None
     excluded = clip.masks.excluded_value
     plane = run.sized(lambda: grey_plane(read_picture(file), file), "mask", file, i, size)
     if plane is None:
         return None
-    read = lambda: tissue_masks([plane], [str(file)], excluded)[0]
+    if levels is None:
+        return None
+    read = lambda: tissue_masks([plane], [str(file)], excluded, levels=levels)[0]
     tissue = run.tried(read, "mask-values", file, i)
     if tissue is not None and not tissue.any():
         run.findings.append(finding("frame-without-tissue", file, "the mask excludes every pixel", i))

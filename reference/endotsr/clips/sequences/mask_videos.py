@@ -1,0 +1,59 @@
+"""Masks in one video file, as programs that segment videos write them.
+
+A plane of such a file has the name `FILE/000003`, so that planes are listed, paired and read like files.
+"""
+
+import os
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.clip import grey_plane
+from endotsr.clips.sequences.mask_values import LEAST_WHITE
+from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
+from endotsr.errors import InputError
+
+MOST_BYTES = 1 << 31  # of the planes of a video that are held
+
+
+def mask_files(path: Path) -> list[Path] | None:
+    """The names of the planes of a video of masks; None for any other path. Raises InputError."""
+    if (path.is_file() and path.suffix.lower() in (".png", ".webp")) or not is_video(path):
+        return None
+    facts = video_facts(path)
+    if facts.count * facts.width * facts.height > MOST_BYTES:
+        raise InputError(
+            f"{path}: {facts.count} masks of {facts.width}x{facts.height} pixels; allowed: a video of at most"
+            f" {MOST_BYTES} pixels, or a folder of pictures (`ffmpeg -i {path.name} masks/%06d.png -start_number 0`)"
+        )
+    return [path / f"{k:06d}" for k in range(facts.count)]
+
+
+def plane_of(path: Path) -> NDArray:
+    """The plane (H, W) of a mask: a picture file, or a name of `mask_files`. Raises InputError."""
+    file = path.parent
+    if not file.is_file():
+        return grey_plane(read_picture(path), path)
+    status = os.stat(file)
+    return _planes(file, status.st_mtime_ns, status.st_size)[int(path.name)]
+
+
+def coloured_plane_of(path: Path) -> NDArray:
+    """As `plane_of`, with the channels of a coloured picture. Raises InputError."""
+    return plane_of(path) if path.parent.is_file() else read_picture(path)
+
+
+@lru_cache(maxsize=2)
+def _planes(path: Path, changed: int, size: int) -> NDArray[np.uint8]:
+    """The planes (n, H, W) of a video. Raises InputError for coloured pictures."""
+    count = video_facts(path).count
+    planes: list[NDArray[np.uint8]] = []
+    for k, picture in enumerate(video_pictures(path, list(range(count)))):
+        spread = picture.max(axis=2).astype(np.int16) - picture.min(axis=2)
+        if spread.max() >= LEAST_WHITE:
+            raise InputError(f"{path}: picture {k} is coloured; allowed: masks in black and white")
+        planes.append(np.ascontiguousarray(picture[:, :, 1]))
+    return np.stack(planes)
