@@ -192,6 +192,7 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 #         "harmonics": ((slice(0, 1), o.harmonics_base * constant), (slice(1, None), o.harmonics_rest * constant)),
 #         "fdm_weight": ((slice(0, 3), fdm * o.deformation_position_factor), (slice(3, 10), fdm)),
 #         **dict.fromkeys(("fdm_centre", "fdm_width"), fdm),
+#         **dict.fromkeys(EXPOSURES if config.model.exposure else (), o.exposure * falling),
 #     }
 #     if residuals_active(iteration, config):
 #         start = activated if o.restart_residual_schedule else 0

@@ -150,25 +150,21 @@ print(
 # def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges):
 #     """One iteration on a uniformly drawn training frame: the new state and the ViewGradients."""
 #     i = state.iteration + 1
-#     o = config.optimiser
 #     if schedules.residuals_active(i, config) and not schedules.residuals_active(i - 1, config):
 #         state = activated(state, config)
-#     frame = frame_of(sequence, sequence.train_index[rng.integers(len(sequence.train_index))])
+#     k = rng.integers(len(sequence.train_index))
+#     frame = frame_of(sequence, sequence.train_index[k])
+#     exposure = [array[:, k] for array in state.exposures.values()] or None
 #     view = view_gradients(
 #         state.gaussians, spectral, frame_targets(frame, config), weights_at(i, config), config, frame.camera,
-#         frame.time, edges, raster=raster, degree=schedules.active_degree(i, config),
+#         frame.time, edges, exposure=exposure, raster=raster, degree=schedules.active_degree(i, config),
 #     )
 #     statistics = state.statistics
-#     adam = state.adam
-#     gaussians = state.gaussians
 #     if schedules.statistics_active(i, config):
 #         statistics = gather_statistics(statistics, view.d_mean2d, view.visible, frame.camera.width, frame.camera.height)
-#     if not (schedules.densify_now(i, config) and o.legacy_skip):
-#         rates = schedules.learning_rates(i, config)
-#         given = (arrays(gaussians), view.gradients, rates, o.beta1, o.beta2, o.epsilon)
-#         adam, parameters = adam_update(adam, *given)
-#         gaussians = gaussians._replace(**parameters)
-#     state = State(gaussians, adam, statistics, i)
+#     if not (schedules.densify_now(i, config) and config.optimiser.legacy_skip):
+#         state = stepped(state, view, k, i, config)
+#     state = state._replace(statistics=statistics, iteration=i)
 #     return controlled(state, sequence, config, rng) if schedules.densify_now(i, config) else state, view
 # ```
 #

@@ -26,9 +26,8 @@ Place = tuple[str, ...]  # keys of the settings of a case, from the outside in
 SECTIONS = ("model", "raster", "loss", "optimiser", "density", "initialisation", "training")
 FREE = {
     "model.deformation": "a rigid scene has no arrays of the deformation, and their absence says so",
-    "model.exposure": "an option that is off in every preset; its equation has a family of its own",
     "model.pose_correction": "an option that is off in every preset; its equation has a family of its own",
-    "optimiser.exposure": "a rate of that option",
+    "optimiser.exposure": "a rate of an option that is off in every preset; one trajectory has a value of its own",
     "optimiser.pose": "a rate of that option",
     "raster.preset": "the name of eleven values, each of which is a setting of the cases",
     "initialisation.first_frame_points": "how many candidates are drawn; the cases take every candidate",

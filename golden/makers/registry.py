@@ -11,6 +11,7 @@ import importlib
 from types import ModuleType
 from typing import NamedTuple
 
+from endotsr.definition.exposure import EXPOSURES
 from endotsr.port.stages.compositing import IMAGES
 from endotsr.port.stages.laplacian import LEVELS
 from endotsr.port.stages.optimiser import RESIDUAL_RATES, SQUARES, STATE, TERMS
@@ -24,7 +25,7 @@ FAMILIES = (
     "masked_l1", "masked_ssim", "depth", "smoothness", "exposure", "pose", "registration", "covariance", "projection",
     "harmonics", "composite", "composite_limits", "render", "schedule", "density", "initialisation", "scene",
     "objective", "training", "other_settings", "extremes", "narrow", "wide", "switches",
-    "borders",
+    "borders", "exposed",
 )  # fmt: skip
 
 
@@ -280,5 +281,7 @@ JUDGED: dict[str, dict[str, Judged]] = {
         **{name: Judged(4, "raw parameter^2", order="iteration") for name in SQUARES},
         **{name: Judged(4, order="iteration") for name in STATE},
         **{f"final_{name}": Judged(4, "raw parameter", "max") for name in Gaussians._fields},
+        **{f"square_{name}": Judged(4, "raw parameter^2", order="iteration") for name in EXPOSURES},
+        **{f"final_{name}": Judged(4, "raw parameter", "max") for name in EXPOSURES},
     },
 }

@@ -4,6 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
+EXPOSURES = ("exposure_log_gain", "exposure_bias")  # the trained arrays, (3, n) [channel, training frame]
 ExposureSaved = namedtuple("ExposureSaved", "colour log_gain")
 ExposureGrads = namedtuple("ExposureGrads", "d_colour d_log_gain d_bias")
 

@@ -1,5 +1,7 @@
 """Equations (6) and (B10): every schedule, as a function of the iteration i = 1, 2, ... and the settings."""
 
+from endotsr.definition.exposure import EXPOSURES
+
 
 def decay(step, steps, final):
     """final^tau, tau = clip(step / steps, 0, 1); without steps, tau = [step > 0]."""
@@ -25,6 +27,7 @@ def learning_rates(iteration, config):
         "harmonics": ((slice(0, 1), o.harmonics_base * constant), (slice(1, None), o.harmonics_rest * constant)),
         "fdm_weight": ((slice(0, 3), fdm * o.deformation_position_factor), (slice(3, 10), fdm)),
         **dict.fromkeys(("fdm_centre", "fdm_width"), fdm),
+        **dict.fromkeys(EXPOSURES if config.model.exposure else (), o.exposure * falling),
     }
     if residuals_active(iteration, config):
         start = activated if o.restart_residual_schedule else 0

@@ -8,6 +8,7 @@ from endotsr.definition import schedules
 from endotsr.definition.adam import adam_state, adam_update
 from endotsr.definition.calibration import calibrate, calibration_views, rms
 from endotsr.definition.density_control import densify, empty_statistics, gather_statistics, scene_extent
+from endotsr.definition.exposure import EXPOSURES
 from endotsr.definition.initialisation import activate_residuals, initialise
 from endotsr.definition.laplacian import laplacian_loss_forward, laplacian_loss_reverse
 from endotsr.definition.metrics import psnr_tissue
@@ -17,12 +18,27 @@ from endotsr.definition.scene import arrays, scene_at, spectral_from
 from endotsr.definition.settings import PAPER
 from endotsr.definition.view import view_gradients
 
-State = namedtuple("State", "gaussians adam statistics iteration")  # everything that changes between iterations
+State = namedtuple("State", "gaussians adam statistics iteration exposures")  # all that changes between iterations
 
 
-def start(gaussians):
-    """Zero moments and empty statistics."""
-    return State(gaussians, adam_state(arrays(gaussians)), empty_statistics(gaussians.opacity_logit.size), 0)
+def start(gaussians, exposures=None):
+    """Zero moments and empty statistics; `exposures` as `no_exposures` gives them, None without the option (B13)."""
+    exposures = exposures or {}
+    adam = adam_state(arrays(gaussians) | exposures)
+    return State(gaussians, adam, empty_statistics(gaussians.opacity_logit.size), 0, exposures)
+
+
+def no_exposures(model, frames):
+    """The identity for every training frame (B13), by name; empty without the option."""
+    return {name: np.zeros((3, frames)) for name in EXPOSURES} if model.exposure else {}
+
+
+def in_column(vectors, k, exposures):
+    """Gradients of all exposures from those of training frame k: 0 for every other frame."""
+    found = {name: np.zeros_like(array) for name, array in exposures.items()}
+    for array, vector in zip(found.values(), vectors or ()):
+        array[:, k] = vector
+    return found
 
 
 def frame_of(sequence, k):
@@ -44,28 +60,35 @@ def activated(state, config):
     return state._replace(gaussians=gaussians, adam=adam_state(arrays(gaussians)) | state.adam)
 
 
+def stepped(state, view, k, i, config):
+    """The state after the Adam step of all parameters; k is the position of the frame among the training frames."""
+    o = config.optimiser
+    parameters = arrays(state.gaussians) | state.exposures
+    gradients = view.gradients | in_column(view.d_exposure, k, state.exposures)
+    rates = schedules.learning_rates(i, config)
+    adam, parameters = adam_update(state.adam, parameters, gradients, rates, o.beta1, o.beta2, o.epsilon)
+    exposures = {name: parameters.pop(name) for name in state.exposures}
+    return state._replace(gaussians=state.gaussians._replace(**parameters), adam=adam, exposures=exposures)
+
+
 def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges):
     """One iteration on a uniformly drawn training frame: the new state and the ViewGradients."""
     i = state.iteration + 1
-    o = config.optimiser
     if schedules.residuals_active(i, config) and not schedules.residuals_active(i - 1, config):
         state = activated(state, config)
-    frame = frame_of(sequence, sequence.train_index[rng.integers(len(sequence.train_index))])
+    k = rng.integers(len(sequence.train_index))
+    frame = frame_of(sequence, sequence.train_index[k])
+    exposure = [array[:, k] for array in state.exposures.values()] or None
     view = view_gradients(
         state.gaussians, spectral, frame_targets(frame, config), weights_at(i, config), config, frame.camera,
-        frame.time, edges, raster=raster, degree=schedules.active_degree(i, config),
+        frame.time, edges, exposure=exposure, raster=raster, degree=schedules.active_degree(i, config),
     )  # fmt: skip
     statistics = state.statistics
-    adam = state.adam
-    gaussians = state.gaussians
     if schedules.statistics_active(i, config):
         statistics = gather_statistics(statistics, view.d_mean2d, view.visible, frame.camera.width, frame.camera.height)
-    if not (schedules.densify_now(i, config) and o.legacy_skip):
-        rates = schedules.learning_rates(i, config)
-        given = (arrays(gaussians), view.gradients, rates, o.beta1, o.beta2, o.epsilon)
-        adam, parameters = adam_update(adam, *given)
-        gaussians = gaussians._replace(**parameters)
-    state = State(gaussians, adam, statistics, i)
+    if not (schedules.densify_now(i, config) and config.optimiser.legacy_skip):
+        state = stepped(state, view, k, i, config)
+    state = state._replace(statistics=statistics, iteration=i)
     return controlled(state, sequence, config, rng) if schedules.densify_now(i, config) else state, view
 
 
@@ -79,8 +102,9 @@ def controlled(state, sequence, config, rng):
     adam = {
         name: (*(np.where(new, 0, moment[..., made.plan.source]) for moment in (m, v)), k)
         for name, (m, v, k) in state.adam.items()
+        if name not in state.exposures
     }
-    return State(made.gaussians, adam, made.statistics, state.iteration)
+    return state._replace(gaussians=made.gaussians, adam=state.adam | adam, statistics=made.statistics)
 
 
 def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
@@ -101,7 +125,8 @@ def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
 
 def train(sequence, config, rng, raster=PAPER, on_iteration=lambda state, view: None):
     """Gaussians and Spectral after all iterations, initialised from the depth of the training frames."""
-    state = start(initialise(sequence, config.initialisation, config.model, rng))
+    exposures = no_exposures(config.model, len(sequence.train_index))
+    state = start(initialise(sequence, config.initialisation, config.model, rng), exposures)
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     while state.iteration < config.training.iterations:
         state, view = iterate(state, sequence, spectral, config, rng, raster)

@@ -101,6 +101,17 @@ def test_a_wrong_output_lowers_the_profiles_that_have_it(golden, port):
     assert found == {"renderer-forward": 3, "renderer": 3, "losses": 1, "optimiser": 1, "method": 1}
 
 
+def test_a_port_without_the_exposure_or_with_a_wrong_one_keeps_every_profile(golden, port):
+    """No profile has this option, so its cases of `objective` and `training` count in none."""
+    path = port / "objective" / "exposed" / "d_position.npy"
+    path.write_bytes(npy_bytes(-read_plain(path)))
+    report = judge(golden, port, "float32", again=port)
+    assert report.level == 2 and said(report) == CLAIMS
+    (port / "not_ported.txt").write_text("exposure")
+    report = judge(golden, port, "float32", again=port)
+    assert report.passed and report.claim.endswith("level 5, float32, without exposure") and said(report) == CLAIMS
+
+
 def test_requests_of_a_profile_ask_for_its_outputs_alone(golden, tmp_path):
     asked, level = asked_of(golden, "", "renderer-forward", 5)
     write_requests(asked, tmp_path, "float32", level)

@@ -16,7 +16,8 @@ _AXES = {
     "Gaussian": "opacity_logit depth visible pruned cloned split parent moments_kept mean_gradient",
     "row column": "mask depth_image opacity_image rendered_depth prior_depth picture edges valid_1 valid_2 valid_3",
     "rgb row column": "colour_image rendered observed exposed band_1 band_2 band_3 colour",
-    "rgb": "background bias log_gain",
+    "rgb": "background bias log_gain exposure_bias exposure_log_gain",
+    "rgb training frame": "exposure_bias exposure_log_gain",
     "rgb Gaussian": "residual residual_at_t colour",
     "xyz": "centre translation rotation_vector offset corrected_translation",
     "xyz Gaussian": "position log_scale scale translation",
@@ -55,7 +56,7 @@ _AXES = {
     "column": "sample_x",
     "row": "sample_y",
 }  # fmt: skip
-_COUNTED = {"training frame": 1, "tissue column": 1, "row column (of any array)": 2}
+_COUNTED = {"training frame": 1, "rgb training frame": 2, "tissue column": 1, "row column (of any array)": 2}
 _BY_NAME = {
     (name, _COUNTED.get(axes, len(axes.split()))): axes for axes, names in _AXES.items() for name in names.split()
 }

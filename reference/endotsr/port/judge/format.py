@@ -23,6 +23,7 @@ LEVELS = {
 }
 Precision = Literal["float32", "float64"]
 MOST_RUNS = 1000  # of a port with races
+OPTIONS = ("exposure",)  # operations that a case of another operation may use; its arrays are named after them
 FLIP_BUDGET = "band"  # the name in the files of the rule that lets some entries flip
 
 
@@ -158,6 +159,17 @@ class Case(_Strict, frozen=True, kw_only=True):
     def name(self) -> str:
         """family/case"""
         return f"{self.family}/{self.case}"
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Options that the case uses, by the operations of their equations: without them a port leaves it out."""
+        names = (*self.inputs, *self.outputs)
+        return tuple(option for option in OPTIONS if any(f"{option}_" in name for name in names))
+
+    @property
+    def parts(self) -> set[str]:
+        """Its operation and those of its options."""
+        return {self.operation, *self.options}
 
     @property
     def answers(self) -> int:

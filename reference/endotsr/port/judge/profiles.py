@@ -33,9 +33,9 @@ class Profile(NamedTuple):
     forward: bool = False
     """whether outputs of reverse passes are left out"""
 
-    def asks(self, operation: str, output: str) -> bool:
-        """Whether an output belongs to the profile."""
-        return operation in self.operations and not (self.forward and output.startswith(REVERSE))
+    def asks(self, parts: Iterable[str], output: str) -> bool:
+        """Whether an output belongs to the profile; `parts` are the operation and the options of its case."""
+        return set(parts) <= set(self.operations) and not (self.forward and output.startswith(REVERSE))
 
 
 PROFILES = {
@@ -89,6 +89,7 @@ class Graded(NamedTuple):
     output: str
     level: int
     passed: bool
+    options: tuple[str, ...] = ()
 
 
 def last_level(profile: str) -> int:
@@ -106,14 +107,14 @@ def of_profile(cases: Iterable[Case], profile: str) -> list[Case]:
 
 def without_reverse(golden: Golden) -> Golden:
     """The vectors without the outputs of reverse passes."""
-    every = Profile("", tuple({case.operation for case in golden.cases}), {}, forward=True)
+    every = Profile("", tuple({part for case in golden.cases for part in case.parts}), {}, forward=True)
     return golden._replace(cases=_with_outputs(golden.cases, every))
 
 
 def _with_outputs(cases: Iterable[Case], profile: Profile) -> list[Case]:
     found = []
     for case in cases:
-        outputs = {name: one for name, one in case.outputs.items() if profile.asks(case.operation, name)}
+        outputs = {name: one for name, one in case.outputs.items() if profile.asks(case.parts, name)}
         if outputs:
             found.append(msgspec.structs.replace(case, outputs=outputs))
     return found
@@ -150,7 +151,7 @@ def profile_claims(graded: Iterable[Graded]) -> list[ProfileClaim]:
     for name, profile in PROFILES.items():
         counts = {level: (0, 0) for level in LEVELS}
         for one in graded:
-            if one.operation in profile.operations and profile.asks(one.operation, one.output):
+            if profile.asks((one.operation, *one.options), one.output):
                 good, asked = counts[one.level]
                 counts[one.level] = (good + one.passed, asked + 1)
         reached = max((level for level in profile.says if level <= complete_level(counts, gaps=True)), default=0)

@@ -4,7 +4,7 @@ import difflib
 import os
 from itertools import islice
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -75,6 +75,8 @@ class CaseReport(msgspec.Struct, kw_only=True):
     title: str
     operation: str = ""
     """empty for the comparison of two runs"""
+    options: tuple[str, ...] = ()
+    """operations of the options that the case uses"""
     level: int
     status: Status
     outputs: list[OutputReport] = []
@@ -157,8 +159,8 @@ def judge(
     forward = not profile and NO_REVERSE in left_out(outputs)[0]
     golden = without_reverse(golden) if forward else golden
     reports = [
-        CaseReport(name=case.name, title=case.title, operation=case.operation, level=case.level, status="not ported")
-        if case.operation in without
+        CaseReport(**_head(case), status="not ported")
+        if case.parts & set(without)
         else judge_case(golden, case, outputs, precision, level)
         for case in golden.cases
         if case.level <= level
@@ -240,9 +242,11 @@ def conclude(
 def _graded(reports: list[CaseReport]) -> list[Graded]:
     """Every verdict for the profiles; one that fails for an operation that the port leaves out."""
     found = [
-        Graded(r.operation or "determinism", o.name, o.level, o.status == "passed") for r in reports for o in r.outputs
+        Graded(r.operation or "determinism", o.name, o.level, o.status == "passed", r.options)
+        for r in reports
+        for o in r.outputs
     ]
-    return found + [Graded(r.operation, "", r.level, False) for r in reports if not r.outputs]
+    return found + [Graded(r.operation, "", r.level, False, r.options) for r in reports if not r.outputs]
 
 
 def _off(golden: Golden, reports: list[CaseReport], precision: Precision) -> list[Off]:
@@ -295,11 +299,15 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
     where = _first_wrong(case, found)
     scores = {flag: one.score for flag, one in evidence.items() if one.score >= NAMED}
     return CaseReport(
-        name=case.name, title=case.title, operation=case.operation, level=case.level, status=_together(found),
-        outputs=found,
+        **_head(case), status=_together(found), outputs=found,
         looks_like=sorted(scores, key=lambda flag: (-scores[flag], -len(evidence[flag].agrees))),
         made_for=list(case.flags), answer=best, first_wrong=where.text, events=where.events, evidence=evidence,
     )  # fmt: skip
+
+
+def _head(case: Case) -> dict[str, Any]:
+    """The fields of a report that are those of its case."""
+    return {name: getattr(case, name) for name in ("name", "title", "operation", "options", "level")}
 
 
 def _name_strays(folder: Path, taken: dict[str, NDArray | Refused]) -> None:
@@ -410,7 +418,7 @@ def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...
     """Bitwise comparison of all outputs of two runs."""
     found = []
     for case in golden.cases:
-        if case.operation in without:
+        if case.parts & set(without):
             continue
         for name, asked in case.outputs.items():
             files = [folder / case.family / case.case / f"{name}.npy" for folder in (first, second)]

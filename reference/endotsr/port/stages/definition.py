@@ -29,7 +29,7 @@ from endotsr.definition import (
     view,
 )
 from endotsr.definition import scene as moving
-from endotsr.port.stages.optimiser import CONSTANT_LENS, SERIES
+from endotsr.port.stages.optimiser import CONSTANT_LENS, SERIES, squares_of
 from endotsr.port.stages.registry import all_stages
 from endotsr.port.stages.requests import Tape, camera_of, config_of, initialisation_of, model_of, raster_of, sequence_of
 from endotsr.port.stages.stage import Found, Inputs, Settings, Stage
@@ -251,21 +251,23 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     given = config.loss.lambda_lap
     weight = train.calibrated_weight(gaussians, spectral, sequence, config, raster) if given == "auto" else given
     config = msgspec.structs.replace(config, loss=msgspec.structs.replace(config.loss, lambda_lap=float(weight)))
-    state, tape, log = train.start(gaussians), Tape(inputs["frame_order"], inputs["split_noise"]), []
+    exposures = train.no_exposures(config.model, len(sequence.train_index))
+    state, tape, log = train.start(gaussians, exposures), Tape(inputs["frame_order"], inputs["split_noise"]), []
     counts = [gaussians.opacity_logit.size]
     for _ in inputs["frame_order"]:  # one iteration per frame
         state, seen = train.iterate(state, sequence, spectral, config, tape, raster, canny_edges)
         log.append({"loss": seen.loss, **seen.terms, **_sizes(state)})
         counts.append(state.gaussians.opacity_logit.size)
-    found: dict[str, NDArray] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
-    found |= {f"final_{name}": array for name, array in moving.arrays(state.gaussians).items()}
+    series = SERIES | squares_of(exposures)
+    found: dict[str, NDArray] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in series.items()}
+    found |= {f"final_{name}": array for name, array in (moving.arrays(state.gaussians) | state.exposures).items()}
     return found | {"lambda_lap": weight, "count": np.array(counts)}, None
 
 
 def _sizes(state: Any) -> dict[str, NDArray]:
     """Sums over all entries of the state after an iteration."""
-    moments = list(state.adam.values())
-    return {f"square_{name}": (array**2).sum() for name, array in moving.arrays(state.gaussians).items()} | {
+    moments, parameters = list(state.adam.values()), moving.arrays(state.gaussians) | state.exposures
+    return {f"square_{name}": (array**2).sum() for name, array in parameters.items()} | {
         "first_moments": sum(np.abs(m).sum() for m, _, _ in moments),
         "second_moments": sum(v.sum() for _, v, _ in moments),
         "gradient_sum": state.statistics.gradient_sum.sum(),

@@ -1,5 +1,6 @@
 """Stages without a gradient: schedules (6), Adam (B10), density control (B11), initialisation (B12), training."""
 
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -19,6 +20,7 @@ from endotsr.training.fitting.trainer import training_step
 from endotsr.training.scene.density_control import densify, empty_statistics, gather_statistics, scene_extent
 from endotsr.training.scene.gaussians import Gaussians, arrays
 from endotsr.training.scene.initialisation import initialise
+from endotsr.training.scene.parameters import frame_parameters, trained
 
 RESIDUAL_RATES = ("appearance_coefficients", "motion_coefficients")
 CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent uses poses only
@@ -111,10 +113,13 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
         calibrate_on(gaussians, constants.spectral, sequence, config).lambda_lap if given == "auto" else float(given)
     )
     tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
-    state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
+    frames = frame_parameters(config.model, sequence.times[sequence.train_index], dtype)
+    moments = adam_state(arrays(gaussians) | trained(frames))
+    state = TrainingState(gaussians, moments, 0, tape, empty_statistics(gaussians.count), weight, frames)
     log = [training_step(state, constants) | _sizes(state) for _ in range(config.training.iterations)]
-    found: dict[str, NDArray] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
-    found |= {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
+    series = SERIES | squares_of(trained(frames))
+    found: dict[str, NDArray] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in series.items()}
+    found |= {f"final_{name}": a for name, a in (arrays(state.gaussians) | trained(frames)).items()}
     return found | {
         "lambda_lap": weight,
         "count": np.array([entry["gaussians"] for entry in log] + [state.gaussians.count], np.int64),
@@ -123,13 +128,19 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 def _sizes(state: TrainingState) -> dict[str, float]:
     """The state of a trajectory after an iteration: sums over all entries, 0 for a missing array."""
-    squares = {f"square_{name}": _total(array * array) for name, array in arrays(state.gaussians).items()}
+    parameters = arrays(state.gaussians) | trained(state.frames)
+    squares = {f"square_{name}": _total(array * array) for name, array in parameters.items()}
     return squares | {
         "first_moments": sum(_total(abs(array)) for array in state.adam.first.values()),
         "second_moments": sum(_total(array) for array in state.adam.second.values()),
         "gradient_sum": _total(state.statistics.gradient_sum),
         "visits": _total(state.statistics.visits),
     }
+
+
+def squares_of(names: Iterable[str]) -> dict[str, str]:
+    """The sums of the squares of frame parameters, as in `SERIES`: asked of a case that has them."""
+    return {f"square_{name}": f"square_{name}" for name in names}
 
 
 def _total(array: NDArray) -> float:
