@@ -17,9 +17,9 @@ section = lambda **values: namedtuple("Section", values)(**values)  # settings b
 
 PAPER_CONFIG = Config(
     model=section(
-        appearance=True, spectral_motion=True, laplacian=True, deformation=True, basis="quartic", bases=17,
-        initial_width=0.01, harmonics_degree=3, frequencies=8, frequency_min=1.0, frequency_max=16.0, beta=0.3,
-        correlation_length=0.2,
+        appearance=True, spectral_motion=True, laplacian=True, deformation=True, exposure=False, basis="quartic",
+        bases=17, initial_width=0.01, harmonics_degree=3, frequencies=8, frequency_min=1.0, frequency_max=16.0,
+        beta=0.3, correlation_length=0.2,
     ),
     loss=section(
         ssim_weight=0.1, depth_weight=1.0, smoothness_weight=1e-4, total_variation_factor=30.0, smoothness_from=1001,
@@ -28,9 +28,9 @@ PAPER_CONFIG = Config(
     ),
     optimiser=section(
         position=1.6e-3, deformation=1.6e-3, deformation_position_factor=1.0, harmonics_base=2.5e-3,
-        harmonics_rest=1.25e-4, opacity=0.05, scale=0.005, rotation=0.001, spectral_motion_factor=0.1,
-        appearance_factor=31.25 / 16, final_factor=0.01, annealed_factor=1.0, annealing_from=4500,
-        restart_residual_schedule=True, beta1=0.9, beta2=0.999, epsilon=1e-15, legacy_skip=False,
+        harmonics_rest=1.25e-4, opacity=0.05, scale=0.005, rotation=0.001, exposure=1e-3,
+        spectral_motion_factor=0.1, appearance_factor=31.25 / 16, final_factor=0.01, annealed_factor=1.0,
+        annealing_from=4500, restart_residual_schedule=True, beta1=0.9, beta2=0.999, epsilon=1e-15, legacy_skip=False,
     ),
     density=section(
         start=500, interval=100, until=4000, growth="threshold", gradient_threshold=2e-4, extent=10.0,
