@@ -90,6 +90,20 @@ def mixed_depth(folder: Path) -> None:
     write_png(folder / "0003.png", mask().astype(np.uint16) * 257)
 
 
+def with_tool(masks: list[np.ndarray], *words: str):
+    """Red tissue and a grey instrument in the left columns, with these masks."""
+
+    def make(folder: Path) -> list[str]:
+        words_of = masked(masks, *words)(folder)
+        for file in (folder / "clip").iterdir():
+            pixels = read_png(file).copy()
+            pixels[:, :40] = pixels[:, :40].mean(axis=2, keepdims=True)
+            write_png(file, pixels)
+        return words_of
+
+    return make
+
+
 HARD = with_empty([mask()] * 12, lambda i: mask(0))
 MASK_ROWS = [
     Row("masks, noise of a codec in frames without an instrument", masked(CODED), "right", "", as_read(CODED)),
@@ -113,6 +127,12 @@ MASK_ROWS = [
     Row("masks, 0 and 1 in one of them", masked([mask(1) if i == 3 else mask() for i in range(12)]), "refused",
         "areas of the number 1"),
     Row("masks, one of 16 bits", masked([mask()] * 12, change=mixed_depth), "refused", "one bit depth"),
+    Row("masks, inverted, in prepare", with_tool([255 - mask()] * 12), "told",
+        "68.8% would be"),
+    Row("masks, inverted, in prepare, the remedy", with_tool([255 - mask()] * 12, "--excluded-value", "black"), "told",
+        "masks: black = excluded: 68.8% of the pixels are tissue", half_excluded),
+    Row("masks, of a grey instrument", with_tool([mask()] * 12), "told",
+        "masks: white = excluded: 68.8% of the pixels are tissue", half_excluded),
     Row("masks, jpg, --excluded-value nonzero", masked(CODED, "--excluded-value", "nonzero", change=jpg), "refused",
         "different numbers, as a JPEG"),
 ]  # fmt: skip

@@ -11,7 +11,7 @@ from endotsr.clips.opencv.pictures import TIFF_ENDINGS, no_data, read_picture, r
 from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.depth_stacks import array_of, plane_of_stack
 from endotsr.clips.sequences.inventory import Inventory
-from endotsr.clips.sequences.masks import sparse_step
+from endotsr.clips.sequences.mask_polarity import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.untrusted import arrays as untrusted

@@ -25,7 +25,8 @@ from endotsr.clips.sequences.files import hash_files
 from endotsr.clips.sequences.folder_reader import of_size
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training, without_faults
-from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
+from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_masks
+from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.smaller import smaller
 from endotsr.clips.sequences.splits import normalised_times, selected_frames, split_frames

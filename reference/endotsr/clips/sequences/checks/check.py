@@ -40,8 +40,9 @@ from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
+from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_masks
 from endotsr.clips.sequences.mask_values import MaskLevels
-from endotsr.clips.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
+from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.splits import parse_frame_range, split_frames
 from endotsr.config import Config, lengthened, with_fixed_length
@@ -251,8 +252,9 @@ def _sample(run: _Pass, file: Path, picture: NDArray, tissue: NDArray | None, de
     small = np.ascontiguousarray(picture[::STEP, ::STEP])
     if len(run.pictures) < 4:
         run.pictures.append((file.name, small))
-    if tissue is not None and depth is not None:
-        run.samples.append((file.name, small, tissue[::STEP, ::STEP], depth[::STEP, ::STEP]))
+    if tissue is not None:
+        sparse = np.zeros_like(small[:, :, 0], np.float32) if depth is None else depth[::STEP, ::STEP]
+        run.samples.append((file.name, small, tissue[::STEP, ::STEP], sparse))
 
 
 def _against_stereo(clip: Clip, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:

@@ -77,6 +77,8 @@ KINDS: dict[str, Kind] = {
     "mask-values": Kind("refusal", REFUSED, "store two values"),
     "tissue-fraction": Kind("refusal", REFUSED, "set the excluded value as stated, or correct the masks"),
     "polarity": Kind("refusal", REFUSED, "set the excluded value as stated, or correct the masks"),
+    "inverted-masks": Kind("warning", "with the wrong reading, training fits the instruments and hides the tissue",
+                           "read them the other way: endotsr prepare SOURCE --masks FOLDER --excluded-value black"),
     "frame-without-tissue": Kind("warning", "it contributes nothing to the training, and its tissue metrics are"
                                  " undefined",
                                  "inspect its mask; leave the frame out if the mask is right"),

@@ -1,0 +1,58 @@
+"""Whether pictures and depth support the polarity of the masks of a clip.
+
+In: pictures, masks and depth, one frame after another. Out: a note on the tissue share with the evidence, and a
+finding where the evidence contradicts the stated polarity.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.mask_polarity import Evidence
+from endotsr.method.kernels.arrays import BoolArray
+
+STEP = 4  # pixels between the sampled rows and columns
+OPTION = "--masks FOLDER --excluded-value"
+OTHER = {"white": "black", "black": "white", "nonzero": "black"}
+
+
+class MaskEvidence:
+    """Sums over tissue and excluded pixels of the frames of a clip."""
+
+    def __init__(self) -> None:
+        self.pixels, self.without_depth, self.redness = np.zeros(2), np.zeros(2), np.zeros(2)  # tissue, excluded
+
+    def add(self, picture: NDArray[np.uint8], tissue: BoolArray, depth: NDArray | None) -> None:
+        """One frame: picture (H, W, 3), tissue (H, W) bool, depth (H, W) or None, 0 = missing."""
+        mask, small = tissue[::STEP, ::STEP], picture[::STEP, ::STEP].astype(np.int32)
+        redness = small[:, :, 0] - small[:, :, 2]
+        for k, part in enumerate((mask, ~mask)):
+            self.pixels[k] += np.count_nonzero(part)
+            self.redness[k] += redness[part].sum()
+            self.without_depth[k] += 0 if depth is None else np.count_nonzero(depth[::STEP, ::STEP][part] == 0)
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """The evidence; None if the masks exclude everything or nothing."""
+        if not self.pixels.all():
+            return None
+        missing, red = self.without_depth / self.pixels, self.redness / self.pixels
+        total = float(self.without_depth.sum() / self.pixels.sum())
+        return Evidence(float(missing[0]), float(missing[1]), total, float(red[0]), float(red[1]))
+
+    def findings(self, where: str, excluded_value: str) -> list[Finding]:
+        """A warning with both readings, if the pictures contradict the stated one."""
+        evidence = self.evidence
+        if evidence is None or not evidence.against:
+            return []
+        share, other = float(self.pixels[0] / self.pixels.sum()), OTHER[excluded_value]
+        what = (
+            f"with {excluded_value} = excluded, {share:.1%} of the pixels are tissue, and {evidence.said}; with {other}"
+            f" = excluded ({OPTION} {other}), {1 - share:.1%} would be"
+        )
+        return [finding("inverted-masks", where, what)]
+
+    def note(self, excluded_value: str) -> str:
+        """The tissue share in words, with the evidence."""
+        evidence, share = self.evidence, f"{self.pixels[0] / self.pixels.sum():.1%} of the pixels are tissue"
+        return f"masks: {excluded_value} = excluded: {share}" + (f"; {evidence.said}" if evidence else "")
