@@ -10,6 +10,7 @@ LONGEST_NAME = 200  # bytes in UTF-8: file systems allow 255, and suffixes such 
 ALLOWED = f"allowed: the name of one file, without folders and control characters, at most {LONGEST_NAME} bytes"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{k}" for port in ("COM", "LPT") for k in "0123456789¹²³")}
 SEPARATORS = "/\\"  # of every system: a run folder may be read on another one
+DECIMAL_COMMA = re.compile(r"(?:^|[\s;])-?\d+,\d+(?=$|[\s;])", re.MULTILINE)  # 0,25 between spaces or semicolons
 REFUSED_ON_WINDOWS = '<>:"|?*'
 
 
@@ -69,3 +70,8 @@ def shown(value: object, longest: int = 80) -> str:
 def plain_line(text: str) -> str:
     """`visible` text on one line; every run of white space becomes one space."""
     return visible(re.sub(r"[ \t\n\r\f\v]+", " ", text).strip())
+
+
+def decimal_commas(text: str) -> str:
+    """The end of a message about numbers that cannot be read, if they seem to have decimal commas; else nothing."""
+    return "; the numbers seem to have decimal commas: write decimal points" if DECIMAL_COMMA.search(text) else ""

@@ -76,6 +76,7 @@ from odd_inputs import ODD_ROWS
 from rig_inputs import RIG_ROWS
 from silent_inputs import SILENT_ROWS
 from squeezed_inputs import SQUEEZED_ROWS
+from stranger_inputs import STRANGER_ROWS
 from stream_inputs import STREAM_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
@@ -301,6 +302,7 @@ ROWS = [
     *SQUEEZED_ROWS,
     *STREAM_ROWS,
     *MASK_ROWS,
+    *STRANGER_ROWS,
 ]  # fmt: skip
 
 

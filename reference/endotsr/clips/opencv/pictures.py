@@ -123,6 +123,11 @@ def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
     except InputError:
         raise
     except Exception as error:  # Pillow passes on any error of its metadata parsers
+        if "unknown pixel mode" in str(error) and kind == "TIFF":
+            raise InputError(
+                f"{path}: a TIFF of a kind that is not read, such as numbers of 16 or 64 bits with a point; allowed:"
+                " whole numbers of 8 or 16 bits, or floating-point numbers of 32 bits"
+            ) from None
         raise InputError(f"{path}: damaged {kind}: {plain_line(str(error))}") from None
 
 

@@ -19,7 +19,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.json import Keys
-from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.names import decimal_commas, plain_line
 from endotsr.untrusted.yaml import matrix, read_yaml
 
 HALF_A_PIXEL = "its pixel centres are at integers, as in OpenCV: half a pixel was added to cx and cy"
@@ -150,13 +150,16 @@ def _number(word: str) -> float:
 
 def read_matrix(path: Path) -> FloatArray:
     """K (3, 3) from three lines of three numbers, or of four (Hamlyn) with a last column of 0. Raises InputError."""
-    words = read_text(path, LARGEST_MATRIX).replace(",", " ").replace("[", " ").replace("]", " ").split()
+    text = read_text(path, LARGEST_MATRIX)
+    words = text.replace(",", " ").replace("[", " ").replace("]", " ").split()
     try:
         numbers = np.array([float(word) for word in words])
     except ValueError:
         numbers = np.zeros(0)
-    if numbers.size not in (9, 12) or not np.isfinite(numbers).all():
-        raise InputError(f"{path}: {len(words)} words; allowed: a camera matrix of 3x3 or 3x4 finite numbers")
+    if numbers.size not in (9, 12) or not np.isfinite(numbers).all() or decimal_commas(text):
+        raise InputError(
+            f"{path}: {len(words)} words; allowed: a camera matrix of 3x3 or 3x4 finite numbers{decimal_commas(text)}"
+        )
     rows = numbers.reshape(3, -1)
     if rows.shape[1] == 4 and rows[:, 3].any():
         raise InputError(f"{path}: the fourth column is not 0: a projection of another camera than the left one")
@@ -213,7 +216,9 @@ def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
     """
     if not path.is_dir():
         keys, notes = _ros_keys(keys, path)
-        return StoredCalibration(_ros_camera(path, keys), notes=tuple(notes)) if ROS_MARK in keys else None
+        if ROS_MARK not in keys:
+            return None
+        return StoredCalibration(_ros_camera(path, keys), notes=(*notes, *_right_camera(path, keys)))
     files = [path / f"{side}.yaml" for side in ("left", "right")]
     if not all(file.is_file() for file in files):
         return None
@@ -226,6 +231,14 @@ def read_ros(path: Path, keys: Keys) -> StoredCalibration | None:
     across = np.array([1000.0 * projection[0, 3] / projection[0, 0], 0.0, 0.0])
     cameras = _ros_camera(files[0], left), _ros_camera(files[1], right)
     return StoredCalibration(*cameras, turns[1].T @ turns[0], turns[1].T @ across, notes=(*notes, *more))
+
+
+def _right_camera(path: Path, keys: Keys) -> list[str]:
+    """A note on the file of a right camera that is read as one camera."""
+    across = matrix(keys[ROS_MARK], f"{path}: {ROS_MARK}", (3, 4))[0, 3]
+    if across == 0:
+        return []
+    return [f"{path.name}: Tx = {across:g}: a right camera; for a pair use a folder with left.yaml and right.yaml"]
 
 
 def _ros_keys(keys: Keys, path: Path) -> tuple[Keys, list[str]]:
@@ -257,7 +270,7 @@ def read_opencv(path: Path, keys: Keys) -> StoredCalibration | None:
 
     Raises:  InputError for a pair without R or T.
     """
-    size, notes = _opencv_size(keys), ()
+    size, notes = opencv_size(keys), ()
     if any(name in keys for names in (*ONE, *PAIRS) for name in names[:1]):
         notes = (*OPENCV.noted(keys, path), *_four_coefficients(keys, path), *_of_matlab(path))
     for left, left_distortion, right, right_distortion in PAIRS:
@@ -300,7 +313,7 @@ def _of_matlab(path: Path) -> list[str]:
     return [f"{path.name}: its camera matrix is read in OpenCV's coordinates; those of MATLAB's classes are 1 larger"]
 
 
-def _opencv_size(keys: Keys) -> tuple[int, int] | None:
+def opencv_size(keys: Keys) -> tuple[int, int] | None:
     for width, height in SIZES:
         if isinstance(keys.get(width), int) and isinstance(keys.get(height), int) and keys[width] > 0 < keys[height]:
             return keys[width], keys[height]

@@ -13,13 +13,14 @@ from endotsr.clips.sequences.calibration_formats import StoredCalibration, Store
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration, checked_rotation, intrinsics_of_matrix
 from endotsr.clips.sequences.matlab_calibrations import FORMATS as MATLAB
 from endotsr.clips.sequences.matlab_calibrations import matlab_keys
+from endotsr.clips.sequences.projections import FORMATS as PROJECTIONS
 from endotsr.clips.sequences.slam_calibrations import FORMATS as SLAM
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.storage import read_storage
 from endotsr.untrusted.yaml import read_yaml
 
-FORMATS = (GENERAL[0], *SLAM, *MATLAB, *GENERAL[1:])  # in the order in which they are tried
+FORMATS = (GENERAL[0], *SLAM, *PROJECTIONS, *MATLAB, *GENERAL[1:])  # in the order in which they are tried
 READERS = {".yaml": read_yaml, ".yml": read_yaml, ".json": read_json, ".xml": read_storage, ".mat": matlab_keys}
 
 

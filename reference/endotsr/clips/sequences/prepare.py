@@ -17,6 +17,7 @@ from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
+from endotsr.clips.sequences.checks.dark_border import DarkBorder
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
@@ -142,7 +143,7 @@ def _write_frames(
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
     facts: list[FrameFacts] = []
-    shown = MaskEvidence()
+    shown, border = MaskEvidence(), DarkBorder()
     (folder / IMAGES).mkdir()
     for k, (i, pair) in enumerate(zip(chosen, clip.pictures(chosen))):
         if straight is None:
@@ -153,6 +154,7 @@ def _write_frames(
         facts.append(frame_facts(clip.names[i], new.left))
         _write_pictures(folder, k, new, settings.pictures)
         tissue = None if clip.masks is None else straight.mask(_mask_or_nearest(clip, i, chosen))
+        border.add(new.left, tissue)
         if tissue is not None:
             _write_mask(folder, k, tissue)
         depth = _depth(clip, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
@@ -166,7 +168,7 @@ def _write_frames(
             shown.add(new.left, tissue, depth)
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    notes += _frame_notes(clip, straight, facts, shown)
+    notes += _frame_notes(clip, straight, facts, shown) + notes_of(border.findings(str(clip.where)))
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:

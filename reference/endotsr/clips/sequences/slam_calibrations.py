@@ -9,16 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.sequences.calibration_formats import (
-    LARGEST_MATRIX,
     Format,
     StoredCalibration,
     StoredIntrinsics,
     distortion_of,
 )
-from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.errors import InputError
-from endotsr.untrusted.files import read_text
 from endotsr.untrusted.json import Keys, number
 from endotsr.untrusted.yaml import matrix
 
@@ -60,7 +57,6 @@ EUROC = Inventory(
     },
 )
 EUROC_MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radial-tangential", "radtan", "none")}
-KITTI_PAIRS = (("P0", "P1"), ("P2", "P3"))
 
 
 def read_orb(path: Path, keys: Keys) -> StoredCalibration | None:
@@ -103,34 +99,6 @@ def read_euroc(path: Path, keys: Keys) -> StoredCalibration | None:
     return StoredCalibration(found, notes=tuple(notes))
 
 
-def read_kitti(path: Path, keys: Keys) -> StoredCalibration | None:
-    """The rectified pair of a file with lines `P0: ` and twelve numbers; the baseline is in metres.
-
-    Raises:  InputError for a line without twelve numbers, or a right camera that is not to the right.
-    """
-    if path.suffix.lower() != ".txt":
-        return None
-    lines = dict(line.split(":", 1) for line in read_text(path, LARGEST_MATRIX).splitlines() if ":" in line)
-    pair = next((pair for pair in KITTI_PAIRS if set(pair) <= set(lines)), None)
-    if pair is None:
-        return None
-    left, right = (matrix(_floats(lines[name]), f"{path}: {name}", (3, 4)) for name in pair)
-    if (left[:, :3] != right[:, :3]).any() or right[0, 3] >= left[0, 3]:
-        raise InputError(f"{path}: {pair[1]}: use the camera right of {pair[0]}, with the same intrinsics")
-    unused = [name for name in lines if name not in pair]
-    notes = [f"{path.name}: {pair[0]} and {pair[1]} are read"]
-    notes += [f"{path.name}: not used: {shortened(unused)}"] if unused else []
-    baseline = 1000.0 * float(left[0, 3] - right[0, 3]) / float(left[0, 0])
-    return StoredCalibration(StoredIntrinsics(left[:, :3].copy()), baseline=baseline, notes=tuple(notes))
-
-
-def _floats(text: str) -> list[float]:
-    try:
-        return [float(word) for word in text.split()]
-    except ValueError:
-        return []
-
-
 def _matrix(fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
 
@@ -138,5 +106,4 @@ def _matrix(fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
 FORMATS = (
     Format("settings of ORB-SLAM (Camera.fx ...), metres", read_orb),
     Format("sensor.yaml of EuRoC", read_euroc),
-    Format("calib.txt of KITTI (P0: P1: ...), metres", read_kitti),
 )

@@ -60,6 +60,9 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
     Raises:  InputError naming the line and the reason.
     """
     rows, stamped, notes = stored_poses(Path(path))
+    descends = next((row.where for before, row in pairwise(rows) if row.stamp < before.stamp), "")
+    if descends:
+        notes = [*notes, f"{descends.removeprefix(f'{path}: ')}: stamps go back: the poses are sorted by their stamps"]
     rows.sort(key=lambda row: row.stamp)
     for before, row in pairwise(rows):
         if before.stamp == row.stamp:

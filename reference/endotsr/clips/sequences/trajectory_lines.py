@@ -16,6 +16,7 @@ from endotsr.clips.sequences.inventory import Inventory
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import read_text
+from endotsr.untrusted.names import decimal_commas
 
 COLUMNS = (7, 8, 12, 16)
 ALLOWED = (
@@ -124,7 +125,7 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
             head = _named_columns(line)
             continue
         if not row or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
-            raise InputError(f"{where}: {ALLOWED}")
+            raise InputError(f"{where}: {ALLOWED}{decimal_commas(line)}")
         found.append((where, row))
     return found, head
 

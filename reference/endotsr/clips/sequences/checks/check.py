@@ -15,6 +15,7 @@ from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
+from endotsr.clips.sequences.checks.dark_border import DarkBorder
 from endotsr.clips.sequences.checks.depth import (
     DepthFacts,
     depth_facts,
@@ -77,6 +78,7 @@ class _Pass:
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
         self.masks = MaskSteps()
+        self.border = DarkBorder()
         self.depth: list[DepthFacts] = []
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
@@ -122,6 +124,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     facts: dict[str, Any] = {"frames": len(clip.images)}
     if run.frames:
         run.findings += frame_findings(run.frames, str(clip.images[0].parent))
+        run.findings += run.border.findings(str(clip.images[0].parent))
     if clip.masks and clip.masks.files:
         run.findings += run.masks.findings(str(clip.masks.files[0].parent))
     if run.depth and clip.depth:
@@ -189,6 +192,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         run.frames.append(frame_facts(file.name, picture))
         tissue = _mask(clip, run, masks[i], i, size, levels)
         run.masks.add(i, tissue)
+        run.border.add(picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         if i in sampled:
             if found is not None:

@@ -48,6 +48,8 @@ KINDS: dict[str, Kind] = {
     "white-frame": Kind("warning", "a white frame teaches the model a white scene at its time", LEAVE_OUT),
     "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does",
                                 "prepare the video itself, or deinterlace it before exporting pictures"),
+    "dark-border": Kind("warning", "training fits black tissue there",
+                        "crop the clip (endotsr prepare --crop), or exclude the border (endotsr masks)"),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
     "duplicated-frame": Kind("warning", "the motion stops there, and training leaves out a frame that a held-out"
                              " frame repeats", LEAVE_OUT),

@@ -4,6 +4,7 @@ Every file in this folder defines a value `LAYOUT` and is registered automatical
 order of `rank`: unambiguous ones first, a plain folder of pictures last.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -15,10 +16,12 @@ from typing import NamedTuple
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
+from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
+from endotsr.untrusted.names import plain_line
 
 # Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (
@@ -47,6 +50,10 @@ def layouts() -> tuple[Layout, ...]:
     return tuple(sorted(found, key=lambda layout: (layout.rank, layout.name)))
 
 
+ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
+OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd")
+
+
 def layout_of(path: Path, name: str = "auto") -> Layout:
     """The layout named, or the first that recognises the path.
 
@@ -64,7 +71,19 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
         if layout.recognises(path):
             return layout
     known = "; ".join(f"{layout.name} ({layout.about})" for layout in layouts())
-    raise InputError(f"{path}: no known layout; allowed: {known}")
+    raise InputError(f"{path}: no known layout{_held(path)}; allowed: {known}")
+
+
+def _held(path: Path) -> str:
+    """What a path in no known layout is, where a remedy follows from it."""
+    if path.is_file():
+        return ": an archive; unpack it first" if path.suffix.lower() in ARCHIVES else ""
+    endings = Counter(file.suffix.lower() for file in path.iterdir() if file.is_file() and file.suffix)
+    ending, count = endings.most_common(1)[0] if endings else ("", 0)
+    if ending in OTHER_PICTURES:
+        return f": it holds {count} files that end in {ending}; convert them to png"
+    folders = sorted(plain_line(folder.name) for folder in path.iterdir() if folder.is_dir())
+    return f": it holds the folders {shortened(folders)}; give the one with the pictures" if folders else ""
 
 
 def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:

@@ -1,0 +1,279 @@
+"""Rows of `inputs_tried.py` about folders of a user who knows none of the conventions here."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from input_kinds import (
+    MATRIX,
+    Row,
+    calibrated,
+    centred,
+    close,
+    common,
+    depth_is_true,
+    files,
+    folder_of,
+    half_excluded,
+    mask,
+    masked,
+    prepare,
+    rewritten,
+    ros_text,
+    video,
+)
+from made_videos import pictures, woven
+from odd_inputs import named, with_camera
+from test_stated_depth import recording as with_depth
+from test_stated_depth import true_depth
+
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
+
+P = "{}: 100 0 63.5 {} 0 100 47.5 0 0 0 1 0\n"
+LINE = "{} {} 0 0 0 0 0 1"
+
+
+def palette_masks(folder: Path) -> None:
+    def changed(opened, _):
+        made = opened.point(lambda value: value // 255).convert("P")
+        made.putpalette([0, 0, 0, 255, 255, 255])
+        return made
+
+    rewritten(folder, changed)
+
+
+def one_file(change):
+    """The fourth picture is changed."""
+    return folder_of(pictures(), change=lambda folder: change(folder / "clip/0003.png"))
+
+
+def zeroed(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(data[:200] + bytes(len(data) - 400) + data[-200:])
+
+
+def looped(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path)
+
+
+def zipped(folder: Path) -> list[str]:
+    files(folder, "clip", pictures())
+    with zipfile.ZipFile(folder / "clip.zip", "w") as archive:
+        for file in (folder / "clip").iterdir():
+            archive.write(file, file.name)
+    return prepare("clip.zip")(folder)
+
+
+def depth_files(save, ending: str, *words: str):
+    """True depth in files of another kind."""
+
+    def make(folder: Path) -> list[str]:
+        found = with_depth(folder, true_depth)
+        for i, file in enumerate(sorted((folder / "depth").iterdir())):
+            file.unlink()
+            save(file.with_suffix(ending), true_depth(i))
+        return [*found, *words]
+
+    return make
+
+
+def half_tiff(path: Path, plane) -> None:
+    """A TIFF of 16-bit floating-point numbers, written by hand: Pillow has no such mode."""
+    import struct
+
+    height, width = plane.shape
+    data = plane.astype("<f2").tobytes()
+    tags = [(256, 4, width), (257, 4, height), (258, 3, 16), (259, 3, 1), (262, 3, 1), (273, 4, 8), (277, 3, 1),
+            (278, 4, height), (279, 4, len(data)), (339, 3, 3)]  # fmt: skip
+    directory = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
+    path.write_bytes(
+        b"II*\0" + struct.pack("<I", 8 + len(data)) + data + struct.pack("<H", len(tags)) + directory + bytes(4)
+    )
+
+
+def exr(path: Path, plane) -> None:
+    path.write_bytes(b"\x76\x2f\x31\x01" + bytes(60))
+
+
+def npy(kind):
+    return lambda path, plane: np.save(path, plane.astype(kind))
+
+
+def three_channels(path: Path, plane) -> None:
+    from endotsr.clips.opencv import write_png
+
+    write_png(path, np.repeat(plane.round().astype(np.uint8)[..., None], 3, axis=2))
+
+
+def quotes(folder: Path) -> list[str]:
+    """A folder whose name has spaces, quotes and a dollar sign."""
+    files(folder, "my 'clip' \"1\" $HOME", pictures())
+    return prepare("my 'clip' \"1\" $HOME")(folder)
+
+
+def newline(path: Path) -> None:
+    path.rename(path.with_name("00\n03.png"))
+
+
+def upper(folder: Path) -> None:
+    for file in (folder / "clip").iterdir():
+        file.rename(file.with_suffix(".PNG"))
+
+
+def heic(folder: Path) -> None:
+    for file in (folder / "clip").iterdir():
+        file.rename(file.with_suffix(".heic"))
+
+
+def letterbox(count=12):
+    found = pictures(count)
+    for shown in found:
+        shown[:16], shown[-16:] = 0, 0
+    return found
+
+
+def edited(name: str, change):
+    """A text file of the common format with other bytes."""
+
+    def make(folder: Path) -> list[str]:
+        words = common()(folder)
+        file = folder / "clip" / name
+        file.write_bytes(change(file.read_bytes()))
+        return words
+
+    return make
+
+
+def trajectory(text: str, *words: str):
+    """A trajectory with this content, as bytes."""
+
+    def make(folder: Path) -> list[str]:
+        (folder / "t.txt").write_bytes(text if isinstance(text, bytes) else text.encode())
+        return folder_of(pictures(), "--trajectory", str(folder / "t.txt"), *words)(folder)
+
+    return make
+
+
+def kitti(text: str, *names: str, calibration="calib.txt"):
+    def make(folder: Path) -> list[str]:
+        (folder / "raw").mkdir()
+        for name in names or ("image_2", "image_3"):
+            files(folder / "raw", name, pictures())
+        (folder / "raw" / calibration).write_text(text)
+        return prepare("raw", "--calibration", str(folder / "raw" / calibration), camera=())(folder)
+
+    return make
+
+
+def baseline(millimetres: float):
+    return lambda folder: abs(read_sequence_file(folder / "o").camera.baseline - millimetres) < 1e-6
+
+
+def pair_of(text: str, name="a.yaml"):
+    def make(folder: Path) -> list[str]:
+        (folder / "raw").mkdir()
+        for side in ("left", "right"):
+            files(folder / "raw", side, pictures())
+        (folder / name).write_text(text)
+        return prepare("raw", "--calibration", str(folder / name), camera=())(folder)
+
+    return make
+
+
+def opencv_matrix(name: str, numbers, cols: int) -> str:
+    data = ", ".join(f"{number:g}." if number == int(number) else f"{number}" for number in numbers)
+    return f"{name}: !!opencv-matrix\n   rows: 3\n   cols: {cols}\n   dt: d\n   data: [{data}]\n"
+
+
+PROJECTION = [100, 0, 63.5, 0, 0, 100, 47.5, 0, 0, 0, 1, 0]
+RIGHT = [100, 0, 63.5, -400, 0, 100, 47.5, 0, 0, 0, 1, 0]
+RECTIFIED = "%YAML:1.0\n---\n" + opencv_matrix("P1", PROJECTION, 4) + opencv_matrix("P2", RIGHT, 4)
+RAW_KITTI = "calib_time: 09-Jan-2012 13:57:47\n" + "".join(
+    f"S_rect_0{k}: 1.28e+02 9.6e+01\n" + P.format(f"P_rect_0{k}", tx) for k, tx in enumerate((0, -40, 4, -36))
+)
+LINES = [LINE.format(f"{i / 25:.2f}", f"{0.001 * i:.4f}") for i in range(12)]
+INTERLACED_PAIR = [np.hstack([p, p]) for p in woven()]
+STRANGER_ROWS = [
+    Row("masks, with a palette of black and white", masked([mask()] * 12, change=palette_masks), "right", "",
+        half_excluded),
+    Row("video, H.265 4:2:2 10 bit", video("a.mp4", codec="libx265", layout="yuv422p10le"), "right", "",
+        close(pictures())),
+    Row("pictures, one empty file", one_file(lambda path: path.write_bytes(b"")), "refused", "0003.png"),
+    Row("pictures, one with zeros inside", one_file(zeroed), "refused", "0003.png"),
+    Row("pictures, a link to itself", one_file(looped), "refused", "0003.png"),
+    Row("pictures, a name with a line break", one_file(newline), "refused", "allowed"),
+    Row("names with spaces, quotes and a dollar sign", quotes, "right", "", close(pictures(), 0.01)),
+    Row("names in capitals", folder_of(pictures(), change=upper), "right", "", close(pictures(), 0.01)),
+    Row("a folder above the pictures", kitti(P.format("P2", 4), "first try"), "refused",
+        "it holds the folders first try;"),
+    Row("names of copies", named(lambda k: f"IMG_{k:04d} (2).png"), "right", "", close(pictures(), 0.01)),
+    Row("pictures, heic", folder_of(pictures(), change=heic), "refused", "12 files that end in .heic; convert"),
+    Row("a zip file", zipped, "refused", "an archive; unpack it first"),
+    Row("a folder that is not there", prepare("nothing"), "refused", "not found"),
+    Row("pictures, letterbox", folder_of(letterbox()), "told", "--crop 0 16 128 64 keeps the rest"),
+    Row("video, interlaced, side by side", video("a.mp4", INTERLACED_PAIR, "--stereo", "side_by_side", "--baseline",
+        "4", options={"flags": "+ildct+ilme", "x264-params": "interlaced=1:tff=1"}), "told", "is interlaced"),
+    Row("depth, half-float TIFF", depth_files(half_tiff, ".tiff"), "refused",
+        "numbers of 16 or 64 bits"),
+    Row("depth, EXR", depth_files(exr, ".exr"), "refused", "exr"),
+    Row("depth, half-float npy", depth_files(npy(np.float16), ".npy"), "right", ""),
+    Row("depth, int32 npy", depth_files(npy(np.int32), ".npy"), "right", ""),
+    Row("depth, grey with three channels", depth_files(three_channels, ".png"), "right", ""),
+    Row("depth, steps stated", depth_files(lambda path, plane: np.save(path, (plane * 256).astype(np.uint16)), ".npy",
+        "--depth-scale", "0.00390625"), "right", "", depth_is_true),
+    Row("camera of another size", with_camera("1000", "1000", "960", "540"), "refused",
+        "is the calibration of another picture size?"),
+    Row("camera with a negative focal length", with_camera("-100", "100", "64", "48"), "refused",
+        "focal length -100: allowed: numbers > 0"),
+    Row("camera with decimal commas", with_camera("100,5", "100,5", "64", "48"), "refused", "100,5"),
+    Row("camera, principal point in parts of the picture", with_camera("100", "100", "0.5", "0.5"), "told",
+        "principal-point"),
+    Row("trajectory with decimal commas", trajectory("\n".join(LINES).replace(".", ",")), "refused",
+        "write decimal points"),
+    Row("trajectory with semicolons", trajectory("\n".join(LINES).replace(" ", ";")), "told",
+        "one pose per frame"),
+    Row("trajectory whose stamps go back", trajectory("\n".join(LINES[::-1])), "told",
+        "line 2: stamps go back: the poses are sorted"),
+    Row("trajectory with a stamp twice", trajectory("\n".join([*LINES[:4], LINES[3], *LINES[4:]])), "refused", "twice"),
+    Row("trajectory with a quaternion of zeros", trajectory("\n".join([*LINES[:11], "0.44 0 0 0 0 0 0 0"])), "refused",
+        "quaternion"),
+    Row("trajectory with a byte order mark and CRLF", trajectory("\ufeff" + "\r\n".join(LINES), "--source-rate", "25"),
+        "told", "one pose per frame"),
+    Row("trajectory in UTF-16", trajectory("\n".join(LINES).encode("utf-16")), "refused",
+        "not UTF-8 text"),
+    Row("common format, sequence.toml with a byte order mark and CRLF", edited(FILE_NAME,
+        lambda data: b"\xef\xbb\xbf" + data.replace(b"\n", b"\r\n")), "right", ""),
+    Row("common format, sequence.toml with decimal commas", edited(FILE_NAME,
+        lambda data: data.replace(b"fx = 3", b"fx = 3,")), "refused", FILE_NAME),
+    Row("calibration, calib.txt of KITTI, P2 and P3 alone", kitti(P.format("P2", 4) + P.format("P3", -36)), "told",
+        "P2 and P3 are read", baseline(400)),
+    Row("calibration, calib.txt of KITTI, one camera", kitti(P.format("P2", 4), "images"), "told",
+        "P2 is read as one camera, without a baseline", centred),
+    Row("calibration, calib_cam_to_cam.txt of KITTI", kitti(RAW_KITTI, calibration="calib_cam_to_cam.txt"), "told",
+        "P_rect", baseline(400)),
+    Row("calibration, P1 and P2 of OpenCV", pair_of(RECTIFIED), "told", "P2", baseline(4)),
+    Row("calibration, a projection with a baseline as text", calibrated("K.txt",
+        lambda: "100 0 63.5 -40\n0 101 47.5 0\n0 0 1 0\n"), "refused", "fourth column"),
+    Row("calibration, matrix with decimal commas", calibrated("K.txt", lambda: MATRIX.replace(".", ",")), "refused",
+        "write decimal points"),
+    Row("calibration, P1 and P2 of unlike cameras", pair_of(RECTIFIED.replace("63.5, -400", "93.5, -400")), "refused",
+        "CALIB_ZERO_DISPARITY"),
+    Row("calibration, P1 and P2 of a pair above one another", pair_of(RECTIFIED.replace("-400., 0., 100., 47.5, 0.",
+        "0., 0., 100., 47.5, -400.")), "refused", "above or below it"),
+    Row("calibration, ROS, the right camera alone", calibrated("a.yaml", lambda: ros_text(
+        projection_matrix={"rows": 3, "cols": 4, "data": [float(value) for value in RIGHT]})), "told",
+        "a right camera"),
+    Row("one picture twice in the folder as jpg and png", folder_of(pictures(), change=lambda folder: rewritten_beside(
+        folder)), "refused", "carry the same frame number"),
+    Row("--frames with a hyphen", folder_of(pictures(), "--frames", "0-5"), "refused", "--frames"),
+    Row("--scale 0", folder_of(pictures(), "--scale", "0"), "refused", "scale"),
+    Row("--rate below 0", video("a.mp4", None, "--rate", "-5"), "refused", "rate"),
+]  # fmt: skip
+
+
+def rewritten_beside(folder: Path) -> None:
+    from endotsr.clips.opencv.pictures import write_jpeg
+
+    write_jpeg(folder / "clip/0003.jpg", read_png(folder / "clip/0003.png"))
