@@ -124,6 +124,29 @@ CARELESS = [  # folders of a careless user, on revision b0dcc5c9
     Before("nerfstudio, applied_scale and depth", "silent", "depth was not multiplied by it"),
     Before("TUM, associations", "silent", "not named"),
 ]
+STRANGER = [  # masks, folders and mistakes of users who know no convention, on revision 5e0f551e
+    Before("masks, noise of a codec in frames without an instrument", "refused", "26 values: no mask"),
+    Before("masks, dark jpg in frames without an instrument", "refused", "39 values: no mask"),
+    Before("masks, two small numbers in a frame without an instrument", "refused", "26 values: no mask"),
+    Before("masks, a video", "refused", "a file of another kind"),
+    Before("masks, jpg, --excluded-value nonzero", "silent", "noise was excluded"),
+    Before("masks, inverted, in prepare", "silent", "tissue was excluded"),
+    Before("pictures, letterbox", "silent", "black bars counted as tissue"),
+    Before("pictures of two cameras by their last number", "silent", "two cameras as one"),
+    Before("depth, negative", "silent", "no depth was written"),
+    Before("depth, centimetres", "silent", "read as millimetres"),
+    Before("calibration, ROS, the right camera alone", "silent", "read as one camera"),
+    Before("trajectory whose stamps go back", "silent", "sorted"),
+    Before("trajectory, matrices in brackets", "refused", "8 numbers expected"),
+    Before("trajectory with decimal commas", "wrong reason", "8 numbers expected"),
+    Before("calibration, calib_cam_to_cam.txt of KITTI", "refused", "no camera matrix"),
+    Before("calibration, calib.txt of KITTI, one camera", "refused", "no camera matrix"),
+    Before("calibration, P1 and P2 of OpenCV", "refused", "no known calibration"),
+    Before("calibration, matrix K as csv", "refused", "no known calibration"),
+    Before("calibration that is not there", "wrong reason", "no known calibration"),
+    Before("EndoNeRF, a negative focal length", "wrong reason", "unknown intrinsics"),
+    Before("depth, half-float TIFF", "wrong reason", "a damaged TIFF"),
+]
 
 
 def measured() -> dict[str, Any]:
@@ -143,7 +166,13 @@ def measured() -> dict[str, Any]:
 def table(result: dict[str, Any]) -> str:
     """Before and now, and the number of all inputs by their outcome."""
     parts = []
-    tables = {"After public reports": REPORTED, "Made up later": FOUND, "Other folders": REST, "Careless": CARELESS}
+    tables = {
+        "After public reports": REPORTED,
+        "Made up later": FOUND,
+        "Other folders": REST,
+        "Careless": CARELESS,
+        "Strangers": STRANGER,
+    }
     for title, entries in tables.items():
         rows = []
         for one in entries:

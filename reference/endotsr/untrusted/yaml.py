@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.names import plain_line
 
 LARGEST_FILE = 1 << 20  # bytes
 DIRECTIVE = "%YAML"  # written by OpenCV with a colon, which is not YAML
@@ -32,7 +33,10 @@ def read_yaml(path: Path) -> Keys:
     try:
         documents = [document for document in yaml.load_all(text, Loader) if document is not None]
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise InputError(f"{path}: not YAML: {str(error).splitlines()[0] if str(error) else 'too deep'}") from None
+        mark = getattr(error, "problem_mark", None)
+        place = f" (line {mark.line + 1})" if mark is not None else ""
+        said = getattr(error, "problem", None) or (str(error).splitlines() or ["too deep"])[0]
+        raise InputError(f"{path}: not YAML: {plain_line(said)}{place}") from None
     bare = [{k: v for k, v in d.items() if k != "header"} if isinstance(d, dict) else d for d in documents]
     found = documents[0] if bare and bare.count(bare[0]) == len(bare) else None
     if len(documents) > 1 and found is None:

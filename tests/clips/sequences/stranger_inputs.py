@@ -11,6 +11,7 @@ from input_kinds import (
     centred,
     close,
     common,
+    depth,
     depth_is_true,
     files,
     folder_of,
@@ -27,9 +28,10 @@ from odd_inputs import named, with_camera
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
 
+EULER = "t,x,y,z,roll,pitch,yaw\n" + "\n".join(f"{i / 25},{i},0,0,0,0,90" for i in range(12))
 P = "{}: 100 0 63.5 {} 0 100 47.5 0 0 0 1 0\n"
 LINE = "{} {} 0 0 0 0 0 1"
 
@@ -56,6 +58,37 @@ def zeroed(path: Path) -> None:
 def looped(path: Path) -> None:
     path.unlink()
     path.symlink_to(path)
+
+
+def no_focal_length(folder: Path) -> list[str]:
+    """The EndoNeRF layout with a negative focal length in every row."""
+    from synthetic_folder import write_synthetic_folder
+
+    write_synthetic_folder(folder / "clip")
+    rows = np.load(folder / "clip/poses_bounds.npy")
+    rows[:, 14] = -rows[:, 14]
+    np.save(folder / "clip/poses_bounds.npy", rows)
+    return ["check", str(folder / "clip")]
+
+
+def coloured_masks(folder: Path) -> None:
+    for file in folder.iterdir():
+        write_png(file, np.dstack([mask(), mask(0), mask(0)]))
+
+
+def missing_calibration(folder: Path) -> list[str]:
+    files(folder, "clip", pictures())
+    return prepare("clip", "--calibration", str(folder / "scope"), camera=())(folder)
+
+
+def empty(folder: Path) -> list[str]:
+    (folder / "clip").mkdir()
+    return prepare("clip")(folder)
+
+
+def marked_frame(i: int):
+    """True depth, and in one frame -1 everywhere."""
+    return true_depth(i) * 0 - 1 if i == 3 else true_depth(i)
 
 
 def zipped(folder: Path) -> list[str]:
@@ -102,8 +135,6 @@ def npy(kind):
 
 
 def three_channels(path: Path, plane) -> None:
-    from endotsr.clips.opencv import write_png
-
     write_png(path, np.repeat(plane.round().astype(np.uint8)[..., None], 3, axis=2))
 
 
@@ -267,6 +298,22 @@ STRANGER_ROWS = [
         "a right camera"),
     Row("one picture twice in the folder as jpg and png", folder_of(pictures(), change=lambda folder: rewritten_beside(
         folder)), "refused", "carry the same frame number"),
+    Row("calibration that is not there", missing_calibration, "refused", "scope: not found"),
+    Row("calibration, YAML with tabs", calibrated("a.yaml", lambda: "camera_matrix:\n\tdata: [1]\n"), "refused",
+        "cannot start any token (line 2)"),
+    Row("calibration, matrix K as csv", calibrated("K.csv", lambda: MATRIX.replace(" ", ",")), "told",
+        "half a pixel was added", centred),
+    Row("trajectory with angles", trajectory(EULER), "refused", "write quaternions"),
+    Row("trajectory, matrices in brackets", trajectory("\n".join([str(np.eye(4).tolist())] * 12)), "told",
+        "stamps are frame numbers"),
+    Row("pictures of two cameras by their last number", named(lambda k: f"{k // 2:04d}_{k % 2}.png"), "told",
+        "if these are two cameras"),
+    Row("an empty folder", empty, "refused", "the folder is empty"),
+    Row("depth, negative", depth(lambda i: -true_depth(i)), "refused", "all values are negative"),
+    Row("depth, one frame marked -1 everywhere", depth(marked_frame), "told", "frames without any depth: 3"),
+    Row("depth, centimetres", depth(lambda i: true_depth(i) / 10), "told", "if that is too near"),
+    Row("masks, red", masked([mask()] * 12, change=coloured_masks), "refused", "--excluded-value nonzero"),
+    Row("EndoNeRF, a negative focal length", no_focal_length, "refused", "must be positive"),
     Row("--frames with a hyphen", folder_of(pictures(), "--frames", "0-5"), "refused", "--frames"),
     Row("--scale 0", folder_of(pictures(), "--scale", "0"), "refused", "scale"),
     Row("--rate below 0", video("a.mp4", None, "--rate", "-5"), "refused", "rate"),

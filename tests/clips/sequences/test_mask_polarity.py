@@ -1,4 +1,4 @@
-"""Evidence on the polarity of masks: right masks are accepted, inverted ones are named, with depth and without it."""
+"""What pictures say about the polarity of masks: right ones are accepted, inverted ones are named."""
 
 from itertools import product
 
@@ -8,22 +8,22 @@ import pytest
 from data_folder import data_folder
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
-from endotsr.clips.sequences.mask_polarity import Evidence
+from endotsr.clips.sequences.mask_polarity import PolarityEvidence
 
 
 def test_right_masks_are_accepted_where_depth_is_missing_on_tissue_alone():
     """Depth without a dark border, which masks of the instruments alone leave to the tissue."""
-    border = Evidence(0.4, 0.1, 0.3, red_tissue=60.0, red_excluded=2.0)
+    border = PolarityEvidence(0.4, 0.1, 0.3, red_tissue=60.0, red_excluded=2.0)
     assert border.depth == -1 and border.colour == 1 and not border.against
     assert "depth is missing on 40.0% of the tissue" in border.said and "but mean red minus blue is 60" in border.said
-    assert Evidence(0.4, 0.1, 0.3, red_tissue=30.0, red_excluded=29.0).against
+    assert PolarityEvidence(0.4, 0.1, 0.3, red_tissue=30.0, red_excluded=29.0).against
 
 
 def test_colour_decides_where_depth_does_not():
-    assert Evidence(0.0, 0.0, 0.0, red_tissue=2.0, red_excluded=60.0).against
-    assert not Evidence(0.0, 0.0, 0.0, red_tissue=60.0, red_excluded=2.0).against
-    assert not Evidence(0.0, 0.0, 0.0, red_tissue=10.0, red_excluded=25.0).against
-    assert not Evidence(0.0, 1.0, 0.2, red_tissue=2.0, red_excluded=60.0).against
+    assert PolarityEvidence(0.0, 0.0, 0.0, red_tissue=2.0, red_excluded=60.0).against
+    assert not PolarityEvidence(0.0, 0.0, 0.0, red_tissue=60.0, red_excluded=2.0).against
+    assert not PolarityEvidence(0.0, 0.0, 0.0, red_tissue=10.0, red_excluded=25.0).against
+    assert not PolarityEvidence(0.0, 1.0, 0.2, red_tissue=2.0, red_excluded=60.0).against
 
 
 def test_masks_that_exclude_nothing_give_no_evidence():

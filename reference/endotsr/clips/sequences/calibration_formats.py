@@ -130,7 +130,7 @@ def read_matrix_text(path: Path, keys: Keys) -> StoredCalibration | None:
 
     Nine numbers and one more: the second line is the baseline of a rectified pair in metres (FoundationStereo).
     """
-    if path.suffix.lower() != ".txt":
+    if path.suffix.lower() not in (".txt", ".csv"):
         return None
     lines = [line for line in read_text(path, LARGEST_MATRIX).splitlines() if line.strip()]
     if len(lines) == 2 and len(lines[0].split()) == 9 and len(lines[1].split()) == 1:
@@ -322,7 +322,7 @@ def opencv_size(keys: Keys) -> tuple[int, int] | None:
 
 FORMATS = (  # in the order in which they are tried
     Format("FILE.ini with StereoLeft and StereoRight, millimetres", read_stereo_ini),
-    Format("FILE.txt with a camera matrix K of 3x3 numbers, and a baseline in metres", read_matrix_text),
+    Format("FILE.txt or .csv with a camera matrix K of 3x3 numbers, and a baseline in metres", read_matrix_text),
     Format("camchain.yaml of Kalibr (pinhole, radtan), metres", read_kalibr),
     Format("camera_info of ROS, FILE.yaml or a folder with left.yaml and right.yaml, metres", read_ros),
     Format("FILE.yaml, .xml or .json of OpenCV (camera_matrix, or M1 D1 M2 D2 R T in millimetres)", read_opencv),

@@ -29,6 +29,8 @@ def read_calibration(path: Path) -> StoredCalibration:
 
     Raises:  InputError naming the file, the key and what is allowed.
     """
+    if not path.exists():
+        raise InputError(f"{path}: not found")
     read = READERS.get(path.suffix.lower())
     keys = read(path) if read else {}
     for entry in FORMATS:

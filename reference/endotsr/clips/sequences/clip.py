@@ -135,7 +135,7 @@ class Clip:
         Raises:  InputError for a frame without a pose, or without intrinsics.
         """
         if self.intrinsics is None:
-            raise InputError(f"{self.where}: the intrinsics are unknown")
+            raise InputError(next(iter(self.pose_faults.values()), f"{self.where}: the intrinsics are unknown"))
         poses: list[CameraPose] = []
         for i in frames:
             pose = self.rest if self.poses is None else self.poses[i]

@@ -110,10 +110,13 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
 def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32]:
     """Depth (H, W) in scene units, from stored values times `scale`. Invalid values (0, negative, not finite) become 0.
 
-    Raises:  InputError if no value of a floating-point file is finite, or if a value exceeds the range of float32.
+    Raises:  InputError if no value of a floating-point file is finite, if there are unlike negative values and none is
+             positive, or if a value exceeds the range of float32.
     """
     if raw.dtype.kind == "f" and raw.size and not np.isfinite(raw).any():
         raise InputError(f"{where}: no value is finite; allowed: lengths, and 0 where there is no depth")
+    if raw.dtype.kind in "fi" and not (raw > 0).any() and np.unique(raw[raw < 0]).size > 1:
+        raise InputError(f"{where}: all values are negative; allowed: positive lengths, and 0 where there is no depth")
     with np.errstate(over="ignore"):
         depth = raw.astype(np.float64) * scale
     depth[~np.isfinite(depth) | (depth <= 0)] = 0.0

@@ -29,7 +29,7 @@ SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN, for a single frame
 OPPOSITE_FRACTION = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by up to 0.36 from any other
 
 
-class Evidence(NamedTuple):
+class PolarityEvidence(NamedTuple):
     """What depth and colour say about the polarity of masks.
 
     Depth contradicts it if at least 1 % of all pixels lack depth and the fraction without depth is larger by 0.25 on
@@ -87,11 +87,11 @@ def check_polarity(
     images   (n, 3, H, W) display RGB
     stated_in   the file that states the polarity; "": the settings state it
 
-    Raises:  InputError if the pictures contradict it, see `Evidence`, unless `allow`.
+    Raises:  InputError if the pictures contradict it, see `PolarityEvidence`, unless `allow`.
     """
     if masks.all() or not masks.any():
         return "polarity not checked: the masks exclude everything or nothing"
-    evidence = Evidence(*_missing_fractions(masks, depth), *_redness(images, masks))
+    evidence = PolarityEvidence(*_missing_fractions(masks, depth), *_redness(images, masks))
     if evidence.against and not allow:
         other = "black" if excluded_value == "white" else "white"
         mend = f'--sequence.excluded-value {other} (TOML: [sequence] excluded_value = "{other}")'

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.clip import grey_plane
-from endotsr.clips.sequences.mask_values import LEAST_WHITE
+from endotsr.clips.sequences.mask_values import LEAST_WHITE, OBJECTS
 from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
 
@@ -36,9 +36,17 @@ def plane_of(path: Path) -> NDArray:
     """The plane (H, W) of a mask: a picture file, or a name of `mask_files`. Raises InputError."""
     file = path.parent
     if not file.is_file():
-        return grey_plane(read_picture(path), path)
+        return grey_mask(read_picture(path), path)
     status = os.stat(file)
     return _planes(file, status.st_mtime_ns, status.st_size)[int(path.name)]
+
+
+def grey_mask(pixels: NDArray, path: Path) -> NDArray:
+    """The channel of a mask. Raises InputError for a coloured picture, with the option that reads one."""
+    try:
+        return grey_plane(pixels, path)
+    except InputError as error:
+        raise InputError(f"{error}, {OBJECTS}") from None
 
 
 def coloured_plane_of(path: Path) -> NDArray:

@@ -17,10 +17,9 @@ from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
-from endotsr.clips.sequences.checks.dark_border import DarkBorder
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
-from endotsr.clips.sequences.checks.polarity import MaskEvidence
+from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.choices import DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
@@ -143,7 +142,7 @@ def _write_frames(
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
     facts: list[FrameFacts] = []
-    shown, border = MaskEvidence(), DarkBorder()
+    seen = WrittenFrames()
     (folder / IMAGES).mkdir()
     for k, (i, pair) in enumerate(zip(chosen, clip.pictures(chosen))):
         if straight is None:
@@ -154,7 +153,6 @@ def _write_frames(
         facts.append(frame_facts(clip.names[i], new.left))
         _write_pictures(folder, k, new, settings.pictures)
         tissue = None if clip.masks is None else straight.mask(_mask_or_nearest(clip, i, chosen))
-        border.add(new.left, tissue)
         if tissue is not None:
             _write_mask(folder, k, tissue)
         depth = _depth(clip, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
@@ -164,27 +162,19 @@ def _write_frames(
         elif clip.depth is not None or (clip.points is not None and settings.points != "none"):
             without_depth.append(i)
             _write_no_depth(folder, k, straight.intrinsics)
-        if tissue is not None:
-            shown.add(new.left, tissue, depth)
+        seen.add(new.left, tissue, depth)
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    notes += _frame_notes(clip, straight, facts, shown) + notes_of(border.findings(str(clip.where)))
+    notes += notes_of(
+        frame_findings(facts, str(clip.where)) + intrinsics_findings(straight.intrinsics, str(clip.where))
+    )
+    notes += seen.notes(clip)
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
         notes.append(f"{saturated} pixels are clipped at {65535 * depth_scale:g}, eight times the usual depth")
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(clip, straight, turned, chosen, depth_scale, settings, notes)
-
-
-def _frame_notes(clip: Clip, straight: Straightener, facts: list[FrameFacts], shown: MaskEvidence) -> list[str]:
-    """Notes on pictures and intrinsics; the share of tissue, or a warning about the polarity of the masks."""
-    where = str(clip.where)
-    notes = notes_of(frame_findings(facts, where) + intrinsics_findings(straight.intrinsics, where))
-    if clip.masks is None:
-        return notes
-    excluded = clip.masks.excluded_value
-    return notes + (notes_of(shown.findings(where, excluded)) or [shown.note(excluded)])
 
 
 def _checked(clip: Clip, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:

@@ -113,7 +113,7 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
     found: list[tuple[str, list[float]]] = []
     head: list[str] = []
     for number, line in enumerate(read_text(path).splitlines(), 1):
-        words, where = line.replace(",", " ").replace(";", " ").split(), f"{path}: line {number}"
+        words, where = re.sub(r"[\[\],;]", " ", line).split(), f"{path}: line {number}"
         if not words or words[0].startswith("#"):
             head = _named_columns(line) or head
             continue
@@ -125,9 +125,14 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
             head = _named_columns(line)
             continue
         if not row or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
-            raise InputError(f"{where}: {ALLOWED}{decimal_commas(line)}")
+            raise InputError(f"{where}: {ALLOWED}{decimal_commas(line)}{_angles(line)}")
         found.append((where, row))
     return found, head
+
+
+def _angles(line: str) -> str:
+    """The end of a message about a head line with angles; else nothing."""
+    return "; angles are not read: write quaternions" if re.search("roll|pitch|yaw|euler", line.lower()) else ""
 
 
 def _named_columns(line: str) -> list[str]:

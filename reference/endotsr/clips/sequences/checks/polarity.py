@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.kinds import Finding, finding
-from endotsr.clips.sequences.mask_polarity import Evidence
+from endotsr.clips.sequences.mask_polarity import PolarityEvidence
 from endotsr.method.kernels.arrays import BoolArray
 
 STEP = 4  # pixels between the sampled rows and columns
@@ -32,13 +32,13 @@ class MaskEvidence:
             self.without_depth[k] += 0 if depth is None else np.count_nonzero(depth[::STEP, ::STEP][part] == 0)
 
     @property
-    def evidence(self) -> Evidence | None:
+    def evidence(self) -> PolarityEvidence | None:
         """The evidence; None if the masks exclude everything or nothing."""
         if not self.pixels.all():
             return None
         missing, red = self.without_depth / self.pixels, self.redness / self.pixels
         total = float(self.without_depth.sum() / self.pixels.sum())
-        return Evidence(float(missing[0]), float(missing[1]), total, float(red[0]), float(red[1]))
+        return PolarityEvidence(float(missing[0]), float(missing[1]), total, float(red[0]), float(red[1]))
 
     def findings(self, where: str, excluded_value: str) -> list[Finding]:
         """A warning with both readings, if the pictures contradict the stated one."""

@@ -82,6 +82,8 @@ def _held(path: Path) -> str:
     ending, count = endings.most_common(1)[0] if endings else ("", 0)
     if ending in OTHER_PICTURES:
         return f": it holds {count} files that end in {ending}; convert them to png"
+    if not any(path.iterdir()):
+        return ": the folder is empty"
     folders = sorted(plain_line(folder.name) for folder in path.iterdir() if folder.is_dir())
     return f": it holds the folders {shortened(folders)}; give the one with the pictures" if folders else ""
 

@@ -111,6 +111,18 @@ def _clock(path: Path, files: list[Path], rate: float | None) -> tuple[NDArray[n
     return named, listed._replace(notes=(*listed.notes, said))
 
 
+def _in_turn(files: list[Path]) -> list[str]:
+    """A note on names that end in two numbers in turn, such as 0007_0 and 0007_1: two cameras may be in one folder."""
+    numbers = frame_numbers(files) or []
+    last = [number[-1] for number in numbers]
+    if not numbers or len(numbers[0]) < 2 or len(files) < 4 or last != (last[:2] * len(last))[: len(last)]:
+        return []
+    return [
+        f"the names end in {last[0]} and {last[1]} in turn ({files[0].name}, {files[1].name}): if these are two"
+        " cameras, put their pictures into left/ and right/"
+    ]
+
+
 def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     """The pictures as a clip. Raises InputError."""
     left, right = find_pictures(path)
@@ -124,7 +136,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
     width, height = halves(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
-    gaps = [found.line for found in gap_findings(left)] + squeezed_note(width, height, stereo)
+    gaps = [found.line for found in gap_findings(left)] + _in_turn(left) + squeezed_note(width, height, stereo)
     clock, lists = _clock(path, left, options.rate)
     times = None if clock is None else clock - clock[0]
     rate = options.rate if clock is None else float(1 / np.median(np.diff(clock)))
