@@ -25,7 +25,7 @@ FAMILIES = (
     "masked_l1", "masked_ssim", "depth", "smoothness", "exposure", "pose", "registration", "covariance", "projection",
     "harmonics", "composite", "composite_limits", "render", "schedule", "density", "initialisation", "scene",
     "objective", "training", "other_settings", "extremes", "narrow", "wide", "switches",
-    "borders", "exposed",
+    "borders", "exposed", "sides",
 )  # fmt: skip
 
 

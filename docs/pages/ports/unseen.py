@@ -39,7 +39,7 @@ def fragments(runs: dict[str, Any]) -> dict[str, str]:
 
 
 def changed_table(found: dict[str, Any]) -> str:
-    """The share of the wrong versions of the port by hand that the vectors before and after refuse."""
+    """The share of the wrong versions of the port by hand that some versions of the vectors refuse."""
     of = found["observable"]
     cells = [f"{count} of {of}: {100 * count / of:.1f} %" for count in found["refused"].values()]
     heads = ("Wrong versions of a port in NumPy", *(f"refused by {one}" for one in found["vectors"].values()))

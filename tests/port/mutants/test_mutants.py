@@ -97,4 +97,4 @@ def test_what_stays_unseen_has_a_reason_and_is_a_wrong_version_of_today():
     assert not set(names) - known
     assert set(names) == {name for listed in RECORD["apart"].values() for name in listed}
     refused, of = RECORD["refused"], RECORD["observable"]
-    assert of - refused["after"] == sum(len(group["names"]) for group in free_groups() if group["left"])
+    assert of - refused["now"] == sum(len(group["names"]) for group in free_groups() if group["left"])
