@@ -1,4 +1,4 @@
-"""The answer of docs/claims.md in one paragraph, for README.md and the head of docs/paper.md.
+"""The answer of docs/claims.md in one paragraph and one table, for README.md and the head of docs/paper.md.
 
 Every number comes from a record; a clip that is not measured is named as such.
 """
@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from endotsr.results.report.tables import markdown
 from pages.claims.estimates import Estimate, contrast, runs_of
-from pages.claims.rules import seeds_of
+from pages.claims.rules import LEAST_PAIRS, seeds_of
 from pages.claims.verdicts import CLIPS, FULL, STEPS, WHOLE
 from pages.store.intervals import shown, student
 from pages.store.marks import read_json
@@ -21,65 +22,82 @@ from pages.store.published import MATCHED_PSNR, PUBLISHED
 
 TRUTH, INTERPOLATION = "effects_truth.json", "interpolation.json"
 PREDICTIONS = ("two_neighbours", "flow_interpolation", "two_neighbours_tissue", "flow_interpolation_tissue")
+NAMES = ("the blend", "flow", "the tissue-only blend", "the tissue-only flow")  # of the predictions, in their order
 METHOD, WITHOUT_A = "`paper`", "`paper` without A"
 Record = Any  # content of a file of docs/results
 
 
 def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record | None], right_eye: str) -> str:
-    """What of the paper is reproduced, by how much, what is not, and what beats both models.
+    """What of the paper is reproduced, by how much, what is not, and what beats both models; the levels as a table.
 
     right_eye   mean and interval of the gain on the right camera at held-out times as text, or ""
     """
-    known = [clip for clip in CLIPS if contrast(found[clip], WHOLE, "psnr_full") is not None]
-    missing = [clip for clip in CLIPS if clip not in known]
-    parts = [part for clip in known for part in (components(found[clip], clip), level(folder, found[clip], clip))]
+    known = {clip: found[clip] for clip in CLIPS if contrast(found[clip], WHOLE, "psnr_full") is not None}
+    parts = [components(known), reached(known)] if known else []
+    parts += [beaten(folder, clip, record) for clip, record in known.items()]
     parts.append(splits(found, half))
     if right_eye:
         parts.append(f"On the right camera at held-out times (half size) the components change PSNR by {right_eye}.")
     parts.append(truth(read_json(folder / TRUTH, "python docs/make.py effects.truth")))
-    for clip in missing:
-        who = f"On {clip} the published {PUBLISHED[clip]['psnr_full']:.2f} dB is"
-        parts += [beaten(folder, clip, PUBLISHED[clip]["psnr_full"] or 0.0, who)]
-        parts += [f"The ablation on EndoNeRF {clip} is not finished."]
-    return " ".join(part for part in parts if part)
+    parts += [f"The ablation on {clip} is not finished." for clip in CLIPS if clip not in known]
+    return " ".join(part for part in parts if part) + "\n\n" + levels(folder, found)
 
 
-def components(found: Record, clip: str) -> str:
-    """The gain of all three components over the base, and of the step of A."""
-    whole, step = contrast(found, WHOLE, "psnr_full"), contrast(found, STEPS["A"], "psnr_full")
+def components(known: Mapping[str, Record]) -> str:
+    """The gain of all three components over the base, and of the step of A, clip by clip."""
+    wholes = {clip: contrast(record, WHOLE, "psnr_full") for clip, record in known.items()}
+    steps = {clip: contrast(record, STEPS["A"], "psnr_full") for clip, record in known.items()}
     least, most = MATCHED_PSNR
-    text = (
-        f"On EndoNeRF {clip} the three components together raise the PSNR of their base by {whole.mean:.2f} dB "
-        f"({_median(whole)}; published medians {least} to {most} dB)"
-        if whole is not None
-        else ""
+    published = f"(published medians {least} to {most} dB)"
+    text = f"The three components together raise the PSNR of their base by {_by_clip(wholes, '')} {published}"
+    measured = {clip: step for clip, step in steps.items() if step is not None}
+    return f"{text}; the step of A is {_by_clip(measured, '+')} (published +0.29 dB)." if measured else f"{text}."
+
+
+def _by_clip(gains: Mapping[str, Estimate | None], sign: str) -> str:
+    """Gains with the clip of each, and with the number of seeds where that is not the usual one."""
+    texts = []
+    for clip, gain in gains.items():
+        if gain is not None:
+            seeds = f" ({seeds_of(len(gain.values))})" if len(gain.values) < LEAST_PAIRS else ""
+            texts.append(f"{gain.mean:{sign}.2f} dB{seeds} on {clip}")
+    return " and ".join(texts)
+
+
+def interval(record: Record) -> tuple[float, tuple[float, float] | None]:
+    """Mean and interval over the seeds of the PSNR of the whole method, whole image; no interval for one seed."""
+    return student(list(runs_of(record, FULL, "psnr_full").values()))
+
+
+def reached(known: Mapping[str, Record]) -> str:
+    """The level against the published one."""
+    texts = []
+    for clip, record in known.items():
+        _, limits = interval(record)
+        published = PUBLISHED[clip]["psnr_full"] or 0.0
+        if limits is None:
+            texts.append(f"is not decided on {clip}")
+        else:
+            inside = "is exceeded" if limits[0] > published else "lies in the interval"
+            texts.append(f"{'is not reached' if limits[1] < published else inside} on {clip}")
+    return f"The published level {' and '.join(texts)}."
+
+
+def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
+    """Published and reproduced PSNR of the whole image beside the predictions without a model."""
+    rows = []
+    for clip in CLIPS:
+        here, base = ["-" if found[clip] is None else shown([*runs_of(found[clip], name, "psnr_full").values()], 2)
+                      for name in (FULL, "base")]  # fmt: skip
+        of = baselines(folder, clip)
+        predicted = [f"{of[name]:.2f}" if name in of else "-" for name in PREDICTIONS]
+        rows.append([clip, f"{PUBLISHED[clip]['psnr_full']:.2f}", here, base, *predicted])
+    head = ["EndoNeRF", "published", "here", "its base", "blend", "flow", "blend, tissue only", "flow, tissue only"]
+    about = (
+        "PSNR of the whole image in dB, every eighth frame held out. ± is a 95 % interval over the seeds. Blend is the"
+        " mean of the two neighbouring frames; *tissue only* reads no pixel that the masks exclude, as the method does."
     )
-    if step is None:
-        return f"{text}."
-    fewer = whole is not None and len(step.values) < len(whole.values)
-    seeds = f"{seeds_of(len(step.values))}; " if fewer else ""
-    return f"{text}; the step of A is {step.mean:+.2f} dB of it ({seeds}published +0.29 dB)."
-
-
-def _median(whole: Estimate) -> str:
-    """The median, or that there is one seed alone."""
-    count = len(whole.values)
-    return seeds_of(count) if count == 1 else f"median of {seeds_of(count)} {whole.median:.2f} dB"
-
-
-def level(folder: Path, found: Record, clip: str) -> str:
-    """The level against the published one, and the two predictions without a model."""
-    published = PUBLISHED[clip]["psnr_full"] or 0.0
-    values = list(runs_of(found, FULL, "psnr_full").values())
-    mean, limits = student(values)
-    said = f"published level, {published:.2f} dB,"
-    if limits is None:
-        text, half = f"Whether the {said} is reached is not decided: one seed has {mean:.2f} dB.", 0.0
-    else:
-        inside = "is exceeded" if limits[0] > published else "lies in the interval"
-        verdict, half = "is not reached" if limits[1] < published else inside, limits[1] - mean
-        text = f"The {said} {verdict}: {shown(values, 2)} dB."
-    return f"{text} {beaten(folder, clip, mean, 'The reproduction is', half)}".strip()
+    return f"{markdown(head, rows)}\n\n{about}"
 
 
 def baselines(folder: Path, clip: str) -> dict[str, float]:
@@ -95,18 +113,21 @@ def against(level: float, value: float, half: float) -> str:
     return "level with" if abs(level - value) <= half else "below" if level < value else "above"
 
 
-def beaten(folder: Path, clip: str, level: float, who: str, half: float = 0.0) -> str:
-    """How a level, with half the width of its interval, stands to the predictions without a model."""
+def beaten(folder: Path, clip: str, record: Record) -> str:
+    """How the level stands to the predictions without a model."""
     of = baselines(folder, clip)
     if len(of) < len(PREDICTIONS):
         return ""
-    blend, flow, blend_tissue, flow_tissue = (of[name] for name in PREDICTIONS)
-    to_blend, to_flow, to_tissue, to_flow_tissue = (against(level, value, half) for value in of.values())
-    return (
-        f"{who} {to_blend} the mean of the two neighbouring frames ({blend:.2f} dB) and {to_flow} flow ({flow:.2f} "
-        f"dB); if these may read tissue only, as the model does, it is {to_tissue} the mean ({blend_tissue:.2f} dB) "
-        f"and {to_flow_tissue} flow ({flow_tissue:.2f} dB)."
-    )
+    mean, limits = interval(record)
+    half = limits[1] - mean if limits else 0.0
+    stands: dict[str, list[str]] = {}
+    for name, value in zip(NAMES, of.values(), strict=True):
+        stands.setdefault(against(mean, value, half), []).append(name)
+    if len(stands) == 1:
+        return f"On {clip} the reproduction is {next(iter(stands))} all four predictions without a model."
+    texts = [f"{how} {', '.join(names[:-1])} and {names[-1]}" if names[1:] else f"{how} {names[0]}"
+             for how, names in stands.items()]  # fmt: skip
+    return f"On {clip} the reproduction is {', and '.join(texts)}."
 
 
 def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str:
@@ -122,7 +143,7 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
         below += sum(row["psnr_tissue"] for row in rows) / len(rows) < blend
     if not groups:
         return ""
-    return f"The reproduction is below the blend in {below} of the {len(groups)} choices of held-out frames measured."
+    return f"It is below the blend in {below} of the {len(groups)} choices of held-out frames measured."
 
 
 def truth(found: Record) -> str:
