@@ -5,7 +5,8 @@ import pytest
 
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.config import Config, config_from_dict
-from endotsr.results.evaluation.trajectories import displacement, trajectory_error
+from endotsr.results.evaluation import trajectories
+from endotsr.results.evaluation.trajectories import displacement, evenly, trajectory_error
 from endotsr.training.fitting.model import scene_at, spectral_from
 from endotsr.training.runs.model import Model
 from endotsr.training.scene.gaussians import POSITION_CHANNELS
@@ -101,3 +102,22 @@ def test_pixels_without_a_material_point_are_left_out(still, model):
     error = trajectory_error(model, still, true_positions, [0])
     assert error is not None
     assert error.scene_units == pytest.approx(np.linalg.norm(SHIFT) * np.mean([1, 2, 3]))
+
+
+def test_a_long_clip_is_compared_at_a_bounded_number_of_frames(still, model, monkeypatch):
+    """The first and the last frame are among them; the number of pairs does not grow with the square of the frames."""
+    assert evenly(range(63), 64) == list(range(63))
+    chosen = evenly(range(300), 64)
+    assert len(set(chosen)) == 64 and chosen[0] == 0 and chosen[-1] == 299
+    assert max(np.diff(chosen)) - min(np.diff(chosen)) == 1
+    asked = set()
+
+    def true_positions(reference: int, frame: int) -> np.ndarray:
+        asked.add((reference, frame))
+        return on_the_sheet(still, reference)
+
+    monkeypatch.setattr(trajectories, "MOST_REFERENCES", 2)
+    monkeypatch.setattr(trajectories, "MOST_TIMES", 2)
+    monkeypatch.setattr(trajectories, "training_sample", lambda sequence: [0, 1, 2])
+    assert trajectory_error(model, still, true_positions) is not None
+    assert asked == {(0, 0), (0, 3), (2, 0), (2, 2), (2, 3)}

@@ -28,11 +28,13 @@ from endotsr.training.runs.model import Model
 # (reference frame, frame) -> (3, H, W): positions at the second frame of the points visible at the pixels of the first.
 TruePositions = Callable[[int, int], FloatArray]
 
+# Frames that are compared in a long clip: the number of pairs would grow with its square, to 44 * 300 for 300 frames.
+MOST_REFERENCES, MOST_TIMES = 12, 64
 LEAST_OPACITY = 1e-6  # at pixels with a lower opacity the model predicts no motion
 
 
 class TrajectoryError(NamedTuple):
-    """Means over the tissue pixels of the reference frames and over all frames of the sequence."""
+    """Means over the tissue pixels of the reference frames and over the frames that they are compared with."""
 
     scene_units: float  # length of the error
     pixels: float  # length of the error in the picture, px
@@ -64,30 +66,41 @@ def displacement(scene: Scene, moved: Scene, camera: Camera, model: Model) -> Fl
 def trajectory_error(
     model: Model, sequence: Sequence, true_positions: TruePositions, references: Iterable[int] | None = None
 ) -> TrajectoryError | None:
-    """The error of the model's motion from the reference frames to all frames; None without a tissue pixel.
+    """The error of the model's motion from the reference frames to the others; None without a tissue pixel.
 
     true_positions  from the simulator
-    references      frames; default: every sixth training frame
+    references      frames; default: every sixth training frame, `MOST_REFERENCES` of them in a long clip
+
+    The other frames are all frames, or in a long clip `MOST_TIMES` evenly spaced ones with the first and the last.
     """
-    chosen = training_sample(sequence) if references is None else [int(i) for i in references]
+    chosen = evenly(training_sample(sequence), MOST_REFERENCES) if references is None else [int(i) for i in references]
+    times = evenly(range(sequence.count), MOST_TIMES)
 
     def scene_of(frame: int) -> Scene:
         return scene_at(model.gaussians, model.spectral, model.config.model, float(sequence.times[frame]))[0]
 
     scenes = {reference: scene_of(reference) for reference in chosen}
-    moved = [(scenes.get(frame) or scene_of(frame)).position for frame in range(sequence.count)]
+    moved = {frame: (scenes.get(frame) or scene_of(frame)).position for frame in times}
     total, pixels = np.zeros(4), 0
     for reference in chosen:
         positions = true_positions(reference, reference)
         tissue = sequence.masks[reference] & np.isfinite(positions).all(axis=0)  # a wound has no material point
         scene, start, camera = scenes[reference], positions[:, tissue], sequence.cameras[reference]
-        for frame in range(sequence.count):
+        for frame in times:
             if frame != reference:  # sums: the lengths of all pairs of a long clip do not fit in memory
                 moves = displacement(scene, scene._replace(position=moved[frame]), camera, model)[:, tissue]
                 truth = true_positions(reference, frame)[:, tissue]
                 total += _lengths(sequence.cameras[frame], start, moves, truth).sum(axis=1)
                 pixels += start.shape[1]
     return TrajectoryError(*(float(value) for value in total / pixels)) if pixels else None
+
+
+def evenly(frames: Iterable[int], most: int) -> list[int]:
+    """All frames, or `most` evenly spaced ones of them with the first and the last."""
+    every = [int(frame) for frame in frames]
+    if len(every) <= most:
+        return every
+    return [every[k] for k in np.linspace(0, len(every) - 1, most).round().astype(int)]
 
 
 def _lengths(camera: Camera, start: FloatArray, moves: FloatArray, truth: FloatArray) -> FloatArray:
