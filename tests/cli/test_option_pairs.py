@@ -122,15 +122,16 @@ def made(folder: Path) -> dict[str, Path]:
 def prepare_options(folder: Path) -> dict[str, list[str]]:
     """One value of every option of `prepare` that differs from its default, as words."""
     values = {
-        "stereo": ["none"], "camera": list(CAMERA[1:]), "distortion": ["-0.2", "0.05", "0", "0"],
+        "stereo": ["none"], "camera": list(CAMERA[1:]), "field-of-view": ["65"],
+        "distortion": ["-0.2", "0.05", "0", "0"],
         "calibration": [str(folder / "K.txt")], "baseline": ["4"], "trajectory": [str(folder / "poses.txt")],
         "trajectory-direction": ["world_to_camera"], "trajectory-axes": ["opengl"], "trajectory-unit": ["cm"],
         "masks": [str(folder / "mask")], "excluded-value": ["black"], "pairing": ["order"],
         "depth": [str(folder / "depth")],
         "depth-unit": ["um"], "depth-scale": ["0.02"], "trust-depth": [], "points": ["sparse"], "frames": ["0:5"],
         "drop": ["2"], "crop": ["8", "8", "32", "32"], "unite-masks": [str(folder / "more")], "rate": ["12"],
-        "source-rate": ["50"], "orientation": ["stored"], "scale": ["0.5"], "gaps": ["drop"], "pictures": ["jpg"],
-        "also": ["nerfstudio"], "layout": ["auto"],
+        "source-rate": ["50"], "orientation": ["stored"], "scale": ["0.5"], "gaps": ["drop"],
+        "border": ["keep"], "pictures": ["jpg"], "also": ["nerfstudio"], "layout": ["auto"],
         "model": ["sparse/0"], "right": [str(folder / "right.mkv")],
     }  # fmt: skip
     return {name: [f"--{name}", *words] for name, words in values.items()}
@@ -145,9 +146,9 @@ def _names(options: type) -> set[str]:
 
 
 @pytest.mark.parametrize(("source", "stated", "left_out"), [
-    ("pair", "camera", ["calibration"]),
-    ("pair", "calibration", ["camera"]),
-    ("a.mkv", "camera", ["calibration"]),
+    ("pair", "camera", ["calibration", "field-of-view"]),
+    ("pair", "calibration", ["camera", "field-of-view", "distortion"]),
+    ("a.mkv", "field-of-view", ["calibration", "camera"]),
     ("colmap", None, []),
 ])  # fmt: skip
 def test_no_pair_of_options_of_prepare_is_silent(source, stated, left_out, tmp_path):

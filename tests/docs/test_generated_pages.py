@@ -72,6 +72,7 @@ GENERATED = {  # program -> its parts by name
     "recordings.own_pictures": of_record(ways="table"),
     "recordings.pose_readings": of_record("table"),
     "recordings.poses": of_record("table"),
+    "recordings.scope_video": of_record("table"),
     "recordings.show": of_record(sizes="table"),
     "recordings.simulate": of_record(times="table"),
     "recordings.sinus": of_record(rows="table"),

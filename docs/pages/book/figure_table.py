@@ -68,6 +68,8 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "kill.share": Setting("endotsr.training.runs.training:LARGEST_LOSS", scale=100),
     "kill.cost": Setting("endotsr.training.runs.training:LARGEST_FRACTION", scale=100),
     "depth.farther": Setting("endotsr.clips.sequences.depth_outliers:FARTHER", "{:.1f}"),
+    "view.outside": Setting("endotsr.clips.sequences.field_of_view:LEAST_OUTSIDE", scale=100),
+    "view.inside": Setting("endotsr.clips.sequences.field_of_view:LEAST_INSIDE", scale=100),
     "mask.tissue": Setting("endotsr.clips.sequences.masks:LEAST_TISSUE_FRACTION", scale=100),
     "mask.soft": Setting("endotsr.clips.sequences.mask_values:MOST_SOFT_FRACTION", scale=100),
     "mask.missing": Setting("endotsr.clips.sequences.mask_polarity:LEAST_MISSING_FRACTION", scale=100),

@@ -11,6 +11,7 @@ from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.clips.sequences.choices import (
     Axes,
+    Border,
     DepthOfPoints,
     Direction,
     ExcludedValue,
@@ -49,6 +50,8 @@ class PrepareOptions:
     """right view of a pair: a second video, or a folder of pictures"""
     camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
     """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
+    field_of_view: Annotated[float | None, Option("DEGREES")] = None
+    """in place of --camera: the angle from the left to the right border; square pixels, the axis in the centre"""
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
     """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; pictures are undistorted"""
     calibration: Annotated[Path | None, Option("FILE")] = None
@@ -99,6 +102,8 @@ class PrepareOptions:
     """image scale, by area averaging; intrinsics are adapted"""
     gaps: Gaps = "refuse"
     """single frames without mask or pose: drop omits them, fill interpolates"""
+    border: Border = "auto"
+    """dark border that all frames share, outside of the field of view; auto: excluded if the source has no masks"""
     pictures: PictureKind = "png"
     """format of the written pictures"""
     also: tuple[Other, ...] = ()
@@ -119,8 +124,9 @@ def run(words: list[str]) -> int:
 
     _check_options(options, words)
     settings = PrepareSettings(
-        options.frames, options.drop, options.rate, options.scale, options.gaps, options.pictures, options.points
-    )
+        options.frames, options.drop, options.rate, options.scale, options.gaps, options.border, options.pictures,
+        options.points,
+    )  # fmt: skip
     clip = describe(options.source, _stated(options))
     _refuse_two_baselines(options, clip.calibration is not None)
     if options.unite_masks:
@@ -182,8 +188,9 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
     from endotsr.clips.sequences.source_options import SourceOptions
 
     same = (
-        "layout", "stereo", "right", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
-        "excluded_value", "pairing", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation", "model",
+        "layout", "stereo", "right", "field_of_view", "distortion", "calibration", "baseline", "trajectory",
+        "trajectory_unit", "masks", "excluded_value", "pairing", "depth", "depth_unit", "depth_scale", "trust_depth",
+        "orientation", "model",
     )  # fmt: skip
     return SourceOptions(
         **{name: getattr(options, name) for name in same},

@@ -271,7 +271,7 @@ def test_training_refuses_what_has_to_be_prepared(tmp_path):
 
 
 WRONG = {
-    "no intrinsics": (lambda p: None, {}, "intrinsics are unknown; allowed: --camera"),
+    "no intrinsics": (lambda p: None, {}, "intrinsics are unknown; use --camera"),
     "principal point": (lambda p: None, {"camera": (60, 60, 900, 20)}, "principal point"),
     "odd halves": (lambda p: None, {"camera": CAMERA, "stereo": "side_by_side"}, "63x48 pixels: a side_by_side pair"),
     "no mask of these numbers": (lambda p: masks(p, "m90", "m91"), {"camera": CAMERA}, "no file has the number"),

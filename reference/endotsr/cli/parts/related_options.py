@@ -16,8 +16,15 @@ RESIDUALS = ("model.appearance", "model.spectral-motion")
 
 # layout: of the source, stated or detected
 PREPARE = (
-    Excludes(("camera", "distortion"), ("calibration",), "a calibration file states intrinsics and distortion"),
-    Needs(("distortion",), ("camera",), "the coefficients belong to the intrinsics that are stated with them"),
+    Excludes(
+        ("camera", "field-of-view", "distortion"), ("calibration",),
+        "a calibration file states intrinsics and distortion",
+    ),
+    Excludes(("camera",), ("field-of-view",), "both state the focal length"),
+    Needs(
+        ("distortion",), ("camera", "field-of-view"),
+        "the coefficients belong to the intrinsics that are stated with them",
+    ),
     Needs(
         ("trajectory-unit", "trajectory-direction", "trajectory-axes"),
         ("trajectory", *(f"layout={name}" for name in ("stereomis", "tum", "endonerf", "nerfstudio"))),

@@ -14,6 +14,7 @@ from endotsr.method.splatting.camera import CameraPose
 
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
+LEAST_VIEW, MOST_VIEW = 1, 170  # degrees, of `--field-of-view`
 SPREAD = 0.003  # of the focal length and the picture: 1 px at the border of a picture of 640 px
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 # x right, y down, z forward; x right, y up, z backward; x down, y right, z backward. x_opencv = AXES[name] @ x_name.
@@ -44,6 +45,17 @@ class Intrinsics(NamedTuple):
         """The intrinsics of the picture resized to width x height, with aligned picture edges."""
         x, y = width / self.width, height / self.height
         return self._replace(fx=self.fx * x, cx=self.cx * x, fy=self.fy * y, cy=self.cy * y, width=width, height=height)
+
+
+def intrinsics_of_view(degrees: float, width: int, height: int) -> Intrinsics:
+    """Square pixels and a centred principal point: f = (width / 2) / tan(angle / 2), with the horizontal angle.
+
+    Raises:  InputError for an angle outside 1 to 170 degrees; a picture of a pinhole camera has no 180.
+    """
+    if not LEAST_VIEW <= degrees <= MOST_VIEW:
+        raise InputError(f"--field-of-view {degrees:g}: use the horizontal angle, {LEAST_VIEW} to {MOST_VIEW} degrees")
+    focal = width / 2 / np.tan(np.radians(degrees) / 2)
+    return Intrinsics(focal, focal, width / 2, height / 2, width, height)
 
 
 class StereoCalibration(NamedTuple):

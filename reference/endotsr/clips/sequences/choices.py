@@ -13,5 +13,6 @@ Align = Literal["auto", "frame", "sequence"]  # of a relative depth
 DepthOfPoints = Literal["interpolated", "sparse", "none"]  # of a reconstruction
 Orientation = Literal["turned", "stored"]  # of a video that states a rotation
 Gaps = Literal["refuse", "drop", "fill"]  # frames without mask or pose where others have one
+Border = Literal["auto", "exclude", "keep"]  # outside of the field of view, dark in all frames
 PictureKind = Literal["png", "jpg"]  # of a prepared clip
 Other = Literal["nerfstudio", "colmap"]  # programs for which a prepared clip has further files

@@ -173,7 +173,7 @@ def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Cli
     """
     intrinsics = clip.intrinsics or (clip.calibration.left if clip.calibration else None)
     if intrinsics is None:
-        raise InputError(f"{clip.where}: the intrinsics are unknown; allowed: --camera or --calibration")
+        raise InputError(f"{clip.where}: the intrinsics are unknown; use --camera, --calibration or --field-of-view")
     frames = [clip.where / f"{name}.png" for name in clip.names]
     more = [
         stated_masks(replace(options, masks=folder), frames, intrinsics.width, intrinsics.height, clip.source_names)

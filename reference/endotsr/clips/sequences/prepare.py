@@ -20,19 +20,19 @@ from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.written import WrittenFrames
-from endotsr.clips.sequences.choices import DepthOfPoints, Gaps, PictureKind
+from endotsr.clips.sequences.choices import Border, DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.points import depth_from_points
+from endotsr.clips.sequences.prepared_masks import mask_entry, write_mask
 from endotsr.clips.sequences.sequence_file import (
     DEPTH,
     FILE_NAME,
     FORMAT,
     IMAGES,
-    MASKS,
     RIGHT,
     CameraEntry,
     DepthEntry,
@@ -61,6 +61,7 @@ class PrepareSettings:
     rate: float | None = None  # frames per second to keep
     scale: float = 1.0
     gaps: Gaps = "refuse"  # frames without mask or pose where others have one
+    border: Border = "auto"  # outside of the field of view; auto: excluded if the clip has no masks
     pictures: PictureKind = "png"
     points: DepthOfPoints = "interpolated"
 
@@ -84,6 +85,8 @@ def prepare(
     chosen = thinned(clip, frames, settings.rate, notes)
     chosen, poses = _poses_and_masks(clip, chosen, settings.gaps, notes)
     refuse_no_lengths(clip, chosen)
+    if not chosen:
+        raise InputError(f"{clip.where}: no frame is left")
     with new_folder(Path(out), FILE_NAME if replace else "") as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
@@ -136,8 +139,6 @@ def _write_frames(
     notes: list[str],
     on_frame: OnFrame,
 ) -> SequenceFile:
-    if not chosen:
-        raise InputError(f"{clip.where}: no frame is left")
     straight: Straightener | None = None
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
@@ -154,7 +155,7 @@ def _write_frames(
         _write_pictures(folder, k, new, settings.pictures)
         tissue = None if clip.masks is None else straight.mask(_mask_or_nearest(clip, i, chosen))
         if tissue is not None:
-            _write_mask(folder, k, tissue)
+            write_mask(folder, k, tissue)
         depth = _depth(clip, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
         if depth is not None and depth.any():
             depth_scale = depth_scale or step_of_depth(float(np.percentile(depth[depth > 0], LARGEST)))
@@ -168,13 +169,14 @@ def _write_frames(
     notes += notes_of(
         frame_findings(facts, str(clip.where)) + intrinsics_findings(straight.intrinsics, str(clip.where))
     )
-    notes += seen.notes(clip)
+    notes += seen.notes(clip, settings.border)
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
         notes.append(f"{saturated} pixels are clipped at {65535 * depth_scale:g}, eight times the usual depth")
+    masks = mask_entry(clip, folder, len(chosen), seen, settings.border, notes)
     turned = [straight.pose(pose) for pose in poses] if poses else None
-    return _file_of(clip, straight, turned, chosen, depth_scale, settings, notes)
+    return _file_of(clip, straight, turned, chosen, masks, depth_scale, settings, notes)
 
 
 def _checked(clip: Clip, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
@@ -226,11 +228,6 @@ def _write_pictures(folder: Path, k: int, pair: PicturePair, ending: str) -> Non
             write_png(path, picture) if ending == "png" else write_jpeg(path, picture)
 
 
-def _write_mask(folder: Path, k: int, mask: NDArray[np.bool_]) -> None:
-    (folder / MASKS).mkdir(exist_ok=True)
-    write_png(folder / MASKS / f"{k:06d}.png", np.where(mask, 0, 255).astype(np.uint8))
-
-
 def _write_no_depth(folder: Path, k: int, size: Intrinsics) -> None:
     write_levels(_depth_file(folder, k), np.zeros((size.height, size.width), np.float32), 1.0)
 
@@ -245,6 +242,7 @@ def _file_of(
     straight: Straightener,
     poses: list[CameraPose] | None,
     chosen: list[int],
+    masks: MaskEntry | None,
     depth_scale: float,
     settings: PrepareSettings,
     notes: list[str],
@@ -266,7 +264,7 @@ def _file_of(
         frame_rate=rate,
         times=times,
         source_names=_source_names(clip, chosen),
-        masks=MaskEntry(proposed=clip.masks.proposed, origin=clip.masks.origin) if clip.masks is not None else None,
+        masks=masks,
         depth=entry if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )

@@ -10,8 +10,8 @@ region is an instrument if it is large and enters from the border of the picture
 surrounding tissue, or if it overlaps an instrument of the previous or next frame. Other regions, such as highlights,
 remain tissue. Tissue-coloured and blood-covered instruments are not found.
 
-A scope shows tissue in a round or truncated field of view, and the border outside it is dark in all frames. That border
-is found first, from all frames together. It is excluded in every frame and from the search.
+The dark border outside the field of view (`field_of_view`) is found first, from all frames together. It is excluded in
+every frame and from the search.
 
 In: the pictures of a clip. Out: a `Proposal`, or the reason why there is none. A person has to inspect it.
 """
@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import area_resize, dense_flow
+from endotsr.clips.opencv import dense_flow
 from endotsr.clips.sequences.clip import Picture
+from endotsr.clips.sequences.field_of_view import DARK, outside_of_view, reduced
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
-WORKING = 320  # px, longer side of the working pictures
 FLOOR = 12.0  # grey levels: the redness of a black pixel is noise
 SEED, GROW = 0.12, 0.4  # of the usual redness
 LEAST_REDNESS = 0.05  # usual redness of a clip; below it, metal is not distinguishable
@@ -37,9 +37,6 @@ CLOSING, MARGIN = 0.012, 0.02  # of the longer side: closed gaps, and margin add
 RING = 0.05  # of the longer side: ring around a region whose motion counts as tissue motion
 UNLIKE = 1.5  # px at the working size: motion relative to the tissue
 OVERLAP = 0.5  # fraction of a region that overlaps the instruments of a neighbouring frame
-DARK = 20.0  # grey levels: pixels that are never brighter are outside the field of view
-LEAST_OUTSIDE, LEAST_INSIDE = 0.01, 0.05  # of the picture: smallest border and smallest field of view
-SOFT_EDGE = 2  # px at the working size: the blurred edge of the field of view, which is excluded
 LITTLE_TISSUE = 0.05  # of the field of view; a frame with less has almost no tissue
 
 
@@ -76,7 +73,7 @@ def propose_masks(pictures: Iterable[Picture]) -> Proposal:
     small, sizes = [], []
     for picture in pictures:
         sizes.append(picture.shape[:2])
-        small.append(_reduced(picture))
+        small.append(reduced(picture))
     if not small:
         return Proposal([], "there are no pictures")
     outside = outside_of_view(small)
@@ -97,37 +94,6 @@ def _without_tissue(excluded: list[BoolArray], view: float) -> tuple[int, ...]:
     return tuple(i for i, plane in enumerate(excluded) if 1 - plane.mean() < LITTLE_TISSUE * view)
 
 
-def outside_of_view(pictures: list[Picture]) -> BoolArray:
-    """(h, w) True outside the field of view: dark in all pictures and connected to the border.
-
-    Bright areas out there, such as text, are also outside: the field of view is one region without holes.
-
-    Edges:  pictures of several sizes, almost no border or almost no field of view: False everywhere.
-    """
-    from scipy import ndimage
-
-    shape = pictures[0].shape[:2]
-    nowhere = np.zeros(shape, bool)
-    if any(picture.shape[:2] != shape for picture in pictures):
-        return nowhere
-    brightest = np.max([ndimage.gaussian_filter(p.max(axis=2).astype(np.float32), 1.0) for p in pictures], axis=0)
-    ring = np.ones((shape[0] + 2, shape[1] + 2), bool)
-    ring[1:-1, 1:-1] = brightest < DARK
-    joined = np.asarray(ndimage.binary_propagation(np.pad(nowhere, 1, constant_values=True), mask=ring), bool)[
-        1:-1, 1:-1
-    ]
-    labels: Any
-    labels, count = ndimage.label(ndimage.binary_opening(~joined, iterations=2))  # pyright: ignore[reportGeneralTypeIssues]
-    if not count:
-        return nowhere
-    largest = labels == 1 + int(np.bincount(labels.ravel())[1:].argmax())
-    beyond = ~np.asarray(ndimage.binary_fill_holes(largest), bool)
-    outside = np.asarray(ndimage.binary_dilation(beyond, iterations=SOFT_EDGE), bool)
-    if not LEAST_OUTSIDE <= joined.mean() or 1 - outside.mean() < LEAST_INSIDE:
-        return nowhere
-    return outside
-
-
 def _instruments(small: list[Picture], outside: BoolArray) -> tuple[list[BoolArray], str]:
     """The instruments of every picture, empty if there are none, and the reason. Only the field of view is searched."""
     redness = [_redness(picture) for picture in small]
@@ -144,12 +110,6 @@ def _instruments(small: list[Picture], outside: BoolArray) -> tuple[list[BoolArr
     if not frames:
         return [], "no grey region enters from the border or moves relative to the tissue"
     return chosen, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}"
-
-
-def _reduced(picture: Picture) -> Picture:
-    height, width = picture.shape[:2]
-    factor = min(1.0, WORKING / max(height, width))
-    return area_resize(picture, max(1, round(width * factor)), max(1, round(height * factor)))
 
 
 def _redness(picture: Picture) -> FloatArray:

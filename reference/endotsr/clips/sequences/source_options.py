@@ -23,6 +23,7 @@ class SourceOptions:
     layout: str = "auto"
     stereo: StatedStereo = "auto"
     camera: tuple[float, ...] | None = None  # fx fy cx cy, pixel edges at integers
+    field_of_view: float | None = None  # horizontal, degrees, in place of `camera`
     distortion: tuple[float, ...] = ()
     calibration: Path | None = None  # a file in one of `calibration_formats.FORMATS`
     right: Path | None = None  # right view: a video, or a folder of pictures

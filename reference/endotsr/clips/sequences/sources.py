@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import stretched
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
-from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, scene_factor
+from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, intrinsics_of_view, scene_factor
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.depth_stacks import stack_planes
@@ -199,18 +199,23 @@ def with_stated(clip: Clip, options: SourceOptions) -> Clip:
 
 
 def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> StatedCamera:
-    """What `--camera`, `--calibration` and `--baseline` state for pictures of this size.
+    """What `--camera`, `--field-of-view`, `--calibration` and `--baseline` state for pictures of this size.
 
     Raises:  InputError for a calibration of another aspect ratio; proportional sizes are scaled.
     """
     if options.calibration is not None:
         found = calibrated(options.calibration, width, height)
         return found._replace(baseline=options.baseline or found.baseline)
-    if options.camera is None:
+    notes = ()
+    if options.camera is not None:
+        stated = Intrinsics(*options.camera, width, height)
+    elif options.field_of_view is not None:
+        stated = intrinsics_of_view(options.field_of_view, width, height)
+        notes = (f"{options.field_of_view:g} degrees from left to right: focal length {stated.fx:.1f} px, centred",)
+    else:
         return StatedCamera(baseline=options.baseline)
-    fx, fy, cx, cy = options.camera
-    stated = checked_intrinsics(Intrinsics(fx, fy, cx, cy, width, height, options.distortion), where)
-    return StatedCamera(stated, baseline=options.baseline)
+    stated = checked_intrinsics(stated._replace(distortion=options.distortion), where)
+    return StatedCamera(stated, baseline=options.baseline, notes=notes)
 
 
 def stated_poses(

@@ -82,7 +82,8 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     intrinsics = clip.intrinsics
     if intrinsics is None:
         raise InputError(
-            f"{clip.where}: the intrinsics are unknown; allowed: --camera FX FY CX CY in pixels, or --calibration FILE"
+            f"{clip.where}: the intrinsics are unknown; use --camera FX FY CX CY in pixels, --calibration FILE, or"
+            " --field-of-view DEGREES, the angle from the left to the right border"
         )
     if (intrinsics.width, intrinsics.height) != (width, height):
         raise InputError(

@@ -37,15 +37,23 @@ class DarkBorder:
             return []
         dark = self.brightest <= DARK
         border = _from_the_edges(dark) & self.tissue
-        share = float(border.mean())
-        if share < LEAST or dark.all():
+        fraction = float(border.mean())
+        if fraction < LEAST or dark.all():
             return []
+        what = f"{fraction:.1%} of the pixels are dark in every frame, from the edge inwards, and count as tissue"
+        return [finding("dark-border", where, what + self.bars)]
+
+    @property
+    def bars(self) -> str:
+        """Which crop removes whole rows and columns that are dark in every frame, as the end of a sentence; or ""."""
+        if self.brightest is None:
+            return ""
+        dark = self.brightest <= DARK
         rows, columns = (np.flatnonzero(~dark.all(axis=axis)) for axis in (1, 0))
+        if not rows.size or rows.size * columns.size == dark.size:
+            return ""
         (x, right), (y, bottom) = ((STEP * int(part[0]), STEP * int(part[-1] + 1)) for part in (columns, rows))
-        cut = rows.size * columns.size < dark.size
-        bars = f"; --crop {x} {y} {right - x} {bottom - y} keeps the rest" if cut else ""
-        what = f"{share:.1%} of the pixels are dark in every frame, from the edge inwards, and count as tissue{bars}"
-        return [finding("dark-border", where, what)]
+        return f"; --crop {x} {y} {right - x} {bottom - y} keeps the rest"
 
 
 def _from_the_edges(dark: BoolArray) -> BoolArray:

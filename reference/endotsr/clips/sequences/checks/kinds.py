@@ -49,7 +49,7 @@ KINDS: dict[str, Kind] = {
     "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does",
                                 "prepare the video itself, or deinterlace it before exporting pictures"),
     "dark-border": Kind("warning", "training fits black tissue there",
-                        "crop the clip (endotsr prepare --crop), or exclude the border (endotsr masks)"),
+                        "crop the clip (endotsr prepare --crop), or exclude the border (--border exclude)"),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
     "duplicated-frame": Kind("warning", "the motion stops there, and training leaves out a frame that a held-out"
                              " frame repeats", LEAVE_OUT),

@@ -45,14 +45,14 @@ class MaskEvidence:
         evidence = self.evidence
         if evidence is None or not evidence.against:
             return []
-        share, other = float(self.pixels[0] / self.pixels.sum()), OTHER[excluded_value]
+        fraction, other = float(self.pixels[0] / self.pixels.sum()), OTHER[excluded_value]
         what = (
-            f"with {excluded_value} = excluded, {share:.1%} of the pixels are tissue, and {evidence.said}; with {other}"
-            f" = excluded ({OPTION} {other}), {1 - share:.1%} would be"
+            f"with {excluded_value} = excluded, {fraction:.1%} of the pixels are tissue, and {evidence.said}; with"
+            f" {other} = excluded ({OPTION} {other}), {1 - fraction:.1%} would be"
         )
         return [finding("inverted-masks", where, what)]
 
     def note(self, excluded_value: str) -> str:
         """The tissue share in words, with the evidence."""
-        evidence, share = self.evidence, f"{self.pixels[0] / self.pixels.sum():.1%} of the pixels are tissue"
-        return f"masks: {excluded_value} = excluded: {share}" + (f"; {evidence.said}" if evidence else "")
+        evidence, tissue = self.evidence, f"{self.pixels[0] / self.pixels.sum():.1%} of the pixels are tissue"
+        return f"masks: {excluded_value} = excluded: {tissue}" + (f"; {evidence.said}" if evidence else "")

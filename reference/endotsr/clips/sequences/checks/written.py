@@ -6,7 +6,9 @@ from numpy.typing import NDArray
 from endotsr.clips.sequences.checks.dark_border import DarkBorder
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
+from endotsr.clips.sequences.choices import Border
 from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.method.kernels.arrays import BoolArray
 
 NEAR = 10.0  # mm; endoscopes work nearer, and depth in centimetres looks like it
@@ -16,23 +18,28 @@ class WrittenFrames:
     """Sums over the frames of a clip, one after another."""
 
     def __init__(self) -> None:
-        self.masks, self.border, self.medians = MaskEvidence(), DarkBorder(), []
+        self.masks, self.border, self.view, self.medians = MaskEvidence(), DarkBorder(), FieldOfView(), []
 
     def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
         """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
         self.border.add(picture, tissue)
+        self.view.add(picture)
         if tissue is not None:
             self.masks.add(picture, tissue, depth)
         if depth is not None and depth.any():
             self.medians.append(float(np.median(depth[depth > 0])))
 
-    def notes(self, clip: Clip) -> list[str]:
-        """Sentences on the frames of this clip, warnings where they contradict what was stated."""
+    def notes(self, clip: Clip, border: Border) -> list[str]:
+        """Sentences on the frames of this clip, warnings where they contradict what was stated.
+
+        border   what happens with a dark border; a warning only where the masks of the clip are kept as they are
+        """
         where, notes = str(clip.where), []
         if clip.masks is not None:
             excluded = clip.masks.excluded_value
             notes += notes_of(self.masks.findings(where, excluded)) or [self.masks.note(excluded)]
-        return notes + notes_of(self.border.findings(where)) + self._depth_notes(clip)
+            notes += notes_of(self.border.findings(where)) if border == "auto" else []
+        return notes + self._depth_notes(clip)
 
     def _depth_notes(self, clip: Clip) -> list[str]:
         if clip.depth is None or clip.depth.stated is None or clip.arbitrary or not self.medians:

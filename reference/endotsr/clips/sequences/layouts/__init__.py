@@ -25,7 +25,8 @@ from endotsr.untrusted.names import plain_line
 
 # Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (
-    "stereo", "camera", "distortion", "calibration", "baseline", "trajectory", "masks", "depth", "orientation",
+    "stereo", "camera", "field_of_view", "distortion", "calibration", "baseline", "trajectory", "masks", "depth",
+    "orientation",
 )  # fmt: skip
 NOTHING = SourceOptions()
 
@@ -124,8 +125,9 @@ def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
     """Raises InputError for a statement that this layout does not read."""
     for name in STATEMENTS:
         if getattr(options, name) != getattr(NOTHING, name) and name not in layout.takes:
-            taken = ", ".join(f"--{word}" for word in layout.takes) or "none of these"
-            raise InputError(f"{path}: the layout {layout.name} does not read --{name}; allowed: {taken}")
+            given, *taken = (f"--{word.replace('_', '-')}" for word in (name, *layout.takes))
+            allowed = ", ".join(taken) or "none of these"
+            raise InputError(f"{path}: the layout {layout.name} does not read {given}; allowed: {allowed}")
 
 
 def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
