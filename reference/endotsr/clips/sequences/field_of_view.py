@@ -63,7 +63,7 @@ def brightness(picture: Picture) -> NDArray[np.float32]:
     """(h, w) the brightest channel in grey levels, smoothed with a standard deviation of 1 px."""
     from scipy.ndimage import gaussian_filter
 
-    return gaussian_filter(picture.max(axis=2).astype(np.float32), 1.0)
+    return np.asarray(gaussian_filter(picture.max(axis=2).astype(np.float32), 1.0), np.float32)
 
 
 def outside_of_view(pictures: Iterable[Picture]) -> BoolArray:

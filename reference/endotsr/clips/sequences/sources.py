@@ -208,7 +208,8 @@ def stated_camera(options: SourceOptions, width: int, height: int, where: object
         return found._replace(baseline=options.baseline or found.baseline)
     notes = ()
     if options.camera is not None:
-        stated = Intrinsics(*options.camera, width, height)
+        fx, fy, cx, cy = options.camera
+        stated = Intrinsics(fx, fy, cx, cy, width, height)
     elif options.field_of_view is not None:
         stated = intrinsics_of_view(options.field_of_view, width, height)
         notes = (f"{options.field_of_view:g} degrees from left to right: focal length {stated.fx:.1f} px, centred",)
