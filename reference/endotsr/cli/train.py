@@ -237,12 +237,15 @@ def _progress(folder: RunFolder, sequence: "Sequence", config: Config, options: 
 
     from endotsr.cli.parts.waiting import waiting_line
     from endotsr.clips.sequences.checks.duration import TimedCommand, frames_of
+    from endotsr.clips.sequences.files import has_truth
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before
     from endotsr.training.runs.speed import remembered_unit
 
     frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
+    if has_truth(Path(sequence.source)):
+        frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived)
     print(waiting_line(plan, remembered_unit(threads), done_before(config).exists()))

@@ -12,6 +12,7 @@ from endotsr.untrusted.files import open_regular
 from endotsr.untrusted.names import file_name
 from endotsr.untrusted.png import LARGEST_FILE
 
+TRUTH = "truth"  # folder of a simulated sequence
 ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, and no other PNG files"
 
 
@@ -189,3 +190,8 @@ def _first_repeated(files: list[Path], numbers: list[tuple[int, ...]]) -> str:
             return f"{seen[number].name} and {file.name}"
         seen[number] = file
     return ""
+
+
+def has_truth(folder: Path) -> bool:
+    """Whether a sequence folder contains the truth of a simulated scene."""
+    return (Path(folder) / TRUTH / "truth.json").is_file()

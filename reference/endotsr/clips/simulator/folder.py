@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from endotsr.clips.sequences.files import TRUTH
 from endotsr.clips.sequences.poses import POSE_FILES, rows_from_cameras
 from endotsr.clips.sequences.splits import split_frames
 from endotsr.clips.simulator.cameras import camera_centres
@@ -23,7 +24,7 @@ from endotsr.clips.simulator.frames import SimulatedFrame, SimulatedScene, make_
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.shading import lit_by_all, shade
 from endotsr.clips.simulator.trajectories import empty_tracks, follow
-from endotsr.clips.simulator.truth import TRUTH, write_frame, write_scene
+from endotsr.clips.simulator.truth import write_frame, write_scene
 from endotsr.clips.simulator.views import see_rays, view_of_points
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray

@@ -11,18 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.sequences.files import has_truth
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.simulator.surface import Surface, make_surface, surface_point
-from endotsr.clips.simulator.truth import TRUTH, SceneTruth, read_truth
+from endotsr.clips.simulator.truth import SceneTruth, read_truth
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 
 TOLERANCE = 1e-6  # mm, between the tracks in the file and the formula; both are float64
-
-
-def has_truth(folder: Path) -> bool:
-    """Whether a sequence folder contains the truth of a simulated scene."""
-    return (Path(folder) / TRUTH / "truth.json").is_file()
 
 
 def check_truth(folder: Path) -> tuple[SceneTruth, Surface]:

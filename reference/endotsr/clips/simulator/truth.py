@@ -21,6 +21,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.files import TRUTH
 from endotsr.clips.simulator.frames import SimulatedFrame, SimulatedScene
 from endotsr.clips.simulator.gain import GainSpectrum, gain_series, gain_spectrum
 from endotsr.clips.simulator.scenes import effects_on
@@ -33,7 +34,6 @@ from endotsr.untrusted.json import read_json
 from endotsr.untrusted.names import shown
 from endotsr.untrusted.sections import checked
 
-TRUTH = "truth"
 FORMAT = 1
 LARGEST_FILE = 1 << 31  # bytes, of the arrays together as well
 MAY_BE_NAN = ("pixel", "position", "material")

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.clips.sequences.checks.duration import MOST_REFERENCES, MOST_TIMES
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.constants import Y00
@@ -28,8 +29,6 @@ from endotsr.training.runs.model import Model
 # (reference frame, frame) -> (3, H, W): positions at the second frame of the points visible at the pixels of the first.
 TruePositions = Callable[[int, int], FloatArray]
 
-# Frames that are compared in a long clip: the number of pairs would grow with its square, to 44 * 300 for 300 frames.
-MOST_REFERENCES, MOST_TIMES = 12, 64
 LEAST_OPACITY = 1e-6  # at pixels with a lower opacity the model predicts no motion
 
 

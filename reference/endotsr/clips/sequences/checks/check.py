@@ -39,6 +39,7 @@ from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
+from endotsr.clips.sequences.files import has_truth
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_masks
@@ -310,7 +311,8 @@ def _of_length(clip: Clip, config: Config, run: _Pass) -> tuple[Config, Frames]:
 
     def split() -> Frames:
         chosen = parse_frame_range(config.sequence.frames, len(clip.images))
-        return frames_of(*split_frames(len(chosen), config.sequence.split, config.sequence.block_length))
+        found = frames_of(*split_frames(len(chosen), config.sequence.split, config.sequence.block_length))
+        return found.with_true_motion() if has_truth(clip.where) else found
 
     frames = run.tried(split, "frames", clip.where)
     if frames is None:

@@ -40,6 +40,9 @@ MEASURED, PERCEIVED = 1.2, 2.7  # units per picture for its metrics, and for LPI
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
 PAGES = 80.0  # units for the viewer, the report and the renders
 EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
+# Frames whose motion is compared with a known truth: all pairs of a clip of 300 frames would take half an hour.
+MOST_REFERENCES, MOST_TIMES = 12, 64
+COMPARED = 1.6  # units per pair of them
 COMPILATION = 30.0  # seconds for the kernels of a training, once per machine
 
 
@@ -121,11 +124,17 @@ class Frames(NamedTuple):
     training: int
     held_out: int
     times: int  # of targets between the training frames
+    compared: int = 0  # pairs of frames between which the true motion is known
 
     @property
     def gaps(self) -> int:
         """Number of pairs of consecutive training frames."""
         return max(0, self.training - 1)
+
+    def with_true_motion(self) -> "Frames":
+        """The numbers for a simulated clip, whose motion is compared with the truth."""
+        references = min(-(-self.training // EVERY_TRAINING_FRAME), MOST_REFERENCES)
+        return self._replace(compared=references * (min(self.total, MOST_TIMES) - 1))
 
 
 class Speed(NamedTuple):
@@ -191,7 +200,7 @@ def estimated_seconds(plan: TimedCommand, unit: float = SECONDS) -> PartSeconds:
     sizes = 1.25 if config.training.coarse_start else 1.0
     targets = sizes * gap_units(frames) * frames.gaps * visited(config, frames.gaps, config.training.iterations)
     pictures = frames.held_out * METHODS * (MEASURED + PERCEIVED * bool(plan.perceived))
-    pictures += MEASURED * frames.training / EVERY_TRAINING_FRAME
+    pictures += MEASURED * frames.training / EVERY_TRAINING_FRAME + COMPARED * frames.compared
     return PartSeconds(
         alone * size * READ * frames.total,
         alone * size * tracked * frames.training,
