@@ -119,7 +119,7 @@ def test_outputs_of_an_earlier_port_are_not_judged(tmp_path, capsys):
     assert run([*words, reference]) == 0 and "level 0, float32" in capsys.readouterr().out
     assert run([*words, f"{sys.executable} -c 0 {{requests}} {{outputs}}"]) == 1
     said = capsys.readouterr().out
-    assert said.endswith("no level is complete\n") and " 0 of 10 outputs" in said
+    assert said.endswith("no level is complete\n") and " 0 of 18 outputs" in said
     assert not list((tmp_path / "kept" / "outputs").iterdir())
 
 
@@ -130,7 +130,7 @@ def test_a_port_that_answers_and_then_fails_has_no_claim(tmp_path, capsys):
     report = tmp_path / "report.json"
     assert run(["run", "--level", "0", "--port", port, "--json", str(report)]) == 1
     said = capsys.readouterr().out
-    assert "10 of 10 outputs" in said and said.endswith("no claim: the port ended with code 3\n")
+    assert "18 of 18 outputs" in said and said.endswith("no claim: the port ended with code 3\n")
     assert json.loads(report.read_text())["level"] == -1
 
 
