@@ -14,10 +14,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, start, train_words
+from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, scene, start, train_words
 
 from endotsr.cli.main import main
-from endotsr.cli.parts import progress
+from endotsr.cli.parts import progress, waiting
 from endotsr.config import load_config
 from endotsr.training.fitting import state as training_state
 from endotsr.training.fitting import trainer
@@ -95,6 +95,19 @@ def test_equal_settings_give_equal_runs_for_any_number_of_threads(finished_run, 
 def test_another_seed_gives_another_run(finished_run, tmp_path):
     assert main(train_only(tmp_path / "run", "--seed", "1", "--iterations", "3")) == 0
     assert log_without_seconds(tmp_path / "run")[0] != log_without_seconds(finished_run)[0]
+
+
+def test_the_forecast_knows_whether_a_clip_has_a_true_motion(tmp_path, monkeypatch):
+    """The folder of `scene` holds its truth; without it the same clip is like any other."""
+    plans = []
+    monkeypatch.setattr(waiting, "waiting_line", lambda plan, *_: plans.append(plan) or "")
+    shutil.copytree(scene(), tmp_path / "clip")
+    for name in ("known", "unknown"):
+        assert (
+            main(train_words(tmp_path / name, "--no-evaluate", "--iterations", "2", source=str(tmp_path / "clip"))) == 0
+        )
+        shutil.rmtree(tmp_path / "clip" / "truth", ignore_errors=True)
+    assert [plan.frames.compared for plan in plans] == [2 * 8, 0]
 
 
 @pytest.mark.parametrize("at", [3, 17])

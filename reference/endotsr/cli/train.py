@@ -185,7 +185,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     _print_sequence(source, sequence)
     for line in lines:
         print(line)
-    shown = _progress(RunFolder(options.out), sequence, config, options)
+    shown = _progress(RunFolder(options.out), source, sequence, config, options)
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads)
     folder = train_new_run(options.out, {**record, **found}, sequence, config, shown)
     shown.remember_speed()
@@ -227,11 +227,11 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     if asked.training.iterations > kept.training.iterations:
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
-    resume_run(folder, sequence, threads, _progress(folder, sequence, folder.config(), options))
+    resume_run(folder, sequence, threads, _progress(folder, source, sequence, folder.config(), options))
     return folder, sequence
 
 
-def _progress(folder: RunFolder, sequence: "Sequence", config: Config, options: TrainOptions) -> Progress:
+def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Config, options: TrainOptions) -> Progress:
     """The progress of a training, on standard error and as a page in its folder; prints what the command will take."""
     import numba
 
@@ -241,10 +241,11 @@ def _progress(folder: RunFolder, sequence: "Sequence", config: Config, options: 
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before
+    from endotsr.training.runs.sources import SIMULATED
     from endotsr.training.runs.speed import remembered_unit
 
     frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
-    if has_truth(Path(sequence.source)):
+    if source == SIMULATED or has_truth(Path(source)):
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived)
