@@ -19,6 +19,7 @@ from typing import Any
 from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.film_file import write_video
+from endotsr.clips.sequences.sequence_file import read_sequence_file
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import machine
@@ -55,9 +56,9 @@ def measured(key: str, runs: dict[str, tuple[int, int]], data: Path) -> dict[str
         said("poses", clip, "--sfm")
         said("train", clip, "--preset", "quick", "--out", run, "--seed", seed)
         metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
-        origin = next(line for line in (clip / "sequence.toml").read_text().splitlines() if "field of view" in line)
+        masks = read_sequence_file(clip).masks
     found = {name: metrics["baselines"][name]["mean"]["psnr_tissue"] for name in BASELINES}
-    return {"psnr": metrics["held_out"]["mean"]["psnr_tissue"], "origin": origin.partition('"')[2].strip('"'), **found}
+    return {"psnr": metrics["held_out"]["mean"]["psnr_tissue"], "origin": masks.origin if masks else "", **found}
 
 
 def plan(seeds: int) -> dict[str, tuple[int, int]]:

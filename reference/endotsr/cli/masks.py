@@ -119,5 +119,5 @@ def carrying_command(source: Path) -> str:
     """
     from endotsr.clips.sequences.sequence_file import FILE_NAME
 
-    place = "--replace" if (source / FILE_NAME).is_file() else f"--out {shlex.quote(f'{source.stem}_masks')} --replace"
-    return f"endotsr masks {shlex.quote(str(source))} --keys keys.json {place}"
+    place = "" if (source / FILE_NAME).is_file() else f"--out {shlex.quote(f'{source.stem}_masks')} "
+    return f"endotsr masks {shlex.quote(str(source))} --keys keys.json {place}--replace"

@@ -47,6 +47,11 @@ class Intrinsics(NamedTuple):
         return self._replace(fx=self.fx * x, cx=self.cx * x, fy=self.fy * y, cy=self.cy * y, width=width, height=height)
 
 
+def focal_length(angle: float, side: int) -> float:
+    """Focal length in pixels of a view with this angle, radians, across `side` pixels."""
+    return side / 2 / np.tan(angle / 2)
+
+
 def intrinsics_of_view(degrees: float, width: int, height: int) -> Intrinsics:
     """Square pixels and a centred principal point: f = (width / 2) / tan(angle / 2), with the horizontal angle.
 
@@ -54,7 +59,7 @@ def intrinsics_of_view(degrees: float, width: int, height: int) -> Intrinsics:
     """
     if not LEAST_VIEW <= degrees <= MOST_VIEW:
         raise InputError(f"--field-of-view {degrees:g}: use the horizontal angle, {LEAST_VIEW} to {MOST_VIEW} degrees")
-    focal = width / 2 / np.tan(np.radians(degrees) / 2)
+    focal = focal_length(np.radians(degrees), width)
     return Intrinsics(focal, focal, width / 2, height / 2, width, height)
 
 

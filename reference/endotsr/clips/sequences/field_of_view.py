@@ -6,7 +6,6 @@ where it is when the scope moves. A model that takes it for tissue learns a bord
 In: the pictures of a clip, one at a time. Out: the border as a mask.
 """
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -66,12 +65,13 @@ def brightness(picture: Picture) -> NDArray[np.float32]:
     return np.asarray(gaussian_filter(picture.max(axis=2).astype(np.float32), 1.0), np.float32)
 
 
-def outside_of_view(pictures: Iterable[Picture]) -> BoolArray:
-    """(h, w) True outside the field of view of pictures of one size. Pictures of several sizes: False everywhere."""
-    found = [brightness(picture) for picture in pictures]
-    if any(plane.shape != found[0].shape for plane in found):
-        return np.zeros(found[0].shape, bool)
-    return outside_of(np.max(found, axis=0))
+def outside_of_view(pictures: list[Picture]) -> BoolArray:
+    """(H, W) True outside the field of view of pictures of one size. Pictures of several sizes: False everywhere."""
+    view = FieldOfView()
+    for picture in pictures:
+        view.add(picture)
+    found = view.outside()
+    return np.zeros(pictures[0].shape[:2], bool) if found is None else found
 
 
 def outside_of(brightest: NDArray[np.float32]) -> BoolArray:

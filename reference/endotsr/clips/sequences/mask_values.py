@@ -96,7 +96,7 @@ def levels_of_set(read: Callable[[int], NDArray], files: list[Path], where: obje
     Raises:  InputError as `levels_of`.
     """
     count, values = len(files), set[int]()
-    first = sorted(set(np.linspace(0, count - 1, min(SAMPLED, count)).astype(int).tolist()))
+    first = _sampled(count)
     for k in [*first, *sorted(set(range(count)) - set(first))]:
         if k not in first and max(values, default=0) >= DECIDED:
             break
@@ -105,6 +105,11 @@ def levels_of_set(read: Callable[[int], NDArray], files: list[Path], where: obje
         except InputError:
             continue
     return levels_of(values, where, any(map(is_coded, files)))
+
+
+def _sampled(count: int) -> list[int]:
+    """Up to `SAMPLED` evenly spaced pictures of a set."""
+    return sorted(set(np.linspace(0, count - 1, min(SAMPLED, count)).astype(int).tolist()))
 
 
 def white_pixels(
@@ -139,7 +144,7 @@ def white_pixels(
 def refuse_coded_objects(read: Callable[[int], NDArray], count: int, where: object) -> None:
     """Raises InputError for pictures whose numbers other than 0 are not objects alone: coded or smooth ones."""
     values: set[int] = set()
-    for k in sorted(set(np.linspace(0, count - 1, min(SAMPLED, count)).astype(int).tolist())):
+    for k in _sampled(count):
         values |= numbers_of(read(k))
     if len(values) > MOST_NUMBERS:
         raise InputError(

@@ -40,7 +40,8 @@ MEASURED, PERCEIVED = 1.2, 2.7  # units per picture for its metrics, and for LPI
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
 PAGES = 80.0  # units for the viewer, the report and the renders
 EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
-# Frames whose motion is compared with a known truth: all pairs of a clip of 300 frames would take half an hour.
+# Frames whose motion is compared with a known truth. The number of pairs would grow with the square of the clip: 300
+# frames would have 44 * 299.
 MOST_REFERENCES, MOST_TIMES = 12, 64
 COMPARED = 1.6  # units per pair of them
 COMPILATION = 30.0  # seconds for the kernels of a training, once per machine

@@ -15,6 +15,7 @@ from endotsr.clips.sequences.camera import (
     ARBITRARY,
     Intrinsics,
     checked_intrinsics,
+    focal_length,
     pose_of,
     rows_of_motion,
     scene_factor,
@@ -113,8 +114,8 @@ def read_intrinsics(data: Keys, frame: Keys, size: tuple[int, int], where: str) 
         if key in found
     }
     if "fl_x" not in found and "camera_angle_x" in angles:
-        across = width / 2 / np.tan(angles["camera_angle_x"] / 2)
-        down = height / 2 / np.tan(angles["camera_angle_y"] / 2) if "camera_angle_y" in angles else across
+        across = focal_length(angles["camera_angle_x"], width)
+        down = focal_length(angles["camera_angle_y"], height) if "camera_angle_y" in angles else across
         found = {"fl_x": across, "fl_y": down, "cx": width / 2, "cy": height / 2} | found
     fx, fy, cx, cy = (
         number(found.get(key, found.get("fl_x") if key == "fl_y" else None), f"{where}: {key}") for key in INTRINSICS
