@@ -13,9 +13,11 @@
 # %% [markdown]
 # # 1. Time: the Fourier dictionary and its normalised atoms
 #
-# During a clip the light drifts, and breathing and heartbeat move the tissue. Both residuals of Endo-TSR describe such
-# changes by the same $2F$ sinusoids of time. This notebook builds them and centres and scales them over the training
-# stamps. It also shows the one case in which scaling would be wrong: an atom that is zero at every stamp.
+# During a clip the light drifts, and breathing and heartbeat move the tissue. Endo-TSR describes these changes with
+# two residuals, one of the colour and one of the position of each Gaussian. Both are weighted sums of the same $2F$
+# sinusoids of time, which are called *atoms*. This chapter constructs the atoms, and then centres and scales them over
+# the training stamps. It also treats the one case in which an atom must not be scaled: an atom that is zero at every
+# stamp.
 #
 # | Symbol | Meaning | In `paper` |
 # |---|---|---|
@@ -30,8 +32,9 @@
 # The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
 # links.
 #
-# In these notebooks each equation is printed as in the specification. Its **definition** in plain NumPy follows. An
-# `assert` compares the definition with the compiled function. If a sign is changed in either, the notebook stops.
+# Each chapter prints an equation as the specification prints it, followed by its **definition** in plain NumPy. An
+# `assert` then compares the definition with the compiled function. If a sign is changed in either, the chapter stops
+# with an error.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 
@@ -54,13 +57,14 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 # %% [markdown]
 # ## The dictionary
 #
-# The frequencies are log-spaced, in cycles per sequence:
+# The frequencies are measured in cycles per sequence. They are spaced logarithmically between the smallest and the
+# largest:
 #
 # $$
 # \omega_f = \omega_{\min}\left(\frac{\omega_{\max}}{\omega_{\min}}\right)^{\frac{f-1}{F-1}},\qquad f = 1,\dots,F .
 # $$
 #
-# The atoms are all sines, followed by all cosines:
+# The first $F$ atoms are the sines of these frequencies, and the other $F$ are the cosines:
 #
 # $$
 # \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
@@ -94,7 +98,7 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 # ```
 
 # %% [markdown]
-# The compiled functions have the same names. They agree with the definition to rounding.
+# The compiled functions have the same names as those of the definition and agree with them to rounding.
 
 # %%
 F, omega_min, omega_max = 8, 1.0, 16.0
@@ -111,10 +115,11 @@ for t in (0.0, 0.137, 0.37, 0.81, -0.4, 1.9):
 # %% [markdown]
 # ### Why the phase is reduced first
 #
-# $\sin(2\pi\cdot16\cdot\tfrac{5}{32})$ is the sine of five half turns, which is exactly 0. Floating point cannot
-# represent $\pi$ exactly, so the printed formula gives rounding noise. The specification removes whole turns and
-# quarter turns **before** the multiplication by $\pi$; both steps are exact. With $p=\omega t$,
-# $r = p - \operatorname{round}(p)$, $k=\operatorname{round}(4r)$ and $\delta = r - k/4$:
+# The argument of $\sin(2\pi\cdot16\cdot\tfrac{5}{32})$ is five half turns, where the sine is exactly 0. A
+# floating-point number cannot represent $\pi$ exactly, so the formula as printed gives rounding noise instead. The
+# specification therefore removes whole turns and quarter turns **before** the multiplication by $\pi$. Both
+# subtractions are exact. With $p=\omega t$, $r = p - \operatorname{round}(p)$, $k=\operatorname{round}(4r)$ and
+# $\delta = r - k/4$:
 #
 # $$
 # (\sin 2\pi p,\ \cos 2\pi p) =
@@ -139,9 +144,9 @@ for t in rng.uniform(0, 1, 20):
 # %% [markdown]
 # ## Centred and scaled over the training stamps
 #
-# The base colour of a Gaussian represents its mean colour, and the colour residual should not change it. The atoms of
-# the residual therefore have mean 0 over the training stamps $\mathcal T$. They have RMS 1, so that equal coefficients
-# have equal RMS effect at every frequency:
+# The base colour of a Gaussian should represent its mean colour, and the colour residual should represent the
+# deviations from that mean. The atoms of the colour residual therefore have mean 0 over the training stamps
+# $\mathcal T$. They also have RMS 1, so that equal coefficients have equal RMS effect at every frequency:
 #
 # $$
 # \begin{aligned}
@@ -187,11 +192,11 @@ np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
 # %% [markdown]
 # ### Figure: a Gaussian of the running clip
 #
-# The running clip of this book has 63 frames, and every eighth is held out. Below are the coefficients $A$ of one of the
-# Gaussians trained on it, the one in the extract whose colour changes most. Its colour residual is
-# $\beta\tanh(A\bar\phi(t))$, with $\beta=0.3$ ({doc}`02_colour_residual`). With the same coefficients on the raw atoms
-# $\phi(t)$ the mean over the training stamps is not 0. By how many of 255 levels does the mean colour of a Gaussian then
-# move?
+# The running clip of this book has 63 frames, of which every eighth is held out. The left panel shows the colour
+# residual of one Gaussian that was trained on this clip: in the stored extract, it is the Gaussian whose colour
+# changes most. Its residual is $\beta\tanh(A\bar\phi(t))$ with its coefficients $A$ and $\beta=0.3$
+# ({doc}`02_colour_residual`). If the same coefficients multiplied the raw atoms $\phi(t)$, the mean of $A\phi(t)$ over
+# the training stamps would not be 0. By how many of 255 levels would the mean colour of a Gaussian then shift?
 
 # %% tags=["hide-input"]
 clip = load()
@@ -232,16 +237,18 @@ offset = np.sqrt((both[0].mean(axis=0) ** 2).mean()) / both[0].std(axis=0).mean(
 assert 0.07 < offset < 0.15, "about a tenth"
 
 # %% [markdown]
-# On raw atoms the mean colour moves by about a third of a level on average. That is little: over the 55 training stamps
-# the mean of an atom is about a tenth of its deviation. On normalised atoms the argument of the $\tanh$ has mean 0, so
-# the shift that remains comes from the $\tanh$. The next section has the case in which the scale matters most.
+# With raw atoms the mean colour shifts by about a third of a level on average. The shift is small, as is the mean of a
+# raw atom: over the 55 training stamps it is about a tenth of the deviation of that atom. With normalised atoms the
+# argument of the $\tanh$ has mean 0, so the shift that remains comes from the $\tanh$. The next section shows the case
+# in which the scale matters most.
 #
 # ## The dead atom
 #
-# Take a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$: the atom differs from 0
-# between the frames, but not at any frame. Its RMS is 0. Dividing its rounding noise by the RMS of this noise would
-# give a random signal of size 1, and the model would be trained on it. The rule is therefore: if the RMS is below
-# $10^{-6}$, the atom is 0 in value and in gradient.
+# Consider a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$. Between the frames
+# this atom differs from 0, but on the frames it is 0 up to rounding noise, and so is its RMS. If the noise were
+# divided by its own RMS, the atom would become a random signal of size 1, and the model would be trained on it. Such
+# an atom is called *dead*. The rule is therefore: if the RMS is below $10^{-6}$, the atom is set to 0, and so is its
+# gradient.
 
 # %%
 stamps_32 = np.arange(32) / 32
@@ -298,31 +305,32 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# $g_X$ always means $\partial\mathcal L/\partial X$. A loss gives $g_\phi$ for each atom. We need gradients with
-# respect to the frequencies and to time.
+# Throughout the book $g_X$ denotes $\partial\mathcal L/\partial X$, the gradient of the loss $\mathcal L$ with respect
+# to $X$. Here $g_\phi$ is given for each atom, and we need the gradients with respect to the frequencies and to time.
 #
-# **(1.1) The phase.** Time and frequency enter an atom only through the number of turns $p_f=\omega_ft$, and
-# $\mathrm dp_f=t\,\mathrm d\omega_f+\omega_f\,\mathrm dt$.
+# **(1.1) The phase.** Time and frequency enter an atom through the number of turns $p_f=\omega_ft$, whose differential
+# is $\mathrm dp_f=t\,\mathrm d\omega_f+\omega_f\,\mathrm dt$.
 #
-# **(1.2) The angle.** The folding subtracts whole turns and quarter turns, which are constant between two jumps. So
-# $\mathrm d\delta=\mathrm dp_f$, and a step of $p_f$ turns the angle by $2\pi\,\mathrm dp_f$.
+# **(1.2) The angle.** The folding subtracts whole turns and quarter turns from $p_f$. Between two jumps the subtracted
+# number is constant, so $\mathrm d\delta=\mathrm dp_f$. A change of the phase by $\mathrm dp_f$ therefore changes the
+# angle by $2\pi\,\mathrm dp_f$.
 #
-# **(1.3) Sine and cosine.** With $s_f$ and $c_f$ for the two atoms of a frequency,
-# $\mathrm d\phi_f=2\pi c_f\,\mathrm dp_f$ and $\mathrm d\phi_{F+f}=-2\pi s_f\,\mathrm dp_f$. One phase moves both atoms,
-# so $g_{p_f}=2\pi\,(g_{\phi_f}c_f-g_{\phi_{F+f}}s_f)$.
+# **(1.3) Sine and cosine.** Let $s_f$ and $c_f$ be the sine and the cosine of frequency $f$. Then
+# $\mathrm d\phi_f=2\pi c_f\,\mathrm dp_f$ and $\mathrm d\phi_{F+f}=-2\pi s_f\,\mathrm dp_f$. Both atoms depend on the
+# same phase, so its gradient is the sum of two terms: $g_{p_f}=2\pi\,(g_{\phi_f}c_f-g_{\phi_{F+f}}s_f)$.
 #
-# **(1.4) Frequency and time.** A frequency enters its own phase only, so $g_{\omega_f}=t\,g_{p_f}$. Time enters all
-# $F$ phases, so $g_t=\sum_f\omega_f\,g_{p_f}$.
+# **(1.4) Frequency and time.** By (1.1) a frequency changes its own phase and no other, which gives
+# $g_{\omega_f}=t\,g_{p_f}$. Time changes all $F$ phases, which gives $g_t=\sum_f\omega_f\,g_{p_f}$.
 #
 # $$
 # g_{\omega_f} = 2\pi t\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr),\qquad
 # g_t = \sum_{f=1}^{F} 2\pi\omega_f\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr).
 # $$
 #
-# **(1.5) The scale.** $m_k$ and $\rho^{\mathrm{rms}}_k$ are computed once, from the training stamps, and held fixed. So
-# $\mathrm d\bar\phi_k=\mathrm d\phi_k/\rho^{\mathrm{rms}}_k$.
+# **(1.5) The scale.** The statistics $m_k$ and $\rho^{\mathrm{rms}}_k$ are computed once from the training stamps and
+# then held fixed, so $\mathrm d\bar\phi_k=\mathrm d\phi_k/\rho^{\mathrm{rms}}_k$.
 #
-# **(1.6) The dead atom** is 0 at every time, so no step of $\phi_k$ changes it. Its gradient is 0.
+# **(1.6) The dead atom.** A dead atom is 0 at every time, whatever the value of $\phi_k$, so its gradient is 0.
 #
 # $$
 # g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}
@@ -363,9 +371,9 @@ np.testing.assert_allclose(
 # %% [markdown]
 # ## The gradient check
 #
-# Every derived formula is checked. `check_pair` compares the reverse pass with finite differences of the forward pass,
-# along random directions and single entries. There is no absolute tolerance: a zero gradient against a non-zero
-# difference fails.
+# Each derived formula is checked numerically. `check_pair` compares the reverse pass with finite differences of the
+# forward pass, along random directions and for single entries. The comparison has no absolute tolerance: a gradient of
+# exactly 0 fails the check if the difference is not 0.
 
 # %%
 with one_thread():
@@ -379,13 +387,14 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. The clip has $n$ frames at $t=k/n$, none held out. Which $n$ make the sine of 16 cycles dead? Which atoms of other
-#    frequencies can be dead for $n\ge20$?
-# 2. Write `dictionary_forward` and `dictionary_reverse`, with the folding above, and let the golden cases judge them:
-#    `--only dictionary` ({doc}`index`). The case `quarter_turns` refuses the formula as printed.
-# 3. The cell below answers this one. The dictionary has 16 atoms. Over 24 frames with three held out there are 21
-#    stamps, which is more than 16. Are all 16 atoms linearly independent over these stamps? Are they with 32 frames,
-#    none held out? Estimate the rank of the normalised dictionary in both cases.
+# 1. A clip has $n$ frames at $t=k/n$, of which none is held out. For which $n$ is the sine of 16 cycles dead? Which
+#    atoms of other frequencies can be dead for $n\ge20$?
+# 2. Write `dictionary_forward` and `dictionary_reverse` with the folding above, and let the golden cases judge them:
+#    `--only dictionary` ({doc}`index`). The formula as printed fails the case `quarter_turns`.
+# 3. The cell below answers this one. The dictionary has 16 atoms. In a clip of 24 frames with three held out there are
+#    21 training stamps, more than there are atoms. Are all 16 atoms linearly independent over these stamps? Are they
+#    independent over the stamps of 32 frames with none held out? Estimate the rank of the normalised dictionary in
+#    both cases.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Over 21 stamps all 16 atoms are independent. Over 32 equally spaced stamps one atom is

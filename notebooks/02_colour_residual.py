@@ -13,9 +13,10 @@
 # %% [markdown]
 # # 2. The bounded colour residual (component A)
 #
-# The light changes during a clip: exposure drifts, and tissue becomes pale under pressure. Component A lets the colour
-# of each Gaussian follow such a change, by at most $\beta$ in display units for all values of its coefficients. The
-# bound limits the size of the residual, not what it represents.
+# The light changes during a clip: the exposure drifts, and tissue becomes pale under pressure. Component A lets the
+# colour of each Gaussian follow such a change. Whatever its coefficients are, the displayed colour changes by at most
+# $\beta$. This bound limits the size of the residual. It does not limit what the residual represents, as the end of
+# the next section shows.
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
@@ -54,10 +55,10 @@ statistics = atom_statistics(stamps, omega)
 # $$
 #
 # **(2.1) The unit.** The residual is added to the degree-0 harmonic coefficient $h_0$, and the displayed colour is
-# $Y_{00}h_0+\dots+\tfrac12$. A displayed change of $\beta\tanh x$ therefore needs
+# $Y_{00}h_0+\dots+\tfrac12$. To change the displayed colour by $\beta\tanh x$, the residual must therefore be
 # $\Delta h_0=\frac{\beta}{Y_{00}}\tanh x$.
 #
-# **(2.2) The bound.** $|\tanh x|\le1$, so no coefficients change a displayed colour by more than $\beta$.
+# **(2.2) The bound.** Since $|\tanh x|\le1$, the displayed colour changes by at most $\beta$ for any coefficients.
 #
 # <!-- definition: endotsr.definition.appearance.appearance_forward -->
 # ```python
@@ -78,17 +79,18 @@ for t in (0.0, 0.2, 0.77):
 assert np.abs(Y00 * appearance_forward(1e6 * A, phi_bar, beta)[0]).max() <= beta * (1 + 1e-15)
 
 # %% [markdown]
-# **Identity at the start.** $A=0$ gives a residual of exactly 0. A model in which the component has just been activated
-# renders the same image, bit by bit.
+# **Identity at the start.** The coefficients start at $A=0$, where the residual is exactly 0. At the iteration that
+# activates the component, the model therefore renders the same image as before, bit for bit.
 
 # %%
 zero = np.zeros_like(A)
 assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 
 # %% [markdown]
-# **The limit of the bound.** Each Gaussian has separate coefficients, so neighbours may change in opposite directions.
-# A texture that moves over static Gaussians with a contrast of 0.2 is within the bound of 0.3, and the residual
-# reproduces it exactly. The bound alone does not distinguish such a texture from light.
+# **The limit of the bound.** Each Gaussian has its own coefficients, so neighbours may change in opposite directions.
+# Consider a texture with a contrast of 0.2 that moves across Gaussians that do not move. The contrast is within the
+# bound of 0.3, and the residual can reproduce this motion of the texture. The bound alone does not distinguish such a
+# texture from a change of the light.
 
 # %%
 place = np.linspace(0, 1, N)
@@ -108,12 +110,12 @@ assert contrast > 0.2 and moved > 0.2 and np.abs(frames).max() < beta
 # %% [markdown]
 # ## Figure: brightening explained by colour, or by motion
 #
-# A patch of tissue becomes paler and recovers, without moving. Component A represents this by a change of colour over
-# time (left panel). A model without A has constant colours. It can make a pixel brighter at one time by moving, turning
-# or scaling Gaussians. In the middle panel, a bright neighbour four pixels away is shifted so that the pixel has the same
-# brightness at each time. How far do you expect it to move? The image at this pixel is right in both cases, but the
-# geometry of the second is wrong. The paper gives colour and motion separate components. (The right panel belongs to
-# step (2.4).)
+# A patch of tissue becomes paler and recovers, without moving. The left panel shows how component A represents the
+# event: the colour changes over time. A model without A has constant colours. It can make a pixel brighter at one time
+# by moving, turning or scaling Gaussians. The middle panel shows an example: a bright neighbour four pixels away is
+# shifted so that the pixel has the same brightness at each time. How far do you expect it to move? In both cases the
+# image at this pixel is right, but in the second case the geometry is wrong. The paper gives colour and motion
+# separate components. (The right panel belongs to step (2.4).)
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 0.98, 197)
@@ -168,25 +170,26 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_{\Delta h_0}$ for each channel and Gaussian. We need gradients with respect to the coefficients $A$
-# and to the atoms $\bar\phi$.
+# Here $g_{\Delta h_0}$ is given for each channel and Gaussian, and we need the gradients with respect to the
+# coefficients $A$ and to the atoms $\bar\phi$.
 #
-# **(2.3) The slope.** $\mathrm d\tanh x=\mathrm dx/\cosh^2x$, so
+# **(2.3) The slope.** The derivative of the hyperbolic tangent is $1/\cosh^2x$, so
 # $g_x=\frac{\beta}{Y_{00}}\,g_{\Delta h_0}/\cosh^2x$.
 #
-# **(2.4) A slope that keeps its digits.** $1/\cosh^2x=1-\tanh^2x$. In float32 the right side loses its digits one by
-# one (right panel above). Correctly rounded, $\tanh x$ is 1 from $x=13\ln2\approx9.01$ on, and the slope is then
-# exactly 0: a saturated residual has no gradient. With $e=\exp(-2|x|)$, $\cosh x=(1+e)/(2\sqrt e)$, so the slope is
-# $4e/(1+e)^2$. This form subtracts nothing and cannot overflow.
+# **(2.4) A slope that keeps its digits.** The identity $1/\cosh^2x=1-\tanh^2x$ suggests the right side as a formula.
+# In float32 it loses its digits one by one as $x$ grows (right panel above). Correctly rounded, $\tanh x$ is 1 from
+# $x=13\ln2\approx9.01$ on, and the computed slope is then exactly 0: a saturated residual has no gradient. The stable
+# form uses $e=\exp(-2|x|)$. With it $\cosh x=(1+e)/(2\sqrt e)$, so the slope is $4e/(1+e)^2$. This form contains no
+# subtraction and cannot overflow.
 #
-# **(2.5) One coefficient** is multiplied by one atom: $\partial x_{ci}/\partial A_{cki}=\bar\phi_k$, so
+# **(2.5) One coefficient** is multiplied by one atom, $\partial x_{ci}/\partial A_{cki}=\bar\phi_k$, which gives
 # $g_{A_{cki}}=g_{x_{ci}}\bar\phi_k$.
 #
 # **(2.6) One atom** is multiplied by the coefficients of all Gaussians and channels, so its gradient is the sum over
 # both.
 #
-# **(2.7) At the start** $A=0$ and $x=0$, so $e=1$ and the slope is 1. The gradient with respect to $A$ is
-# $\frac{\beta}{Y_{00}}\bar\phi\,g_{\Delta h_0}$ and not 0, so the first step changes $A$.
+# **(2.7) At the start** of component A, $A=0$ and $x=0$, so $e=1$ and the slope is 1. The gradient with respect to $A$
+# is $\frac{\beta}{Y_{00}}\bar\phi\,g_{\Delta h_0}$. It is in general not 0, so the first step changes $A$.
 #
 # $$
 # g_{x_{ci}} = \frac{\beta}{Y_{00}}\,\frac{4e_{ci}}{(1+e_{ci})^2}\;g_{\Delta h_{0,ci}},\qquad
@@ -239,7 +242,7 @@ assert np.abs(start).max() > 0
 # %% [markdown]
 # ## The gradient check
 #
-# Each atom is a separate block, so the other fifteen cannot mask a mistake in a single atom.
+# The check treats each atom as a separate block, so the fifteen other atoms cannot mask a mistake in one of them.
 
 # %%
 with one_thread():
@@ -250,10 +253,10 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. Two Gaussians have the same bound $\beta$, and one has twice the coefficients $A$. How do their colour changes compare
-#    for small and for large $x$?
-# 2. Write `appearance_forward` and `appearance_reverse` and let the golden cases judge them: `--only appearance`
-#    ({doc}`index`). The case `deep_saturation` refuses $1-\tanh^2x$ computed from a rounded $\tanh x$.
+# 1. Two Gaussians have the same bound $\beta$, but the coefficients $A$ of one are twice those of the other. How do
+#    their colour changes compare for small and for large $x$?
+# 2. Write `appearance_forward` and `appearance_reverse`, and let the golden cases judge them: `--only appearance`
+#    ({doc}`index`). A port that computes $1-\tanh^2x$ from a rounded $\tanh x$ fails the case `deep_saturation`.
 # 3. The cell below answers this one. The **argument** $x$ of the residual has mean 0 over the training stamps, because
 #    each $\bar\phi_k$ has mean 0. Is the mean of $\beta\tanh x$ also 0? Find an $A$ for which the mean colour over the
 #    training stamps changes.
