@@ -21,12 +21,14 @@ from endotsr.port.stages.stage import Outputs, Stage
 
 LATEST = 1000  # rank of a spot with unknown reach
 ENOUGH = 40  # equal explanations that end the search
+MOST = 3  # smallest number of explained cases with refused outputs beside which one may stay unexplained
 TELLING = 8  # smallest number of wrong entries for which any number is accepted, and of outputs for wrong gradients
 WHOLE = {
     "all": "every output",
     "derivative": "every forward output, of which the gradients of the port are the derivatives,",
     "refused": "every output of those that are refused; it would be wrong in others that pass,",
     "forward": "every forward output; the gradients of the port are wrong in another way,",
+    "most": "every output, except in one refused case,",
 }
 """Extents of an explanation."""
 Install = Callable[[], Any]  # applies a change and returns a function that undoes it
@@ -89,11 +91,16 @@ class Trial:
         return any(hit.whole in ("all", "derivative") for hit in self.hits)
 
     def fits(self, install: Install | None, mode: str, request: OtherReading | None = None) -> str:
-        """The extent to which a change explains all cases: a key of WHOLE, or "" for nothing."""
+        """The extent to which a change explains all cases: a key of WHOLE, or "" for nothing.
+
+        A port may do more than one thing otherwise where an optional part is on: after MOST explained cases, one may
+        stay unexplained.
+        """
         self.tried += 1
         self.matched = False
         gradients: list[bool | None] = []  # of cases with gradients that differ from the changed definition's
         spoils = False  # a case that passed
+        explained, unlike = 0, False  # cases with refused outputs; one of them where the port does something else
         for one in self.cases:
             if spoils:
                 break
@@ -104,7 +111,11 @@ class Trial:
                     found, saved = one.forward(self.stage, inputs, settings)
             same = one.same(request.tell(found) if request else found, one.forward_names)
             if not same and one.refused:
-                return ""
+                if unlike or explained < MOST:
+                    return ""
+                unlike = True
+                continue
+            explained += same and bool(one.refused)
             self.matched |= same and bool(one.refused.intersection(one.forward_names))
             if same and one.gradient_names and False not in gradients and (one.refused or not gradients):
                 with _installed(install if mode != "forward" else None):
@@ -116,6 +127,8 @@ class Trial:
                     with _installed(install):
                         gradients.append(one.is_derivative(self.stage))
             spoils = spoils or (not same and not one.refused)
+        if unlike:
+            return "" if gradients or spoils else "most"
         if gradients and spoils:
             return ""
         if gradients:
@@ -165,12 +178,13 @@ class Trial:
 
     def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
         """Record a change that fits."""
-        enough = {"forward": self.wrong_forward, "refused": self.wrong if sum(map(bool, self.refusals)) > 1 else 0}
+        several = sum(map(bool, self.refusals)) > 1
+        enough = {"forward": self.wrong_forward, "refused": self.wrong if several else 0, "most": self.wrong_forward}
         if whole and enough.get(whole, TELLING) >= TELLING:
             if spot and not self.forward_refused and spot.place.phases == {"forward"}:
                 rank = (rank[0] + 1, *rank[1:])  # the refused outputs are computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
-            self.hits.append(Hit(text, where, function, whole, (int(whole in enough), *rank, len(self.hits))))
+            self.hits.append(Hit(text, where, function, whole, (int(whole in enough) + (whole == "most"), *rank, len(self.hits))))
 
     def modes(self, place: Statement) -> list[str]:
         """The phases in which a change of a place can affect the refused outputs."""
