@@ -18,8 +18,8 @@ import msgspec
 
 from endotsr.clips.sequences.carry_masks import carry_masks
 from endotsr.clips.sequences.clip_flows import motion_of
-from endotsr.clips.sequences.drawing import even_frames
 from endotsr.clips.sequences.drawn_masks import DrawnFile, key_masks
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.config import with_settings

@@ -10,10 +10,11 @@ import pytest
 from endotsr.clips.sequences.carry_masks import carry_masks
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.clip_flows import ClipFlows
-from endotsr.clips.sequences.drawing import displacement, drawing_of, even_frames, plausible_drafts
+from endotsr.clips.sequences.drawing import displacement, drawing_of, plausible_drafts
 from endotsr.clips.sequences.drawn_masks import FORMAT, MOST_POINTS, key_masks, read_drawn
 from endotsr.clips.sequences.mask_shapes import MaskShape, filled, inside_polygon, near_line, shapes_of
 from endotsr.clips.sequences.propose_masks import Proposal
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 
 WIDTH, HEIGHT = 50, 40

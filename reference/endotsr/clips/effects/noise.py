@@ -11,6 +11,7 @@ import numpy as np
 
 from endotsr.clips.effects.frames import TILE, ReducedFrames
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 NORMAL_MAD = 0.6745  # median of |x| of a standard normal
@@ -35,7 +36,7 @@ class Noise(NamedTuple):
 
 def estimate_noise(sequence: Sequence, clip: ReducedFrames) -> Noise:
     """The noise of the training frames at full and at working size."""
-    chosen = np.unique(np.linspace(0, clip.count - 1, min(MOST_FRAMES, clip.count)).round().astype(int))
+    chosen = even_frames(clip.count, MOST_FRAMES)
     index = sequence.train_index[chosen]
     full = [spatial_noise(sequence.images[i] / 255.0, sequence.masks[i]) for i in index]
     working = [spatial_noise(clip.images[k], clip.masks[k]) for k in chosen]

@@ -18,6 +18,7 @@ from endotsr.clips.sequences.clip_flows import ClipFlows, motion_of
 from endotsr.clips.sequences.drawn_masks import DrawnFile, DrawnKey, key_masks
 from endotsr.clips.sequences.mask_shapes import LARGEST, MaskShape, Origin, shapes_of
 from endotsr.clips.sequences.propose_masks import Proposal
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -56,13 +57,6 @@ class DrawnClip(NamedTuple):
     never: list[MaskShape]
     step: int  # px between the nodes; the first one is at (step / 2, step / 2)
     columns: int
-
-
-def even_frames(count: int, wanted: int) -> list[int]:
-    """`wanted` evenly spaced frames of `count`, the first and the last one included; one frame is the middle one."""
-    if wanted == 1:
-        return [count // 2]
-    return np.unique(np.linspace(0, count - 1, min(wanted, count)).round().astype(int)).tolist()
 
 
 def drawing_of(

@@ -6,6 +6,7 @@ where it is when the scope moves. A model that takes it for tissue learns a bord
 In: the pictures of a clip, one at a time. Out: the border as a mask.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,25 +31,35 @@ class FieldOfView:
 
     def __init__(self) -> None:
         self._brightest: NDArray[np.float32] | None = None  # (h, w) at the working size
-        self._size = (0, 0)
         self._equal = True  # all pictures have one size
+        self.tissue: BoolArray = np.zeros((0, 0), bool)  # (H, W) in some frame
 
-    def add(self, picture: Picture) -> None:
-        """Take a picture (H, W, 3) into account."""
+    def add(self, picture: Picture, tissue: BoolArray | None = None) -> None:
+        """Take a picture (H, W, 3) and its tissue (H, W), None without masks, into account."""
         found = brightness(reduced(picture))
         if self._brightest is None:
-            self._brightest, self._size = found, picture.shape[:2]
-        elif picture.shape[:2] == self._size:
+            self._brightest, self.tissue = found, np.zeros(picture.shape[:2], bool)
+        elif picture.shape[:2] == self.tissue.shape:
             np.maximum(self._brightest, found, out=self._brightest)
         else:
             self._equal = False
+            return
+        self.tissue |= True if tissue is None else tissue
+
+    def dark_border(self) -> BoolArray | None:
+        """(H, W) True where every picture is dark, joined to the edge; None if nothing is, or for several sizes."""
+        return self._at_full_size(dark_from_the_edge)
 
     def outside(self) -> BoolArray | None:
         """(H, W) True outside the field of view; None if there is no border, or for pictures of several sizes."""
+        return self._at_full_size(outside_of)
+
+    def _at_full_size(self, search: Callable[[NDArray[np.float32]], BoolArray]) -> BoolArray | None:
         if self._brightest is None or not self._equal:
             return None
-        found = outside_of(self._brightest)
-        return nearest_pixels(found, self._size[1], self._size[0], "mask") if found.any() else None
+        found = search(self._brightest)
+        height, width = self.tissue.shape
+        return nearest_pixels(found, width, height, "mask") if found.any() else None
 
 
 def reduced(picture: Picture) -> Picture:
@@ -74,8 +85,17 @@ def outside_of_view(pictures: list[Picture]) -> BoolArray:
     return np.zeros(pictures[0].shape[:2], bool) if found is None else found
 
 
+def dark_from_the_edge(brightest: NDArray[np.float32]) -> BoolArray:
+    """(h, w) True where the brightest of all pictures is dark, in a region that is connected to the edge."""
+    from scipy.ndimage import binary_propagation
+
+    ring = np.pad(brightest < DARK, 1, constant_values=True)
+    around = np.pad(np.zeros(brightest.shape, bool), 1, constant_values=True)
+    return np.asarray(binary_propagation(around, mask=ring), bool)[1:-1, 1:-1]
+
+
 def outside_of(brightest: NDArray[np.float32]) -> BoolArray:
-    """(h, w) True where the brightest of all pictures is dark, in a region that is connected to the border.
+    """(h, w) True in the dark region of `dark_from_the_edge`, and in all that is not the field of view.
 
     Bright areas out there, such as text, are also outside: the field of view is one region without holes.
 
@@ -83,10 +103,7 @@ def outside_of(brightest: NDArray[np.float32]) -> BoolArray:
     """
     from scipy import ndimage
 
-    nowhere = np.zeros(brightest.shape, bool)
-    ring = np.pad(brightest < DARK, 1, constant_values=True)
-    around = np.pad(nowhere, 1, constant_values=True)
-    joined = np.asarray(ndimage.binary_propagation(around, mask=ring), bool)[1:-1, 1:-1]
+    nowhere, joined = np.zeros(brightest.shape, bool), dark_from_the_edge(brightest)
     padded = np.pad(~joined, THIN, "edge")  # opening must not erode at the edge of the picture
     opened = ndimage.binary_opening(padded, iterations=THIN)[THIN:-THIN, THIN:-THIN]
     labels: Any

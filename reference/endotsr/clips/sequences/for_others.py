@@ -18,6 +18,7 @@ from endotsr.clips.sequences.choices import Other
 from endotsr.clips.sequences.clip import REST, Clip
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.writing import replace_text
@@ -111,7 +112,7 @@ def _points(clip: Clip, intrinsics: Intrinsics, poses: list[CameraPose]) -> list
     """Some tissue pixels with depth of some frames."""
     if clip.depth is None:
         return []
-    chosen = np.unique(np.linspace(0, clip.count - 1, FRAMES_OF_POINTS).astype(int)).tolist()
+    chosen = even_frames(clip.count, FRAMES_OF_POINTS)
     found: list[SeenPoint] = []
     for i, pair in zip(chosen, clip.pictures(chosen)):
         depth, tissue = clip.depth(i), clip.masks(i) if clip.masks else None

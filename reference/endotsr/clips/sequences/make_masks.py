@@ -25,6 +25,7 @@ from endotsr.clips.sequences.masks import mask_levels, threshold_masks
 from endotsr.clips.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.sources import PROPOSAL
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
@@ -231,7 +232,7 @@ def overlays(clip: Clip, proposal: Proposal) -> Picture:
 
     Blue: drawn by a person; green: carried or proposed; orange: never tissue.
     """
-    chosen = np.unique(np.linspace(0, clip.count - 1, min(SHOWN, clip.count)).astype(int)).tolist()
+    chosen = even_frames(clip.count, SHOWN)
     shown = []
     for i, pair in zip(chosen, clip.pictures(chosen)):
         never, drawn = proposal.never, i in proposal.drawn

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 
 MOST_SOFT_FRACTION = 0.05  # of a frame; a picture with more pixels between black and white is not a mask
@@ -96,7 +97,7 @@ def levels_of_set(read: Callable[[int], NDArray], files: list[Path], where: obje
     Raises:  InputError as `levels_of`.
     """
     count, values = len(files), set[int]()
-    first = _sampled(count)
+    first = even_frames(count, SAMPLED)
     for k in [*first, *sorted(set(range(count)) - set(first))]:
         if k not in first and max(values, default=0) >= DECIDED:
             break
@@ -105,11 +106,6 @@ def levels_of_set(read: Callable[[int], NDArray], files: list[Path], where: obje
         except InputError:
             continue
     return levels_of(values, where, any(map(is_coded, files)))
-
-
-def _sampled(count: int) -> list[int]:
-    """Up to `SAMPLED` evenly spaced pictures of a set."""
-    return sorted(set(np.linspace(0, count - 1, min(SAMPLED, count)).astype(int).tolist()))
 
 
 def white_pixels(
@@ -144,7 +140,7 @@ def white_pixels(
 def refuse_coded_objects(read: Callable[[int], NDArray], count: int, where: object) -> None:
     """Raises InputError for pictures whose numbers other than 0 are not objects alone: coded or smooth ones."""
     values: set[int] = set()
-    for k in _sampled(count):
+    for k in even_frames(count, SAMPLED):
         values |= numbers_of(read(k))
     if len(values) > MOST_NUMBERS:
         raise InputError(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.sequences.checks.dark_border import crop_without
 from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.choices import Border
 from endotsr.clips.sequences.clip import Clip
@@ -44,7 +45,7 @@ def mask_entry(
     for k in range(frames):
         excluded = read_png(folder / MASKS / f"{k:06d}.png") > 0 if entry is not None else border
         write_mask(folder, k, ~(excluded | border))
-    keep = f"--border keep counts it as tissue{seen.border.bars}"
+    keep = f"--border keep counts it as tissue{crop_without(seen.view.dark_border())}"
     notes.append(f"{what}: it is excluded as outside of the field of view; {keep}")
     said = f"field of view {border.mean():.1%}"
     if entry is None:

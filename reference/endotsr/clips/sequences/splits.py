@@ -45,6 +45,16 @@ def evenly_spaced(times: NDArray[np.float64]) -> bool:
     return bool(off <= max(UNEVEN * step, ROUNDING))
 
 
+def even_frames(count: int, most: int) -> list[int]:
+    """`most` evenly spaced frames of `count`, the first and the last one included; one frame is the middle one.
+
+    Edges:   all frames if there are at most `most`.
+    """
+    if most == 1:
+        return [count // 2]
+    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)).tolist()
+
+
 def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:
     """The published split: frame i is held out when (i - 1) % 8 == 0, that is 1, 9, 17, ..."""
     index = np.arange(count)

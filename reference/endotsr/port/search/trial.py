@@ -184,7 +184,9 @@ class Trial:
             if spot and not self.forward_refused and spot.place.phases == {"forward"}:
                 rank = (rank[0] + 1, *rank[1:])  # the refused outputs are computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
-            self.hits.append(Hit(text, where, function, whole, (int(whole in enough) + (whole == "most"), *rank, len(self.hits))))
+            self.hits.append(
+                Hit(text, where, function, whole, (int(whole in enough) + (whole == "most"), *rank, len(self.hits)))
+            )
 
     def modes(self, place: Statement) -> list[str]:
         """The phases in which a change of a place can affect the refused outputs."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
@@ -64,7 +65,7 @@ def right_view(
         return {"reason": f"disparity and depth give no consistent baseline ({baseline:.3g}, spread {spread:.0%})"}
     rows: dict[str, MeasureRow] = {}
     for part, frames in (("held_out", sequence.test_index), ("training", training_sample(sequence))):
-        values = [_frame(sequence, int(i), baseline, right(int(i)), render) for i in frames]
+        values = [_frame(sequence, int(i), baseline, right(i), render) for i in frames]
         for label in values[0] if values else ():
             psnr, ssim = np.array([value[label] for value in values]).T
             row = rows.setdefault(label, {"label": label})
@@ -86,8 +87,8 @@ def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]
 
     count = max(16, sequence.width // SEARCHED // 16 * 16)
     found = []
-    for i in np.unique(np.linspace(0, sequence.count - 1, MATCHED_FRAMES).astype(int)):
-        left, other = (np.ascontiguousarray(p.transpose(1, 2, 0)) for p in (sequence.images[i], right(int(i))))
+    for i in even_frames(sequence.count, MATCHED_FRAMES):
+        left, other = (np.ascontiguousarray(p.transpose(1, 2, 0)) for p in (sequence.images[i], right(i)))
         match = match_pair(left, other, 0, count, smooth=False)
         known = np.isfinite(match.raw) & (match.disagreement <= 1) & sequence.masks[i] & (sequence.depth[i] > 0)
         found.append(match.raw[known] * sequence.depth[i][known] / sequence.cameras[i].fx)

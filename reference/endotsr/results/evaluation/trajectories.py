@@ -18,6 +18,7 @@ import numpy as np
 
 from endotsr.clips.sequences.checks.duration import MOST_REFERENCES, MOST_TIMES
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.constants import Y00
 from endotsr.method.splatting.camera import Camera, project
@@ -97,9 +98,7 @@ def trajectory_error(
 def evenly(frames: Iterable[int], most: int) -> list[int]:
     """All frames, or `most` evenly spaced ones of them with the first and the last."""
     every = [int(frame) for frame in frames]
-    if len(every) <= most:
-        return every
-    return [every[k] for k in np.linspace(0, len(every) - 1, most).round().astype(int)]
+    return [every[k] for k in even_frames(len(every), most)]
 
 
 def _lengths(camera: Camera, start: FloatArray, moves: FloatArray, truth: FloatArray) -> FloatArray:

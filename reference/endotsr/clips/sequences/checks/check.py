@@ -15,7 +15,7 @@ from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
-from endotsr.clips.sequences.checks.dark_border import DarkBorder
+from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import (
     DepthFacts,
     depth_facts,
@@ -39,6 +39,7 @@ from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
+from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.files import has_truth
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
@@ -46,7 +47,7 @@ from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_m
 from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.pairing import matching_files
-from endotsr.clips.sequences.splits import parse_frame_range, split_frames
+from endotsr.clips.sequences.splits import even_frames, parse_frame_range, split_frames
 from endotsr.config import Config, lengthened, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.method.kernels.machine import memory_of_machine
@@ -79,7 +80,7 @@ class _Pass:
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
         self.masks = MaskSteps()
-        self.border = DarkBorder()
+        self.view = FieldOfView()
         self.depth: list[DepthFacts] = []
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
@@ -125,7 +126,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     facts: dict[str, Any] = {"frames": len(clip.images)}
     if run.frames:
         run.findings += frame_findings(run.frames, str(clip.images[0].parent))
-        run.findings += run.border.findings(str(clip.images[0].parent))
+        run.findings += border_findings(run.view, str(clip.images[0].parent))
     if clip.masks and clip.masks.files:
         run.findings += run.masks.findings(str(clip.masks.files[0].parent))
     if run.depth and clip.depth:
@@ -181,7 +182,7 @@ def _check_cameras(clip: Clip, run: _Pass, size: Size) -> dict[str, str]:
 def _read_frames(clip: Clip, run: _Pass) -> Size | None:
     """Read every frame once. Returns the size of the first readable picture."""
     masks, depth = (_paired(clip.images, part.files if part else []) for part in (clip.masks, clip.depth))
-    sampled = set(np.linspace(0, len(clip.images) - 1, min(SAMPLED, len(clip.images))).astype(int).tolist())
+    sampled = set(even_frames(len(clip.images), SAMPLED))
     levels = _mask_levels(clip, run)
     size = None
     for i, file in enumerate(clip.images):
@@ -193,7 +194,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         run.frames.append(frame_facts(file.name, picture))
         tissue = _mask(clip, run, masks[i], i, size, levels)
         run.masks.add(i, tissue)
-        run.border.add(picture, tissue)
+        run.view.add(picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         if i in sampled:
             if found is not None:

@@ -1,67 +1,56 @@
 """Dark borders that count as tissue: black bars of a letterbox, and the outside of a round field of view.
 
-In: pictures and masks, one frame after another. Out: a finding with the size of the border.
+In: what is found of the field of view while the frames of a clip pass by. Out: a finding with the size of the border.
 """
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.field_of_view import WORKING, FieldOfView
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray
 
-STEP = 4  # pixels between the sampled rows and columns
-DARK = 16  # grey levels; video in limited range has its black there
 LEAST = 0.02  # of the pixels
+SMOOTHED = 2  # px at the working size of the field of view: most that its smoothing takes from a border
+SAMPLED = 24  # frames of a loaded clip
 
 
-class DarkBorder:
-    """The brightest value of every sampled pixel while it counts as tissue, over the frames of a clip."""
-
-    def __init__(self) -> None:
-        self.brightest: NDArray[np.uint8] | None = None
-        self.tissue: BoolArray | None = None  # in any frame
-
-    def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None) -> None:
-        """One frame: picture (H, W, 3), tissue (H, W) or None without masks."""
-        bright = picture[::STEP, ::STEP].max(axis=2)
-        mask = np.ones(bright.shape, bool) if tissue is None else tissue[::STEP, ::STEP]
-        if self.brightest is None or self.tissue is None:
-            self.brightest, self.tissue = bright.copy(), mask.copy()
-        elif self.brightest.shape == bright.shape:
-            np.maximum(self.brightest, bright, out=self.brightest)
-            self.tissue |= mask
-
-    def findings(self, where: str) -> list[Finding]:
-        """A warning, if at least 2 % of the pixels are a dark border that counts as tissue."""
-        if self.brightest is None or self.tissue is None:
-            return []
-        dark = self.brightest <= DARK
-        border = _from_the_edges(dark) & self.tissue
-        fraction = float(border.mean())
-        if fraction < LEAST or dark.all():
-            return []
-        what = f"{fraction:.1%} of the pixels are dark in every frame, from the edge inwards, and count as tissue"
-        return [finding("dark-border", where, what + self.bars)]
-
-    @property
-    def bars(self) -> str:
-        """Which crop removes whole rows and columns that are dark in every frame, as the end of a sentence; or ""."""
-        if self.brightest is None:
-            return ""
-        dark = self.brightest <= DARK
-        rows, columns = (np.flatnonzero(~dark.all(axis=axis)) for axis in (1, 0))
-        if not rows.size or rows.size * columns.size == dark.size:
-            return ""
-        (x, right), (y, bottom) = ((STEP * int(part[0]), STEP * int(part[-1] + 1)) for part in (columns, rows))
-        return f"; --crop {x} {y} {right - x} {bottom - y} keeps the rest"
+def border_findings(view: FieldOfView, where: str) -> list[Finding]:
+    """A warning, if at least 2 % of the pixels are a dark border that counts as tissue in some frame."""
+    border = view.dark_border()
+    if border is None:
+        return []
+    fraction = float((border & view.tissue).mean())
+    if fraction < LEAST or border.all():
+        return []
+    what = f"{fraction:.1%} of the pixels are dark in every frame, from the edge inwards, and count as tissue"
+    return [finding("dark-border", where, what + crop_without(border))]
 
 
-def _from_the_edges(dark: BoolArray) -> BoolArray:
-    """The dark pixels from which a row or a column of dark pixels leads to an edge of the picture."""
-    reached = np.zeros_like(dark)
-    for axis in (0, 1):
-        for way in (slice(None), slice(None, None, -1)):
-            turned = dark[way] if axis == 0 else dark[:, way]
-            found = np.logical_and.accumulate(turned, axis=axis)
-            reached |= found[way] if axis == 0 else found[:, way]
-    return reached
+def loaded_border_findings(images: NDArray[np.uint8], masks: BoolArray, where: str) -> list[Finding]:
+    """`border_findings` of images (n, 3, H, W) and masks (n, H, W), True = tissue, of which a sample is looked at."""
+    view = FieldOfView()
+    for i in even_frames(len(images), SAMPLED):
+        view.add(np.ascontiguousarray(images[i].transpose(1, 2, 0)), masks[i])
+    return border_findings(view, where)
+
+
+def crop_without(border: BoolArray | None) -> str:
+    """Which crop removes the whole rows and columns of a border (H, W), as the end of a sentence; or "".
+
+    The smoothing of `brightness` makes a border narrower, so that the crop begins a little inside.
+    """
+    if border is None:
+        return ""
+    rows, columns = (np.flatnonzero(~border.all(axis=axis)) for axis in (1, 0))
+    if not rows.size or rows.size * columns.size == border.size:
+        return ""
+    inset = math.ceil(SMOOTHED * max(1.0, max(border.shape) / WORKING))
+    (x, right), (y, bottom) = (
+        (int(part[0]) and int(part[0]) + inset, int(part[-1]) + 1 - inset * (part[-1] + 1 < size))
+        for part, size in ((columns, border.shape[1]), (rows, border.shape[0]))
+    )
+    return f"; --crop {x} {y} {right - x} {bottom - y} keeps the rest"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import camera_findings
+from endotsr.clips.sequences.checks.dark_border import loaded_border_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
@@ -36,6 +37,7 @@ def guarded(
     images, folder = [clip.images[i] for i in frames], str(clip.where)
     found = gap_findings(images) + time_findings(None if clip.times is None else clip.times[list(frames)], folder)
     found += frame_findings([picture for picture, _ in facts], str(images[0].parent))
+    found += loaded_border_findings(sequence.images, sequence.masks, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
     found += depth_findings(depth, str(clip.depth.files[0].parent), clip.arbitrary, near, clip.depth.assumed)

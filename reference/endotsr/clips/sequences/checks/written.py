@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.checks.dark_border import DarkBorder
+from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.choices import Border
@@ -18,12 +18,11 @@ class WrittenFrames:
     """Sums over the frames of a clip, one after another."""
 
     def __init__(self) -> None:
-        self.masks, self.border, self.view, self.medians = MaskEvidence(), DarkBorder(), FieldOfView(), []
+        self.masks, self.view, self.medians = MaskEvidence(), FieldOfView(), []
 
     def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
         """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
-        self.border.add(picture, tissue)
-        self.view.add(picture)
+        self.view.add(picture, tissue)
         if tissue is not None:
             self.masks.add(picture, tissue, depth)
         if depth is not None and depth.any():
@@ -38,7 +37,7 @@ class WrittenFrames:
         if clip.masks is not None:
             excluded = clip.masks.excluded_value
             notes += notes_of(self.masks.findings(where, excluded)) or [self.masks.note(excluded)]
-            notes += notes_of(self.border.findings(where)) if border == "auto" else []
+            notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
         return notes + self._depth_notes(clip)
 
     def _depth_notes(self, clip: Clip) -> list[str]:
