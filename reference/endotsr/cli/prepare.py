@@ -67,7 +67,7 @@ class PrepareOptions:
     trajectory_unit: Unit | None = None
     """unit of the positions (TUM and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
-    """masks of another program, one per frame, one file for all frames, or a video of masks"""
+    """masks of another program, one per frame, one file for all frames, a video, or an array"""
     excluded_value: ExcludedValue = "white"
     """excluded value of these masks; white = from half of full white on, nonzero = the numbers of objects"""
     pairing: Pairing = "auto"

@@ -37,18 +37,20 @@ def plane_of_stack(path: Path) -> NDArray | None:
     return array_of(file)[int(path.name)]
 
 
-def array_of(path: Path) -> NDArray:
+def array_of(path: Path, kinds: str = "fiu") -> NDArray:
     """The array of an .npz or .npy file, (n, H, W) or (H, W), or of a .mat file, (H, W); axes of length 1 are dropped.
+
+    kinds    the kinds of numbers that count, as NumPy names them
 
     Raises:  InputError for a file without exactly one such array, and for what is no regular file.
     """
     with open_regular(path, LARGEST_FILE) as file:
         status = os.fstat(file.fileno())
-    return _array(path, status.st_mtime_ns, status.st_size)
+    return _array(path, status.st_mtime_ns, status.st_size, kinds)
 
 
-@lru_cache(maxsize=1)
-def _array(path: Path, changed: int, size: int) -> NDArray:
+@lru_cache(maxsize=2)  # depth and masks of a clip
+def _array(path: Path, changed: int, size: int, kinds: str) -> NDArray:
     if path.suffix.lower() == ".npy":
         arrays = {path.name: read_npy(path, LARGEST_FILE)}
     elif path.suffix.lower() == MATLAB:
@@ -59,7 +61,7 @@ def _array(path: Path, changed: int, size: int) -> NDArray:
                 arrays = {name: file.read(name) for name in file.names}
         except RefusedArray as error:
             raise InputError(f"{path}: {error}; {ONE}") from None
-    planes = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "fiu"}
+    planes = {name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in kinds}
     planes = {name: array for name, array in planes.items() if array.ndim in (2, 3) and min(array.shape) > 3}
     if path.suffix.lower() == MATLAB and any(array.ndim == 3 for array in planes.values()):
         raise InputError(f"{path}: holds an array of several frames; use one file of (height, width) per frame")

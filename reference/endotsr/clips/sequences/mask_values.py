@@ -86,7 +86,8 @@ def levels_of(values: Iterable[int], where: object, coded: bool = False) -> Mask
 
 def is_coded(file: Path) -> bool:
     """Whether a mask is stored with loss: a JPEG, or a picture of a video (`FILE/000003`)."""
-    return file.suffix.lower() in (".jpg", ".jpeg") or not file.suffix
+    in_array = file.parent.suffix.lower() in (".npy", ".npz")
+    return file.suffix.lower() in (".jpg", ".jpeg") or not (file.suffix or in_array)
 
 
 def levels_of_set(read: Callable[[int], NDArray], files: list[Path], where: object) -> MaskLevels:

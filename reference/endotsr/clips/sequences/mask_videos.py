@@ -1,4 +1,4 @@
-"""Masks in one video file, as programs that segment videos write them.
+"""Masks in one file, as programs that segment videos write them: a video, or a NumPy array.
 
 A plane of such a file has the name `FILE/000003`, so that planes are listed, paired and read like files.
 """
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.clip import grey_plane
+from endotsr.clips.sequences.depth_stacks import ENDINGS
+from endotsr.clips.sequences.mask_arrays import array_plane, in_array, mask_stack
 from endotsr.clips.sequences.mask_values import LEAST_WHITE, OBJECTS
 from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
@@ -20,7 +22,9 @@ MOST_BYTES = 1 << 31  # of the planes of a video that are held
 
 
 def mask_files(path: Path) -> list[Path] | None:
-    """The names of the planes of a video of masks; None for any other path. Raises InputError."""
+    """The names of the planes of a video or an array of masks; None for any other path. Raises InputError."""
+    if path.suffix.lower() in ENDINGS:
+        return mask_stack(path)
     if (path.is_file() and path.suffix.lower() in (".png", ".webp")) or not is_video(path):
         return None
     facts = video_facts(path)
@@ -34,6 +38,8 @@ def mask_files(path: Path) -> list[Path] | None:
 
 def plane_of(path: Path) -> NDArray:
     """The plane (H, W) of a mask: a picture file, or a name of `mask_files`. Raises InputError."""
+    if in_array(path):
+        return array_plane(path)
     file = path.parent
     if not file.is_file():
         return grey_mask(read_picture(path), path)
@@ -51,7 +57,7 @@ def grey_mask(pixels: NDArray, path: Path) -> NDArray:
 
 def coloured_plane_of(path: Path) -> NDArray:
     """As `plane_of`, with the channels of a coloured picture. Raises InputError."""
-    return plane_of(path) if path.parent.is_file() else read_picture(path)
+    return plane_of(path) if in_array(path) or path.parent.is_file() else read_picture(path)
 
 
 @lru_cache(maxsize=2)

@@ -17,6 +17,7 @@ from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, intrinsics_of_view, scene_factor
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.clips.sequences.depth_stacks import ENDINGS as ARRAY_ENDINGS
 from endotsr.clips.sequences.depth_stacks import stack_planes
 from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.mask_values import levels_of_set, refuse_coded_objects, white_pixels
@@ -31,6 +32,7 @@ from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import read_json, text
 
 PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
+MASK_ENDINGS = (*PICTURE_ENDINGS, *ARRAY_ENDINGS)
 LARGEST_MARK = 1 << 16  # bytes of this file
 # Pairs whose views are squeezed: how they are arranged, and the factors that restore width and height.
 SQUEEZED = {"half_side_by_side": ("side_by_side", 2, 1), "half_stacked": ("stacked", 1, 2)}
@@ -160,7 +162,7 @@ def stated_masks(
     """
     if options.masks is None:
         return None
-    files = mask_files(options.masks) or files_of(options.masks, PICTURE_ENDINGS)
+    files = mask_files(options.masks) or files_of(options.masks, MASK_ENDINGS)
     mark = options.masks.parent / PROPOSAL
     both = paired(frames, files, options.pairing, source_names)
     found = masks_of(both.files, options.excluded_value, width, height, mark.is_file())

@@ -20,10 +20,13 @@ class MaskEvidence:
     """Sums over tissue and excluded pixels of the frames of a clip."""
 
     def __init__(self) -> None:
+        self.tissue, self.size = 0, 0  # of all pixels; the other sums are over sampled ones
         self.pixels, self.without_depth, self.redness = np.zeros(2), np.zeros(2), np.zeros(2)  # tissue, excluded
 
     def add(self, picture: NDArray[np.uint8], tissue: BoolArray, depth: NDArray | None) -> None:
         """One frame: picture (H, W, 3), tissue (H, W) bool, depth (H, W) or None, 0 = missing."""
+        self.tissue += np.count_nonzero(tissue)
+        self.size += tissue.size
         mask, small = tissue[::STEP, ::STEP], picture[::STEP, ::STEP].astype(np.int32)
         redness = small[:, :, 0] - small[:, :, 2]
         for k, part in enumerate((mask, ~mask)):
@@ -45,7 +48,7 @@ class MaskEvidence:
         evidence = self.evidence
         if evidence is None or not evidence.against:
             return []
-        fraction, other = float(self.pixels[0] / self.pixels.sum()), OTHER[excluded_value]
+        fraction, other = self.tissue / self.size, OTHER[excluded_value]
         what = (
             f"with {excluded_value} = excluded, {fraction:.1%} of the pixels are tissue, and {evidence.said}; with"
             f" {other} = excluded ({OPTION} {other}), {1 - fraction:.1%} would be"
@@ -54,5 +57,5 @@ class MaskEvidence:
 
     def note(self, excluded_value: str) -> str:
         """The tissue share in words, with the evidence."""
-        evidence, tissue = self.evidence, f"{self.pixels[0] / self.pixels.sum():.1%} of the pixels are tissue"
+        evidence, tissue = self.evidence, f"{self.tissue / self.size:.1%} of the pixels are tissue"
         return f"masks: {excluded_value} = excluded: {tissue}" + (f"; {evidence.said}" if evidence else "")

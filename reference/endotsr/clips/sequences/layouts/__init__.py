@@ -13,11 +13,13 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import NamedTuple
 
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.sources import MASK_ENDINGS
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -109,9 +111,8 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
 
 def _stated_folders(options: SourceOptions) -> dict[Path, tuple[str, ...]]:
     """The folders of stated files, see `unread`."""
-    pictures = [folder / "*" for folder in (options.masks, options.right) if folder is not None and folder.is_dir()]
-    depth = [options.depth / "*"] if options.depth is not None and options.depth.is_dir() else []
-    return together(folders_of(pictures), folders_of(depth, DEPTH_ENDINGS))
+    stated = ((options.right, PICTURE_ENDINGS), (options.masks, MASK_ENDINGS), (options.depth, DEPTH_ENDINGS))
+    return together(*(folders_of([of / "*"], endings) for of, endings in stated if of is not None and of.is_dir()))
 
 
 def without_faults(clip: Clip) -> Clip:
