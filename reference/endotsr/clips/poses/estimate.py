@@ -18,7 +18,6 @@ from endotsr.clips.poses.movement import LEAST_MATCHES, FramePair, Movement, mov
 from endotsr.clips.poses.resection import left_over
 from endotsr.clips.poses.returns import Return, closed, returns_of
 from endotsr.clips.poses.views import Views, between, known_depth, small_views
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 
@@ -118,7 +117,7 @@ def _own_motion(matcher: Matcher, poses: list[CameraPose | None]) -> float:
     """Median length at the tissue of the flow that the poses leave between frames `APART` apart; NaN without any."""
     gap, focal = min(APART, matcher.count - 1), (matcher.camera.fx + matcher.camera.fy) / 2
     found = []
-    for i in even_frames(matcher.count - gap, MOST_APART):
+    for i in np.unique(np.linspace(0, matcher.count - 1 - gap, MOST_APART).astype(int)).tolist():
         if poses[i] is None or poses[i + gap] is None:
             continue
         matches = matcher.by_flow(i, i + gap)
