@@ -14,8 +14,8 @@
 # # 5. The translation residual and its Matérn prior (component S)
 #
 # Breathing and heartbeat move tissue periodically. Component S therefore adds a Fourier series to the path of each
-# Gaussian. Its sixteen free coefficients per axis can also produce implausible motion between the frames, so a
-# Matérn-5/2 prior penalises fast motion.
+# Gaussian. With sixteen free coefficients per axis, such a series can also produce implausible motion between the
+# frames. A Matérn-5/2 prior therefore penalises fast motion.
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
@@ -64,9 +64,10 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # \mu_i(t) = \mu_i + \psi_{0:3,i}(t) + \Delta\mu_i(t).
 # $$
 #
-# $\mu_i$ is the stored position, and $\psi$ is the offset of the deformation model of {doc}`04_deformation`. The atoms are
-# **raw**, not normalised. For a raw pair of sine and cosine the penalty below does not depend on the phase. The sine and
-# the cosine of a normalised pair have different scales, and the penalty would depend on it.
+# Here $\mu_i$ is the stored position, and $\psi$ is the offset of the deformation model of {doc}`04_deformation`.
+# Unlike the colour residual, the translation uses the **raw** atoms. A shift in time changes the phase of a raw pair
+# of sine and cosine, and the penalty below does not depend on this phase. In a normalised pair the sine and the cosine
+# have different scales, and the penalty would depend on it.
 #
 # <!-- definition: endotsr.definition.motion.motion_forward -->
 # ```python
@@ -84,9 +85,10 @@ for t in (0.0, 0.37, 0.9):
 # %% [markdown]
 # ## The weights: from a covariance to a spectrum
 #
-# A Gaussian process with Matérn-5/2 covariance $k(\tau)=\bigl(1+\sqrt5\,r+\tfrac53r^2\bigr)e^{-\sqrt5\,r}$,
-# $r=|\tau|/\ell$, gives smooth paths. Two values of a path have the correlation 0.52 at the distance $\ell$ and 0.03 at
-# $3\ell$. By Bochner's theorem such a covariance is the Fourier transform of a non-negative spectral density, here
+# Let $\tau$ be the difference of two times and $r=|\tau|/\ell$. A Gaussian process with the Matérn-5/2 covariance
+# $k(\tau)=\bigl(1+\sqrt5\,r+\tfrac53r^2\bigr)e^{-\sqrt5\,r}$ gives smooth paths. The values of a path at two times
+# have the correlation 0.52 if the times differ by $\ell$, and 0.03 if they differ by $3\ell$. By Bochner's theorem the
+# covariance is the Fourier transform of a non-negative spectral density, which here is
 # $S(\omega)\propto\bigl(5/\ell^2+(2\pi\omega)^2\bigr)^{-3}$. The next cell checks this with a plain sum.
 
 # %%
@@ -104,18 +106,19 @@ assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 # %% [markdown]
 # The penalty follows from this density in four steps.
 #
-# **(5.1) The prior.** Each coefficient is an independent normal number with mean 0. Its variance is proportional to the
-# spectral density of its frequency, $S(\omega_f)$.
+# **(5.1) The prior.** The coefficients are independent normal variables with mean 0. The variance of a coefficient is
+# proportional to the spectral density $S(\omega_f)$ at its frequency.
 #
-# **(5.2) Its negative logarithm** is, up to constants, a sum of squares, each divided by its variance. The weight of a
-# square is therefore proportional to $1/S(\omega_f)\propto\tilde\rho_f=\bigl(5/\ell^2+(2\pi\omega_f)^2\bigr)^3$.
+# **(5.2) The negative logarithm** of this prior is, up to constants, a sum of the squared coefficients, each divided
+# by its variance. The weight of a square is therefore proportional to
+# $1/S(\omega_f)\propto\tilde\rho_f=\bigl(5/\ell^2+(2\pi\omega_f)^2\bigr)^3$.
 #
-# **(5.3) The scale of the weights** belongs to the setting $\lambda_{\mathrm{msp}}$. Dividing by the mean of
-# $\tilde\rho$ gives weights of mean 1 for every $\ell$, so $\ell$ distributes the penalty over the frequencies and
-# $\lambda_{\mathrm{msp}}$ sets its size.
+# **(5.3) The scale of the weights** is left to the setting $\lambda_{\mathrm{msp}}$. Division by the mean of
+# $\tilde\rho$ gives weights of mean 1 for every $\ell$. In this way $\ell$ distributes the penalty over the
+# frequencies, and $\lambda_{\mathrm{msp}}$ sets its size.
 #
-# **(5.4) The mean.** The sum runs over 3 directions, $2F$ atoms and $N$ Gaussians. Division by $6NF$ makes the penalty
-# independent of the number of Gaussians, which density control changes.
+# **(5.4) The mean.** The sum runs over 3 directions, $2F$ atoms and $N$ Gaussians, which are $6NF$ terms. Density
+# control changes the number of Gaussians. Division by $6NF$ makes the penalty independent of this number.
 #
 # $$
 # \begin{aligned}
@@ -157,10 +160,11 @@ text, _ = definition_of_prior.matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, text, rtol=1e-13)
 
 # %% [markdown]
-# **The implied covariance differs.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are
-# not a uniform grid. Independent coefficients with variances $\propto 1/\rho_f$ give a path with the covariance
-# $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is not a Matérn covariance: its correlation at $\ell$ is 0.02 instead of
-# 0.52, and it does not decay. The penalty only defines the relative cost of the frequencies.
+# **The implied covariance differs.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies do
+# not form a uniform grid. If the coefficients are independent with variances $\propto 1/\rho_f$, the path has the
+# covariance $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. This is not a Matérn covariance: its correlation at $\tau=\ell$
+# is 0.02 instead of 0.52, and it does not decay as $\tau$ grows. The penalty only defines the relative cost of the
+# frequencies.
 
 # %%
 implied = lambda tau: np.sum(np.cos(2 * np.pi * omega * tau) / rho) / np.sum(1 / rho)
@@ -169,9 +173,10 @@ assert round(implied(length), 2) == 0.02
 assert max(abs(implied(tau)) for tau in np.linspace(0.6, 1.0, 81)) > 0.3, "three to five l"
 
 # %% [markdown]
-# **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale
-# $1/\ell$, evaluated at $2\pi\omega$. Such a variable is a normal variable whose precision has a gamma distribution of
-# shape and rate $5/2$. The integral over the precision gives the same weights without the formula of $S$:
+# **The Student-t identity.** Up to a constant factor, $S(\omega)$ is the density of a Student-t variable with 5
+# degrees of freedom and scale $1/\ell$, evaluated at $2\pi\omega$. Such a variable is a normal variable whose
+# precision is random, with a gamma distribution of shape and rate $5/2$. An integral over the precision gives the same
+# weights without the formula of $S$:
 
 # %%
 precision = np.exp(np.linspace(-30, 5, 2001))  # equal steps of its logarithm
@@ -183,9 +188,9 @@ density = (gamma * normal).sum(axis=1)  # up to a constant factor
 np.testing.assert_allclose(rho, (1 / density) / np.mean(1 / density), rtol=1e-13)
 
 # %% [markdown]
-# **Invariance to phase.** Rotating the (sine, cosine) pair of a frequency by an angle $\theta$ shifts this component of
-# the path in time, by $\theta/(2\pi\omega_f)$. The path as a whole is shifted only if all pairs are shifted by the same
-# time. The penalty is unchanged in both cases.
+# **Invariance to phase.** If the coefficients of the sine and the cosine of one frequency are rotated by an angle
+# $\theta$, this component of the path shifts in time by $\theta/(2\pi\omega_f)$. The path as a whole shifts only if
+# all pairs are shifted by the same time. In both cases the penalty is unchanged.
 
 
 # %%
@@ -219,11 +224,13 @@ assert np.ptp(difference - normalised(turned(C, theta), 0.5) + normalised(C, 0.5
 # %% [markdown]
 # ## Figure: the effect of the penalty on a trajectory
 #
-# A point moves on a smooth path. It is observed with a little noise in the training frames of a short clip: 17 stamps
-# for 16 coefficients. With almost as many unknowns as observations, many series fit the stamps equally well and differ
-# between them. The Fourier series is fitted twice: by least squares alone, and with
-# $\lambda_{\mathrm{msp}}\,\mathcal L_{\mathrm{msp}}$ added. The minimum of a quadratic is the solution of one linear system,
-# whose matrix is built from the reverse pass below. Where will the two fits differ more, at the stamps or between them?
+# A point moves on a smooth path. It is observed with a little noise in the training frames of a short clip, which give
+# 17 stamps for 16 coefficients. With almost as many unknowns as observations, many series fit the stamps about equally
+# well and differ between them. The Fourier series is fitted twice: by least squares alone, and with
+# $\lambda_{\mathrm{msp}}\,\mathcal L_{\mathrm{msp}}$ added. In each case the minimum of a quadratic is the solution of
+# one linear system, whose matrix is built from the reverse pass below. The left panel shows both paths, the middle
+# panel the energy of their coefficients, and the right panel the weights for several values of $\ell$. Where will the
+# two fits differ more, at the stamps or between them?
 
 # %% tags=["hide-input"]
 stamps = np.delete(np.arange(20), np.arange(1, 20, 8)) / 20
@@ -289,8 +296,9 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_{\Delta\mu}$ for each direction and Gaussian. We need gradients with respect to the coefficients $C$
-# and to the atoms $\phi$. The translation is bilinear, like the argument of the colour residual in (2.5) and (2.6).
+# Here $g_{\Delta\mu}$ is given for each direction and Gaussian, and we need the gradients with respect to the
+# coefficients $C$ and to the atoms $\phi$. The translation is bilinear in the two, like the argument of the colour
+# residual in (2.5) and (2.6).
 #
 # **(5.5) One coefficient** is multiplied by one atom, so $g_{C_{dki}}=g_{\Delta\mu_{di}}\,\phi_k$.
 #
@@ -302,8 +310,8 @@ plt.show()
 # g_{\phi_k} = \sum_{i=1}^{N}\sum_{d=1}^{3} g_{\Delta\mu_{di}}\,C_{dki} .
 # $$
 #
-# **(5.7) The penalty.** $\mathrm dC^2=2C\,\mathrm dC$, and $2/(6NF)=1/(3NF)$. $\rho$ depends on the settings only and
-# is held fixed.
+# **(5.7) The penalty.** The weights $\rho$ depend on the settings only and are held fixed. With
+# $\mathrm dC^2=2C\,\mathrm dC$, the factor $1/(6NF)$ of the sum becomes $2/(6NF)=1/(3NF)$.
 #
 # $$
 # g_{C_{d,f,i}} = \frac{\rho_f}{3NF}\,C_{d,f,i}\;g_{\mathcal L_{\mathrm{msp}}},\qquad
@@ -336,9 +344,9 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # %% [markdown]
 # ## Interactive figure: correlation length and penalty
 #
-# A trajectory is fitted to noisy frames: the mean squared error plus $\lambda_{\mathrm{msp}}\mathcal L_{\mathrm{msp}}$ of
-# {eq}`eq-4` is minimal. Before you move a slider: what is left of the curve at the largest weight, a straight line, the
-# slow wave, or the beat?
+# The curve is a trajectory fitted to noisy frames: for it, the mean squared error plus
+# $\lambda_{\mathrm{msp}}\mathcal L_{\mathrm{msp}}$ of {eq}`eq-4` is minimal. Before you move a slider, predict what is
+# left of the curve at the largest weight: a straight line, the slow wave, or the beat?
 #
 # <div class="widget" data-widget="matern">The figure is live in the built book.</div>
 
@@ -361,14 +369,14 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. The correlation length is doubled. How do the weights of the slowest and of the fastest frequency change, if their
-#    mean stays 1?
+# 1. The correlation length is doubled, and the weights keep their mean of 1. How do the weights of the slowest and of
+#    the fastest frequency change?
 # 2. Write the pair of the penalty {eq}`eq-4` and let the golden cases judge it: `--only matern`. Then write the pair of
 #    {eq}`eq-3`: `--only motion` ({doc}`index`).
 # 3. The cell below answers this one. The raw cosines are 1 at $t=0$, so $C$ can contain a constant offset of the
-#    position. The canonical position could represent that offset at no cost. Does the penalty allow the offset in $C$?
-#    What is the penalty of a slow drift $x=t$, fitted by the atoms, compared with an oscillation of the same size at 16
-#    cycles?
+#    position. The canonical position could represent this offset at no cost. Does the penalty allow it in $C$? Then
+#    fit a slow drift $x=t$ with the atoms. How does its penalty compare with that of an oscillation of the same size
+#    at 16 cycles?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The penalty allows the offset at a cost, and the canonical position represents it at

@@ -13,9 +13,9 @@
 # %% [markdown]
 # # 6. Quaternions, scales and the covariance
 #
-# A few flat or long Gaussians cover a wall or a vessel better than many round ones. The shape of a Gaussian is given by
-# three semi-axes and a rotation. A gradient step may lead to any real number, so both are stored in a form that allows
-# every number: the quaternion may have any length, and the axes are stored as logarithms.
+# A few flat or long Gaussians cover a wall or a vessel better than many round ones. A Gaussian therefore has three
+# semi-axes and a rotation. A gradient step can move a stored number to any real value, so both are stored in a form
+# for which every real value is valid: the rotation as a quaternion of any length, and the semi-axes as logarithms.
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
@@ -70,8 +70,8 @@ N = 6
 # \end{aligned}
 # $$
 #
-# Two inputs need a rule. A log-scale outside $[-40,40]$ is clipped to that interval, since the square of a larger scale
-# could overflow. The zero quaternion, whose direction is undefined, is taken as the identity $(1,0,0,0)$.
+# Two kinds of input need a rule. A log-scale outside $[-40,40]$ is clipped to that interval, since the square of a
+# larger scale could overflow. The zero quaternion has no direction and is taken as the identity $(1,0,0,0)$.
 #
 # <!-- definition: endotsr.definition.covariance.unit -->
 # ```python
@@ -121,8 +121,8 @@ np.testing.assert_allclose(
 )
 
 # %% [markdown]
-# The definition writes $R$ with the vector part $\mathbf v=(x,y,z)$ of the quaternion. For a unit quaternion this is the
-# matrix of the display, because $w^2-\mathbf v\cdot\mathbf v=1-2\,\mathbf v\cdot\mathbf v$.
+# The definition writes $R$ with the vector part $\mathbf v=(x,y,z)$ of the quaternion. For a unit quaternion the
+# result equals the matrix of the display, because $w^2-\mathbf v\cdot\mathbf v=1-2\,\mathbf v\cdot\mathbf v$.
 
 # %%
 w, x, y, z = definition.unit(q)[0]
@@ -134,8 +134,9 @@ printed = [
 np.testing.assert_allclose(text.rotation, printed, atol=1e-14)
 
 # %% [markdown]
-# The length of the raw quaternion has no effect, even if its square would overflow or underflow. $q$ and $-q$ are the
-# same rotation. The zero quaternion can occur, because the deformation model adds an offset to the stored one.
+# The next cell checks the rules. The length of the raw quaternion has no effect, even if its square would overflow or
+# underflow. The quaternions $q$ and $-q$ give the same rotation. The zero quaternion gives the identity. It can occur,
+# because the deformation model adds an offset to the stored quaternion.
 
 # %%
 for factor in (1e-300, 1e-30, -1.0, 1e300):
@@ -150,18 +151,19 @@ np.testing.assert_allclose(covariance_forward(q, s + 60)[0].scale, np.exp(40.0))
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_\Sigma$, with all nine entries taken as independent. We need gradients with respect to the log-scales
-# and to the raw quaternion.
+# Here $g_\Sigma$ is given, with all nine entries taken as independent, and we need the gradients with respect to the
+# log-scales and to the raw quaternion.
 #
-# **(6.1) The product.** $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
-# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$. Each entry of $M$ occurs twice, once in a row and once in a
-# column. The gradient adds both: $g_M=(g_\Sigma+g_\Sigma^\top)M$.
+# **(6.1) The product.** Let $M=R\,\mathrm{diag}(S)$. Then $\Sigma=MM^\top$, and
+# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$. Each entry of $M$ occurs in both factors, and its gradient
+# is the sum of the two contributions: $g_M=(g_\Sigma+g_\Sigma^\top)M$.
 #
-# **(6.2) Its two factors.** $M_{jk}=R_{jk}S_k$. With $S$ held fixed, $g_{R_{jk}}=g_{M_{jk}}S_k$. With $R$ held fixed,
-# a semi-axis scales one whole column, so $g_{S_k}=\sum_jR_{jk}\,g_{M_{jk}}$.
+# **(6.2) The two factors of $M$.** By definition $M_{jk}=R_{jk}S_k$. With $S$ held fixed, $g_{R_{jk}}=g_{M_{jk}}S_k$.
+# With $R$ held fixed, a semi-axis scales one whole column of $M$, so $g_{S_k}=\sum_jR_{jk}\,g_{M_{jk}}$.
 #
-# **(6.3) The logarithm.** $S_k=e^{s_k}$ gives $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$. A clipped
-# log-scale, $|s_k|>40$, does not change $S_k$ and has the gradient 0; at exactly $\pm40$ the gradient passes.
+# **(6.3) The logarithm.** From $S_k=e^{s_k}$ follow $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$. If a
+# log-scale is clipped, $|s_k|>40$, a change of $s_k$ does not change $S_k$, and the gradient is 0. At exactly $\pm40$
+# the gradient passes.
 #
 # $$
 # g_M=(g_\Sigma+g_\Sigma^\top)M,\qquad g_{S_k}=\sum_j R_{jk}\,g_{M_{jk}},\qquad g_{s_k}=S_k\,g_{S_k},\qquad g_{R_{jk}}=g_{M_{jk}}S_k .
@@ -172,25 +174,28 @@ np.testing.assert_allclose(covariance_forward(q, s + 60)[0].scale, np.exp(40.0))
 # so its differential has two parts:
 # $\mathrm dR=2(w\,\mathrm dw-\mathbf v\cdot\mathrm d\mathbf v)\,I+2(\mathrm d\mathbf v\,\mathbf v^\top+\mathbf v\,\mathrm d\mathbf v^\top)+2\,\mathrm dw\,[\mathbf v]_\times+2w\,[\mathrm d\mathbf v]_\times$.
 #
-# **(6.5) Three contractions.** With $G=g_R$ and $\langle G,\mathrm dR\rangle=\sum_{jk}G_{jk}\,\mathrm dR_{jk}$, each term
-# becomes a number or a vector. $\langle G,I\rangle$ is the trace $\tau=\sum_jG_{jj}$. The symmetric part is
+# **(6.5) Three contractions.** Let $G=g_R$. The change of the loss is
+# $\langle G,\mathrm dR\rangle=\sum_{jk}G_{jk}\,\mathrm dR_{jk}$, in which each term of (6.4) becomes a number or a
+# vector. The contraction with the identity is the trace, $\langle G,I\rangle=\tau=\sum_jG_{jj}$. The symmetric term
+# gives
 # $\langle G,\mathrm d\mathbf v\,\mathbf v^\top+\mathbf v\,\mathrm d\mathbf v^\top\rangle=\mathrm d\mathbf v\cdot(G+G^\top)\mathbf v$.
-# The antisymmetric part is $\langle G,[\mathbf a]_\times\rangle=\mathbf a\cdot\mathbf s$ with the *spin*
-# $\mathbf s=(G_{21}-G_{12},\ G_{02}-G_{20},\ G_{10}-G_{01})$.
+# The antisymmetric term gives $\langle G,[\mathbf a]_\times\rangle=\mathbf a\cdot\mathbf s$ for any vector
+# $\mathbf a$, where $\mathbf s=(G_{21}-G_{12},\ G_{02}-G_{20},\ G_{10}-G_{01})$ is called the *spin*.
 #
-# **(6.6) The unit quaternion.** Collecting $\mathrm dw$ and $\mathrm d\mathbf v$ gives $g_w=2w\tau+2\,\mathbf s\cdot\mathbf v$ and
-# $g_{\mathbf v}=-2\tau\,\mathbf v+2(G+G^\top)\mathbf v+2w\,\mathbf s$.
+# **(6.6) The unit quaternion.** Collecting the factors of $\mathrm dw$ and of $\mathrm d\mathbf v$ gives
+# $g_w=2w\tau+2\,\mathbf s\cdot\mathbf v$ and $g_{\mathbf v}=-2\tau\,\mathbf v+2(G+G^\top)\mathbf v+2w\,\mathbf s$.
 #
-# **(6.7) Two forms.** The display below differentiates the printed matrix, whose diagonal has $1$ instead of $\|q\|^2$.
-# It lacks the gradient of $(\|q\|^2-1)\,\tau$, which is $2\tau q$. That vector points along $q$, and the next line
-# removes it. Both forms therefore give the same $g_{\tilde q}$.
+# **(6.7) Two forms.** The display below differentiates the matrix as printed above, whose diagonal contains $1$ where
+# (6.4) has $\|q\|^2$. Compared with (6.6), it lacks the gradient of $(\|q\|^2-1)\,\tau$, which is $2\tau q$. This
+# vector points along $q$, and step (6.8) removes the component along $q$. Both forms therefore give the same
+# $g_{\tilde q}$.
 #
-# **(6.8) The length.** $q=\tilde q/\|\tilde q\|$ gives
-# $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the rotation, so
-# that part of $g_q$ is removed. A longer $\tilde q$ rotates less for the same step, so the rest is divided by its length.
-# At $\tilde q=0$ the gradient is set to 0.
+# **(6.8) The length.** From $q=\tilde q/\|\tilde q\|$ follows
+# $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the
+# rotation, so the component of $g_q$ along $q$ is removed. The same step rotates a longer $\tilde q$ by a smaller
+# angle, so the rest is divided by the length. At $\tilde q=0$ the gradient is set to 0.
 #
-# Indices of $G$ count from 0, as in the code.
+# In the display the indices of $G$ count from 0, as in the code.
 #
 # $$
 # \begin{aligned}
@@ -277,8 +282,9 @@ assert not covariance_reverse(Shape(g_R, g_S), clipped).d_log_scale.any()
 # %% [markdown]
 # ## Figure: a shape found by its gradient
 #
-# Can a nearly round Gaussian become a long, turned one through these gradients alone? The next cell minimises
-# $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass, with $g_\Sigma=2(\Sigma-\Sigma^\star)$.
+# Can these gradients alone turn a nearly round Gaussian into a long, rotated one? Let $\Sigma^\star$ be the covariance
+# of the target. The next cell minimises $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass,
+# which starts from $g_\Sigma=2(\Sigma-\Sigma^\star)$.
 
 # %% tags=["hide-input"]
 q_now, s_now = np.array([[1.0], [0.1], [0.2], [0.1]]), np.log([[0.6], [0.5], [0.55]])
@@ -324,8 +330,8 @@ plt.show()
 # %% [markdown]
 # ## The gradient check
 #
-# `check_function` takes any forward and reverse function. The first check is the chain through $\Sigma$ as derived
-# above; the second is the pair `covariance` of `endotsr gradcheck`.
+# The function `check_function` takes any pair of a forward and a reverse function. The first check covers the whole
+# chain through $\Sigma$ as derived above, and the second the pair `covariance` of `endotsr gradcheck`.
 
 
 # %%
@@ -361,9 +367,9 @@ assert all(report.passed for report in reports)
 # 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (6.2) and (6.6).
 # 2. Write `covariance_reverse` from (6.3), (6.6) and (6.8) and let the golden cases judge it: `--only covariance`
 #    ({doc}`index`). Which case fails if the division by the length is omitted?
-# 3. The cell below answers this one. Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ instead of
-#    $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many parameter sets describe one
-#    ellipsoid?
+# 3. The cell below answers this one. Change the order of the axes of a Gaussian: its log-scales become $(s_2,s_3,s_1)$
+#    instead of $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many sets of parameters
+#    describe one ellipsoid?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1:

@@ -13,9 +13,10 @@
 # %% [markdown]
 # # 8. Colour that depends on the direction: spherical harmonics
 #
-# The colour of a wet surface depends on the viewing direction. Each Gaussian has up to 16 coefficients of the real
-# spherical harmonics per channel. They are evaluated in the direction from the camera to the deformed centre. The
-# colour residual of {doc}`02_colour_residual` is added to the first of them.
+# The colour of a wet surface depends on the direction from which it is seen. For each colour channel a Gaussian
+# therefore has up to 16 coefficients of the real spherical harmonics. The harmonics are evaluated in the direction
+# from the camera to the deformed centre of the Gaussian. The colour residual of {doc}`02_colour_residual` is added to
+# the first coefficient.
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
@@ -53,8 +54,9 @@ N = 9
 # \end{aligned}
 # $$
 #
-# Each $Y_k$ is a polynomial in $x,y,z$ of degree at most 3. The definition stores the polynomials as lists: a factor, then
-# coefficient and exponents of each monomial. A Gaussian at the camera itself has no direction; its $\mathbf n$ is set to 0.
+# Each $Y_k$ is a polynomial in $x,y,z$ of degree at most 3. The definition stores it as a common factor and a list of
+# monomials, each with its coefficient and its exponents. A Gaussian at the camera itself has no direction, and its
+# $\mathbf n$ is set to 0.
 
 # %%
 for k, (factor, polynomial) in enumerate(definition.POLYNOMIALS):
@@ -101,9 +103,10 @@ for degree in range(4):
 assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1"
 
 # %% [markdown]
-# **An independent source.** The associated Legendre functions $P_l^m(x)=(-1)^m(1-x^2)^{m/2}\,P_l^{(m)}(x)$, from the
-# Legendre polynomials $P_l$ of NumPy, give the same sixteen functions. Their sign convention $(-1)^m$ (Condon and
-# Shortley) is the same as in the table.
+# **An independent source.** The same sixteen functions follow from the associated Legendre functions
+# $P_l^m(x)=(-1)^m(1-x^2)^{m/2}\,P_l^{(m)}(x)$. Here $P_l^{(m)}$ is the derivative of order $m$ of the Legendre
+# polynomial $P_l$, which NumPy provides. The polynomials listed above and these functions share the sign convention
+# $(-1)^m$ of Condon and Shortley.
 
 # %%
 direction = rng.normal(size=(3, 50))
@@ -127,10 +130,10 @@ for band in range(4):
 # %% [markdown]
 # ## Figure: the sixteen functions
 #
-# Each function is drawn over the whole sphere (longitude to the right, latitude upwards); red is positive and blue is
-# negative. The kernel evaluates them, with one Gaussian per direction and one coefficient that is not 0. Before you look:
-# the camera moves to the opposite side of a Gaussian, so $\mathbf n$ becomes $-\mathbf n$. In which rows of the figure
-# does every function change its sign?
+# Each function is drawn over the whole sphere, with the longitude to the right and the latitude upwards. Red is
+# positive and blue is negative. The values are those of the compiled function, for one Gaussian per direction and one
+# coefficient that is not 0. Before you look, let the camera move to the opposite side of a Gaussian, so that
+# $\mathbf n$ becomes $-\mathbf n$. In which rows of the figure does every function change its sign?
 
 # %% tags=["hide-input"]
 lon, lat = np.meshgrid(np.linspace(-np.pi, np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37))
@@ -172,34 +175,36 @@ opposite = definition.basis(-around, 16)
 np.testing.assert_allclose(opposite, sign * definition.basis(around, 16), atol=1e-14)
 
 # %% [markdown]
-# In the second and the fourth row: the polynomials of degree 1 and 3 are odd.
+# All functions of the second and of the fourth row do: their polynomials have the odd degrees 1 and 3.
 
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_{rgb}$. We need gradients with respect to the coefficients, the residual, the centre of each Gaussian
-# and the optical centre of the camera.
+# Here $g_{rgb}$ is given, and we need the gradients with respect to the coefficients, the residual, the centre of each
+# Gaussian and the optical centre of the camera.
 #
-# **(8.1) The clamp.** $\max(0,\cdot)$ passes the gradient where the value before it is not negative:
-# $g^{\mathrm{pre}}=g_{rgb}$ there, and 0 elsewhere. At exactly 0 it passes.
+# **(8.1) The clamp.** Let $g^{\mathrm{pre}}$ be the gradient with respect to the argument of $\max(0,\cdot)$. Where
+# the argument is at least 0, $g^{\mathrm{pre}}=g_{rgb}$. Where it is negative, $g^{\mathrm{pre}}=0$.
 #
-# **(8.2) The coefficients.** The colour is linear in $h$, with the factor $Y_k(\mathbf n)$. So
-# $g_{h_k}=Y_k\,g^{\mathrm{pre}}$. The residual has the factor $Y_0$ of the coefficient to which it is added.
+# **(8.2) The coefficients.** The colour is linear in $h_k$, with the factor $Y_k(\mathbf n)$, so
+# $g_{h_k}=Y_k\,g^{\mathrm{pre}}$. The residual is added to $h_0$ and has the same factor $Y_0$.
 #
-# **(8.3) The direction.** The three channels share $\mathbf n$. Each coefficient contributes the slope of its polynomial:
-# $g_{\mathbf n}=\sum_k\bigl(\sum_cg^{\mathrm{pre}}_ch_{kc}\bigr)\,\partial Y_k/\partial(x,y,z)$. $Y_0$ is constant, so its
-# slope is 0.
+# **(8.3) The direction.** The three channels share $\mathbf n$, so their contributions add up. Each coefficient
+# contributes the slope of its polynomial:
+# $g_{\mathbf n}=\sum_k\bigl(\sum_cg^{\mathrm{pre}}_ch_{kc}\bigr)\,\partial Y_k/\partial(x,y,z)$. The constant $Y_0$
+# has the slope 0, so the sum begins at $k=1$.
 #
-# **(8.4) The slope of a monomial.** $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$, with $x,y,z$ taken as independent.
-# The gradient then has a part along $\mathbf n$, which (8.5) removes.
+# **(8.4) The slope of a monomial.** With $x,y,z$ taken as independent,
+# $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$. The resulting gradient also has a component along $\mathbf n$,
+# which (8.5) removes.
 #
-# **(8.5) The normalisation.** $\mathbf n=\mathbf v/\|\mathbf v\|$ gives
-# $\mathrm d\mathbf n=(I-\mathbf n\mathbf n^\top)\,\mathrm d\mathbf v/\|\mathbf v\|$. Only the part of $g_{\mathbf n}$ that is
-# perpendicular to $\mathbf n$ remains, divided by the distance. This is the rule (6.8) of the quaternion. At the camera
-# itself $g_{\mathbf v}$ is set to 0.
+# **(8.5) The normalisation.** From $\mathbf n=\mathbf v/\|\mathbf v\|$ follows
+# $\mathrm d\mathbf n=(I-\mathbf n\mathbf n^\top)\,\mathrm d\mathbf v/\|\mathbf v\|$. The gradient $g_{\mathbf v}$ is
+# therefore the component of $g_{\mathbf n}$ perpendicular to $\mathbf n$, divided by the distance. Step (6.8) has the
+# same rule for the quaternion. At the camera itself $g_{\mathbf v}$ is set to 0.
 #
-# **(8.6) The two ends.** $\mathbf v=\mu-\mathbf o$: the centre of the Gaussian receives $+g_{\mathbf v}$. The optical
-# centre is shared by all Gaussians and receives $-\sum_ig_{\mathbf v_i}$.
+# **(8.6) The two ends.** Since $\mathbf v=\mu-\mathbf o$, the centre of the Gaussian receives $+g_{\mathbf v}$. All
+# Gaussians share the optical centre, which receives $-\sum_ig_{\mathbf v_i}$.
 #
 # $$
 # \begin{aligned}
@@ -255,7 +260,7 @@ np.testing.assert_allclose(along, powers[:, None] * definition.basis(n, 16), ato
 # %% [markdown]
 # ## The gradient check
 #
-# There is one pair of a forward and a reverse pass for each active degree.
+# The check has one pair of a forward and a reverse pass for each active degree.
 
 # %%
 with one_thread():
@@ -271,7 +276,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. All coefficients of a Gaussian above degree 0 are 0. Which gradients vanish? Which of (8.2) and (8.3) decides it?
+# 1. All coefficients of a Gaussian above degree 0 are 0. Which gradients vanish, and does this follow from (8.2) or
+#    from (8.3)?
 # 2. Write `harmonics_reverse` from (8.1) to (8.6) and let the golden cases judge it: `--only harmonics` ({doc}`index`).
 #    One case has a Gaussian at the camera itself.
 # 3. The cell below answers this one. Mirror the scene: negate $x$ of all positions and of the camera. Which

@@ -13,8 +13,8 @@
 # %% [markdown]
 # # 9. Compositing, and its reverse pass line by line
 #
-# At a pixel the Gaussians are ordered by depth. From front to back, each absorbs a fraction of the light that remains.
-# This chapter derives this blend, called *compositing*, and its reverse pass line by line.
+# At each pixel the Gaussians are ordered by depth. From front to back, each absorbs a fraction of the light that
+# remains. This chapter derives this blend, which is called *compositing*, and its reverse pass.
 #
 # | Symbol | Meaning |
 # |---|---|
@@ -83,7 +83,8 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # %% [markdown]
 # ## Forward: the footprint
 #
-# The ellipse of a Gaussian on the screen gives it an opacity at each pixel, at most $\alpha_{\max}$:
+# A Gaussian has an opacity at each pixel, which is largest at its screen centre and falls off with the ellipse of its
+# covariance. It is at most $\alpha_{\max}$:
 #
 # $$
 # \begin{aligned}
@@ -93,12 +94,13 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # \end{aligned}
 # $$
 #
-# $q$ is the squared distance in units of the standard deviations of the ellipse (the Mahalanobis distance). It is written
-# as a sum of two squares. Such a sum is never negative, and it is accurate for needles ({doc}`15_hard_cases`).
+# Here $q$ is the squared Mahalanobis distance: the squared distance of the pixel from the centre, in units of the
+# standard deviations of the ellipse. The formula writes it as a sum of two squares. Such a sum is never negative, and
+# it is accurate even for needles ({doc}`15_hard_cases`).
 #
 # ## Forward: the blend
 #
-# The contributors of a pixel, front to back, are numbered $0,1,\dots,n-1$:
+# Let the contributors of a pixel be numbered $0,1,\dots,n-1$ from front to back. Their blend is:
 #
 # $$
 # \begin{aligned}
@@ -109,8 +111,8 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # \end{aligned}
 # $$
 #
-# Gaussians of equal depth keep the order of their index. A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ does not contribute.
-# If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel ends before Gaussian $k$ is blended. The preset `paper` has
+# Gaussians of equal depth are blended in the order of their indices. A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ is
+# no contributor. If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the blend ends before Gaussian $k$. The preset `paper` has
 # $\alpha_{\max}=0.99$, $\alpha_{\mathrm{cut}}=1/255$ and $T_{\mathrm{stop}}=10^{-4}$; `exact` has 1, 0 and 0.
 #
 # <!-- definition: endotsr.definition.compositing.opacity_of -->
@@ -211,11 +213,11 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
 # %% [markdown]
 # ## Figure: one ray, and the support of a splat under each preset
 #
-# Left: the contributors of one pixel. The height of a bar is the remaining light, $T_k$; the filled part is the
-# fraction that the Gaussian absorbs. Right: one Gaussian under the three presets. The support of `exact` is the whole
-# image. The support of `paper` ends on the ellipse at which $\alpha$ has fallen to 1/255. `legacy` uses the tiles
-# within three standard deviations. Here this removes a few pixels of the ellipse at the bottom, too faint to be seen;
-# the cell below the figure counts them.
+# The left panel shows the contributors of one pixel. The height of a bar is the remaining light $T_k$, and the filled
+# part is the fraction $\alpha_kT_k$ that the Gaussian absorbs. The other panels show one Gaussian under the three
+# presets. The support of `exact` is the whole image. The support of `paper` ends on the ellipse at which $\alpha$ has
+# fallen to 1/255. The preset `legacy` uses the tiles within three standard deviations. Here this removes a few pixels
+# of the ellipse at the bottom, too faint to be seen; the cell below the figure counts them.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(
@@ -272,28 +274,29 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_{\hat I},g_{\hat D},g_{\hat O}$ at each pixel. We need gradients with respect to every $\alpha_k$,
-# colour and depth.
+# Here $g_{\hat I},g_{\hat D},g_{\hat O}$ are given at each pixel, and we need the gradients with respect to the
+# opacity $\alpha_k$, the colour and the depth of each contributor.
 #
-# **(9.1) The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
-# $\hat I=R_0$. Gaussian $k$ covers the fraction $\alpha_k$ of the colour behind it:
-# $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$, ending with $R_n=\mathbf{bg}$.
+# **(9.1) The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$, so that
+# $\hat I=R_0$. Gaussian $k$ covers the fraction $\alpha_k$ of the colour behind it, which gives the recursion
+# $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$ with the end $R_n=\mathbf{bg}$.
 #
-# **(9.2) Its weight in the pixel.** Unrolling (9.1) from the front gives
-# $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$. So $\partial\hat I/\partial R_k=T_k$: every change behind is weighted by
-# the transmittance in front.
+# **(9.2) The weight of $R_k$ in the pixel.** Unrolling (9.1) from the front gives
+# $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$, and therefore $\partial\hat I/\partial R_k=T_k$. A change of the colour
+# behind is weighted by the transmittance in front.
 #
-# **(9.3) One opacity.** $T_k$ does not depend on $\alpha_k$, only on the opacities in front. $R_{k+1}$ does not
-# depend on it either, only on the opacities behind. So
-# $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. More opacity adds colour of
-# Gaussian $k$ and removes colour behind it.
+# **(9.3) One opacity.** The transmittance $T_k$ depends only on the opacities in front of Gaussian $k$, and $R_{k+1}$
+# only on those behind it. Neither depends on $\alpha_k$, so
+# $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. More opacity adds colour
+# of Gaussian $k$ and removes colour behind it.
 #
-# **(9.4) Depth and opacity** are the same sum, with $z_k$ or $1$ instead of the colour and 0 as background. They give
-# $Z_k$ and $Q_k$.
+# **(9.4) Depth and opacity** are sums of the same form, with $z_k$ or $1$ instead of the colour and 0 as the
+# background. $Z_k$ and $Q_k$ denote the counterparts of $R_k$ in these sums.
 #
-# **(9.5) Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
+# **(9.5) The colour and the depth of a Gaussian** enter these sums linearly, with the weight $\alpha_kT_k$.
 #
-# There is no division by $1-\alpha_k$, so $\alpha_k=1$ is not a special case:
+# Together these steps give the reverse pass of the blend. It contains no division by $1-\alpha_k$, so $\alpha_k=1$ is
+# not a special case:
 #
 # $$
 # \begin{aligned}
@@ -306,12 +309,13 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # \end{aligned}
 # $$
 #
-# **(9.6) From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
-# $\alpha=o\,e^{-q/2}$, so $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and
-# $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
+# **(9.6) From $\alpha$ to the footprint.** Where $\alpha$ is clamped to $\alpha_{\max}$, all gradients below are 0.
+# Elsewhere $\alpha=o\,e^{-q/2}$, so $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$. The
+# derivative of the sigmoid gives $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
 #
-# **(9.7) Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
-# $\mathrm d d_y=-\mathrm dv$:
+# **(9.7) Through $q$.** A shift of the centre by $(\mathrm du,\mathrm dv)$ changes the distances by
+# $\mathrm d d_x=-\mathrm du$ and $\mathrm d d_y=-\mathrm dv$. Differentiating $q=r\,d_y^2+A\,\eta^2$ with
+# $\eta=d_x-m\,d_y$ gives the other lines:
 #
 # $$
 # \begin{aligned}
@@ -321,16 +325,18 @@ assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
 # \end{aligned}
 # $$
 #
-# **(9.8) Once per Gaussian**, after the sum over pixels. $m=b/c$, $r=1/c$ and $A=c/(ac-b^2)$ have the derivatives
-# $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
-# $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
+# **(9.8) Once per Gaussian**, after the sum over the pixels, the gradients of $m=b/c$, $r=1/c$ and $A=c/(ac-b^2)$
+# become those of $a,b,c$. The partial derivatives are $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$,
+# $\partial A/\partial c=-A^2m^2$; $\partial m/\partial b=r$, $\partial m/\partial c=-mr$;
+# $\partial r/\partial c=-r^2$.
 #
 # $$
 # g_a=-A^2g_A,\qquad g_b=2A^2m\,g_A+r\,g_m,\qquad g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r .
 # $$
 #
-# The definition goes from $q$ to the covariance in one step, $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$
-# with $Q=\Sigma^{-1}$, instead of (9.8). The sums are the same.
+# Instead of (9.8) the definition differentiates $q$ with respect to the covariance $\Sigma$ on the screen in one step.
+# With $Q=\Sigma^{-1}$ and $d=(d_x,d_y)^{\mathsf T}$ it uses
+# $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$. The sums are the same.
 #
 # <!-- definition: endotsr.definition.compositing.composite_reverse -->
 # ```python
@@ -389,12 +395,12 @@ for settings in (PAPER, EXACT):
 # %% [markdown]
 # ## Figure: a pixel of the running clip
 #
-# The examples above have five Gaussians. The running clip of this book is a simulated clip of 63 frames of 640x512, and
-# the scene below was trained on it ({doc}`14_full_sequence`). The frame is held out: training did not use it. At the
-# marked pixel the model is wrong: a highlight is narrower in the render than in the frame. The bars are the terms of the
-# blend: many faint Gaussians, and most of them behind others. The right panel has $g_{\alpha_k}$ of (9.3) for the loss
-# $\frac12\|\hat I-I\|^2$. Where the gradient is negative, more opacity lowers the loss. Which contributors should have a
-# negative gradient, the white or the red ones?
+# The examples above have five Gaussians. The running clip of this book is a simulated clip of 63 frames of 640x512,
+# and the scene below was trained on it ({doc}`14_full_sequence`). The frame shown is held out, which means that it was
+# not used in training. At the marked pixel the model is wrong: a highlight is narrower in the render than in the
+# frame. The bars show the terms of the blend, which come from many faint Gaussians, most of them behind others. The
+# right panel shows $g_{\alpha_k}$ of (9.3) for the loss $\frac12\|\hat I-I\|^2$. Where this gradient is negative, more
+# opacity lowers the loss. Which contributors should have a negative gradient, the white or the red ones?
 
 # %% tags=["hide-input"]
 clip = load()
@@ -450,17 +456,18 @@ print(f"{len(terms)} contributors; the first {half} have half of the weight; T_n
 print(f"error of the pixel: {np.abs(g_pixel).max() * 255:.0f} of 255")
 
 # %% [markdown]
-# The render has too little green and blue, so the gradient is negative where the colour has more of both than $R_{k+1}$,
-# the colour **behind**. (9.3) compares a Gaussian with what it hides, not with the frame: one of the whiter half of the
-# contributors has a positive gradient, because it hides something whiter. The gradients are small where $T_k$ is small: a
-# Gaussian at the back changes the picture little while those in front of it are opaque.
+# At this pixel the render has too little green and blue. The gradient is therefore negative for a Gaussian that has
+# more of both than $R_{k+1}$, the colour **behind** it. Step (9.3) compares a Gaussian with what it hides, not with
+# the frame. One of the whiter half of the contributors has a positive gradient, because it hides something still
+# whiter. The gradients are small where $T_k$ is small: a Gaussian at the back changes the picture little while those
+# in front of it are opaque.
 
 # %% [markdown]
 # ## A deviation of `diff-gaussian-rasterization`
 #
-# The released rasteriser of 3DGS (`diff-gaussian-rasterization`) adds a small number to $\det^2$ in step (9.8). It
+# The released rasteriser of 3DGS (`diff-gaussian-rasterization`) adds a small number to $\det^2$ in step (9.8), which
 # multiplies its $g_a,g_b,g_c$ by $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces this under the name
-# `conic_epsilon`. The next cell uses a number that is large enough to be visible.
+# `conic_epsilon`. The next cell uses a larger number, to make the effect visible.
 
 # %%
 exact, damped = (
@@ -474,17 +481,19 @@ np.testing.assert_allclose(
 # %% [markdown]
 # ## Interactive figure: three opacities
 #
-# The grey box is the light that reaches a Gaussian, and the coloured part is the light that it absorbs. The loss is half
-# the squared distance to the target colour. Before you drag a handle: if the second opacity becomes 1, which gradients
-# become 0, that of the first, of the second or of the third? Derive it from (9.3), then try.
+# The grey box is the light that reaches a Gaussian, and the coloured part is the light that it absorbs. The loss is
+# half the squared distance to the target colour. Before you drag a handle, suppose that the second opacity becomes 1.
+# Which gradients become 0, that of the first, of the second or of the third opacity? Derive the answer from (9.3),
+# then try.
 #
 # <div class="widget" data-widget="compositing">The figure is live in the built book.</div>
 
 # %% [markdown]
 # ## The gradient check
 #
-# A difference is taken only between two ends with the same discrete decisions (order, contributors, clamp).
-# `composite_blocks` is the fast path that training uses. It runs front to back and computes the same gradients.
+# A finite difference is taken only between two points at which the discrete decisions (order, contributors, clamp) are
+# the same. The pair `composite_blocks` is the fast path of training, which runs front to back and computes the same
+# gradients.
 
 # %%
 with one_thread():
@@ -502,9 +511,9 @@ assert all(report.passed for report in reports)
 #    opacities have the same gradient, and that it is 0 where $c$ equals the background.
 # 2. Write the pair of {eq}`eq-b5` from (9.1) to (9.8) and let the golden cases judge it: `--only composite`
 #    ({doc}`index`). The case `opaque_exact` refuses a division by $1-\alpha$.
-# 3. The cell below answers this one. At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to back.
-#    Which of the three opacities and colours have a gradient? Many programs recover $T_k$ in the reverse pass by
-#    dividing the final $T_n$ by $1-\alpha$. What would such a program compute here?
+# 3. The cell below answers this one. At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to
+#    back. Which of the three opacities and of the three colours have a gradient? Many programs recover $T_k$ in the
+#    reverse pass by dividing the final $T_n$ by $1-\alpha$. What would such a program compute here?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The first two have gradients, the opaque one included (less opacity would show the

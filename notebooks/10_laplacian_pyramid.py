@@ -14,8 +14,9 @@
 # # 10. The mask-propagating Laplacian pyramid (component L)
 #
 # In a mean over pixels, a blurred vessel counts no more than a wall that is slightly too dark. Component L therefore
-# compares fine detail separately, in the bands of a pyramid. The difficulty is the instrument: a filter that reads one
-# of its pixels gives a wrong value. L counts a band value only if **no excluded pixel has any weight in it**.
+# compares fine detail separately, in the bands of a pyramid. The difficulty is the instrument, whose pixels are
+# excluded: a filter that reads one of these pixels gives a wrong value beside the instrument. Component L counts a
+# band value only if **no excluded pixel has any weight in it**.
 #
 # | Symbol | Meaning |
 # |---|---|
@@ -50,13 +51,14 @@ rng = np.random.default_rng(9)
 # %% [markdown]
 # ## Down and up
 #
-# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples:
+# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the samples of even
+# index:
 #
 # $$
 # (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
 # $$
 #
-# with the border reflected without repeating the edge sample.
+# At the border the image is reflected, without repeating the edge sample.
 #
 # Up-sampling $\mathsf U$ is linear interpolation along each axis, by one of two rules. The preset `paper` uses `co_sited`:
 #
@@ -69,8 +71,8 @@ rng = np.random.default_rng(9)
 # \end{aligned}
 # $$
 #
-# Both are linear and act on each axis separately, so each is a small matrix per axis. The definition forms these
-# matrices; the compiled functions do not.
+# Both rules are linear and act on each axis separately, so each consists of one small matrix per axis. The definition
+# forms these matrices; the compiled functions do not.
 #
 # <!-- definition: endotsr.definition.laplacian.reduce_matrix -->
 # ```python
@@ -132,8 +134,8 @@ for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
         np.testing.assert_allclose(rebuilt, image, atol=1e-14)  # nothing is lost
 
 # %% [markdown]
-# A unit ramp distinguishes the two rules: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with
-# `half_pixel`.
+# A ramp of slope 1 distinguishes the two rules. In its interior the three bands are 0 with `co_sited`, and
+# $\tfrac12,1,2$ with `half_pixel`.
 
 # %%
 ramp = np.broadcast_to(np.arange(96.0), (1, 96, 96)).copy()
@@ -145,9 +147,10 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 # %% [markdown]
 # ## Which values are valid
 #
-# The mask, true on tissue, passes through the same operations and gives the *support* of each level; $S_0$ is the mask. A
-# coarse sample is supported if all of its $5\times5$ inputs are supported. A band value is valid if its own fine sample is
-# supported, and so is every coarse sample that $\mathsf U$ reads there:
+# A second pyramid, that of the mask, says which values depend on tissue alone. Its level $S_j$ is the *support* of
+# level $j$, and $S_0$ is the mask itself, true on tissue. A coarse sample is supported if all of its $5\times5$ inputs
+# are supported. A band value is valid if its own fine sample is supported, and so is every coarse sample that
+# $\mathsf U$ reads there:
 #
 # $$
 # \begin{aligned}
@@ -158,8 +161,8 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 #
 # ## The loss
 #
-# With $G_0=\hat I$, $G_j=\mathsf D G_{j-1}$, $P_j=G_{j-1}-\mathsf U G_j$, the same for the observed image, and $n_j$
-# the number of valid values:
+# The levels of the render are $G_0=\hat I$ and $G_j=\mathsf D G_{j-1}$, and its bands are $P_j=G_{j-1}-\mathsf U G_j$.
+# The bands of the observed image are formed in the same way. With $n_j$ valid values in band $j$, the loss is:
 #
 # $$
 # \begin{aligned}
@@ -210,7 +213,8 @@ for rule in ("co_sited", "half_pixel"):
     np.testing.assert_allclose(loss, expected, rtol=1e-12)
 
 # %% [markdown]
-# **No value under the instrument is read.** The next cell puts NaN there, in the render and in the observed frame:
+# **No value under the instrument is read.** The next cell puts NaN there, in the render and in the observed frame.
+# Loss and gradient stay the same:
 
 # %%
 masks = support_masks(mask)
@@ -225,9 +229,9 @@ assert np.array_equal(
 # %% [markdown]
 # ## Figure: valid masks per level, and the effect of masking first
 #
-# The upper row has the valid values of each level. Grey is tissue whose value is not used, because its support touches the
-# instrument. The lower row has the bands of the observed image if it is first multiplied by the mask and then filtered.
-# Where do you expect the strongest detail then? At the edge of the instrument: the loss would make the render reproduce it.
+# The upper row shows the valid values of each level. Grey is tissue whose value is not used, because its support
+# touches the instrument. The lower row shows the bands of the observed image if the image is multiplied by the mask
+# first and filtered afterwards. Where do you expect the strongest detail in these bands?
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(10.1, 4.6), layout="constrained")
@@ -256,26 +260,32 @@ for panel in axes.flat:
 plt.show()
 
 # %% [markdown]
+# It is at the edge of the instrument, and the loss would make the render reproduce this edge.
+
+# %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_{\mathcal L}$. We need the gradient with respect to the render $\hat I$.
+# Here $g_{\mathcal L}$ is given, and we need the gradient with respect to the render $\hat I$.
 #
-# **(10.1) The absolute value.** $\mathrm d|x|=\operatorname{sign}(x)\,\mathrm dx$. Let $\sigma_j$ be the sign of the
-# difference of the bands. Three levels, three channels and $n_j$ values give each valid value the weight $1/(9n_j)$.
+# **(10.1) The absolute value.** The derivative of $|x|$ is $\operatorname{sign}(x)$. Let $\sigma_j$ be the sign of the
+# difference of the bands. The loss is a mean over three levels, three channels and $n_j$ values, so each valid value
+# has the weight $1/(9n_j)$.
 #
-# **(10.2) A linear map.** The rest is linear. $y=Mx$ gives $g_x=M^\top g_y$, so the reverse pass applies the transposes of
-# $\mathsf D$ and $\mathsf U$.
+# **(10.2) A linear map.** The remaining operations are linear, and $y=Mx$ gives $g_x=M^\top g_y$. The reverse pass
+# therefore applies the transposes of $\mathsf D$ and $\mathsf U$.
 #
-# **(10.3) One band.** $P_j=G_{j-1}-\mathsf UG_j$. So $g_{P_j}$ is added to the gradient of $G_{j-1}$, and
-# $-\mathsf U^\top g_{P_j}$ to the gradient of $G_j$.
+# **(10.3) One band.** Since $P_j=G_{j-1}-\mathsf UG_j$, the gradient $g_{P_j}$ is added to that of $G_{j-1}$, and
+# $-\mathsf U^\top g_{P_j}$ is added to that of $G_j$.
 #
 # **(10.4) The next level.** Since $G_{j+1}=\mathsf DG_j$, the term $\mathsf D^\top g_{G_{j+1}}$ is added to the gradient of
 # $G_j$.
 #
-# **(10.5) From coarse to fine.** $G_3$ occurs in $P_3$ only, so the reverse pass begins there. $G_2$ and $G_1$ collect the
-# three parts of (10.3) and (10.4). $G_0=\hat I$ is the fine image of $P_1$ and the source of $G_1$.
+# **(10.5) From coarse to fine.** The coarsest level $G_3$ occurs in $P_3$ only, so the reverse pass begins there. The
+# gradients of $G_2$ and $G_1$ collect the three parts of (10.3) and (10.4). Finally, $G_0=\hat I$ is the fine image of
+# $P_1$ and the source of $G_1$.
 #
-# **(10.6) Excluded pixels** are set to 0 before the pyramid is built. They are constants, so their gradient is 0.
+# **(10.6) Excluded pixels** are set to 0 before the pyramid is built. They are constants of the loss, so their
+# gradient is 0.
 #
 # $$
 # \begin{aligned}
@@ -311,16 +321,17 @@ for rule in ("co_sited", "half_pixel"):
 # %% [markdown]
 # ## Interactive figure: paint an instrument
 #
-# Paint excluded pixels in the first panel, with the pointer or with arrow keys and space. The other panels show the values
-# of each band that do not depend on an excluded pixel. Before you paint: a single excluded pixel in the middle removes a
-# neighbourhood of values, whose width in pixels about doubles from band to band. What fraction of band 3 does it remove?
+# Paint excluded pixels in the first panel, with the pointer or with the arrow keys and the space bar. The other panels
+# show the values of each band that do not depend on an excluded pixel. A single excluded pixel in the middle removes a
+# neighbourhood of values, whose width in pixels about doubles from band to band. Before you paint, estimate what
+# fraction of band 3 it removes.
 #
 # <div class="widget" data-widget="masks">The figure is live in the built book.</div>
 
 # %% [markdown]
 # ## The gradient check
 #
-# There is one pair for each rule of up-sampling.
+# The check has one pair for each rule of up-sampling.
 
 # %%
 with one_thread():
@@ -336,13 +347,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. A render is brighter than the frame by the same amount everywhere. Which bands differ? Which component of the
-#    model, and which other loss, corrects such an error?
-# 2. Write the pair of {eq}`eq-5` and let the golden cases judge it: `--only laplacian` ({doc}`index`). The case
-#    `not_finite_under_mask` refuses a pyramid that reads the instrument and multiplies afterwards.
+# 1. A render is brighter than the frame by the same amount everywhere. In which bands do the two differ? Which
+#    component of the model, and which other loss, corrects such an error?
+# 2. Write the pair of {eq}`eq-5`, and let the golden cases judge it: `--only laplacian` ({doc}`index`). A pyramid that
+#    reads the instrument and multiplies by the mask afterwards fails the case `not_finite_under_mask`.
 # 3. The cell below answers this one. A single pixel in the middle of a large image is excluded. How many values of
-#    each band become invalid (`co_sited`)? Does the number depend on whether the coordinates of the pixel are even or
-#    odd?
+#    each band become invalid with `co_sited`? Does the number depend on whether the coordinates of the pixel are even
+#    or odd?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. In band 1 an even pixel is read by more coarse samples than an odd one: it costs 49

@@ -14,9 +14,10 @@
 # # 11. The base losses: L1, SSIM, depth and smoothness
 #
 # A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
-# compare it with. The base model has a loss for each: the colour of each pixel (L1), the structure of the colours
-# (SSIM), the depth against the prior depth, and smoothness. The colour terms use no value under the instrument. There
-# the depth term uses only its two maxima, and smoothness only the render.
+# compare it with. The base model has one loss for each of these cases. L1 compares the colour of each pixel, SSIM the
+# structure of the colours, and the depth loss the rendered depth with the prior depth. Smoothness constrains the
+# render under the instrument, and the depth on tissue. The two colour losses use no value under the instrument. There,
+# the depth loss uses only its two maxima, and smoothness only the render.
 #
 # | Symbol | Meaning |
 # |---|---|
@@ -84,8 +85,8 @@ H, W = M.shape
 #
 # ## Masked SSIM
 #
-# Both images are 0 where the mask is False. $k$ is a Gaussian window of 11×11 with standard deviation 1.5 and sum 1.
-# $*$ is convolution with zeros outside the image.
+# In this loss both images are set to 0 where the mask is false. The window $k$ is an 11×11 Gaussian with the
+# standard deviation 1.5 and the sum 1. The sign $*$ denotes the convolution with zeros outside the image.
 #
 # $$
 # \begin{aligned}
@@ -108,8 +109,8 @@ H, W = M.shape
 # \end{aligned}
 # $$
 #
-# where $\mu_e,\sigma_e^2$ and $\mu_f,\sigma_f^2$ are mean and variance of $e$ and $f$ in the window. Without tissue
-# $\mathcal L_1$ is 0 and $\mathcal S$ is 1.
+# Here $\mu_e,\sigma_e^2$ and $\mu_f,\sigma_f^2$ are the mean and the variance of $e$ and of $f$ in the window. Without
+# tissue $\mathcal L_1$ is 0 and $\mathcal S$ is 1.
 #
 # <!-- definition: endotsr.definition.masked_l1.masked_l1_forward -->
 # ```python
@@ -182,8 +183,9 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # %% [markdown]
 # ## Normalised depth
 #
-# Rendered depth and prior depth are each divided by their own largest finite value over the whole image, so the scale of the
-# prior has no effect. Here $n$ counts the pixels of $V$. With fewer than 10 of them the loss is 0.
+# Rendered depth and prior depth are each divided by their own largest finite value over the whole image, so the scale
+# of the prior has no effect. Here $n$ is the number of pixels of $V$. If there are fewer than 10 of them, the loss is
+# 0.
 #
 # $$
 # m=\max_{p}\hat D_p,\qquad m_D=\max_{p}D_p,\qquad
@@ -192,9 +194,10 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 #
 # ## Smoothness
 #
-# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. They are Canny's edges ({doc}`/references`) of
-# the rendered depth, clipped to 0 to 255 and rounded down to whole scene units, with the thresholds 20 and 200. The two
-# total variations keep depth and colour flat under the instrument, where nothing is observed.
+# The first term, $\mathcal Q$, keeps the depth smooth on tissue, away from the depth edges $E$. These are the edges
+# that the detector of Canny ({doc}`/references`) finds in the rendered depth, with the thresholds 20 and 200. The
+# depth is first clipped to 0 to 255 and rounded down to whole scene units. The two total variations keep depth and
+# colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}
@@ -204,7 +207,7 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # \end{aligned}
 # $$
 #
-# with $K$ the number of channels (1 or 3).
+# Here $K$ is the number of channels (1 or 3).
 #
 # <!-- definition: endotsr.definition.depth.normalised_depth_forward -->
 # ```python
@@ -296,8 +299,9 @@ np.testing.assert_allclose(L_smooth, smooth_text, rtol=1e-12)
 # ## Figure: why SSIM is used in addition to L1
 #
 # The figure shows a window of the running clip: the held-out frame, and the render of the trained scene
-# ({doc}`14_full_sequence`). Beside it are three changes of the frame with the **same** masked L1 as the render. Which one
-# has the lowest SSIM? L1 does not distinguish the four; SSIM does. (The maps show $1-s$, averaged over channels.)
+# ({doc}`14_full_sequence`). Beside the render are three other changes of the frame, which have the **same** masked L1
+# as the render. Which one has the lowest SSIM? L1 does not distinguish the four pictures; SSIM does. (The maps show
+# $1-s$, averaged over the channels.)
 
 # %% tags=["hide-input"]
 from scipy.ndimage import gaussian_filter
@@ -341,38 +345,41 @@ assert abs(scores["render"] - scores["noisy"]) < 0.01
 plt.show()
 
 # %% [markdown]
-# The SSIM of the render is about that of noise of the same size. Its map has bright spots where a highlight and two fine
-# vessels are missing.
+# The SSIM of the render is about that of noise with the same L1. Its map has bright spots where a highlight and two
+# fine vessels are missing.
 
 # %% [markdown]
 # ## The reverse passes, line by line
 #
-# **(11.1) L1.** The derivative of $|x|$ is $\operatorname{sign}(x)$, with $\operatorname{sign}(0)=0$. The mean has the
-# factor $1/(3n)$. Excluded pixels are not in the sum.
+# **(11.1) L1.** The derivative of $|x|$ is $\operatorname{sign}(x)$, with $\operatorname{sign}(0)=0$. The mean
+# contributes the factor $1/(3n)$. Excluded pixels do not occur in the sum, so their gradient is 0.
 #
 # $$
 # g_{\hat I_{cp}}=\begin{cases}\dfrac{g_{\mathcal L_1}}{3n}\operatorname{sign}(\hat I_{cp}-I_{cp}) & M_p\\ 0 & \text{otherwise,}\end{cases}\qquad \operatorname{sign}(0)=0 .
 # $$
 #
-# **(11.2) SSIM: what depends on $x$.** $y$ is held fixed. $x$ enters through three windowed images: $\mu_x=k*x$,
-# $X=k*x^2$ and $Z=k*(xy)$. In these, $a_1=2\mu_x\mu_y+C_1$, $a_2=2(Z-\mu_x\mu_y)+C_2$, $b_1=\mu_x^2+\mu_y^2+C_1$ and
-# $b_2=X-\mu_x^2+\sigma_y^2+C_2$.
+# **(11.2) SSIM: what depends on $x$.** The frame $y$ is held fixed. The render $x$ enters through three windowed
+# images: $\mu_x=k*x$, $X=k*x^2$ and $Z=k*(xy)$. In terms of these, $a_1=2\mu_x\mu_y+C_1$, $a_2=2(Z-\mu_x\mu_y)+C_2$,
+# $b_1=\mu_x^2+\mu_y^2+C_1$ and $b_2=X-\mu_x^2+\sigma_y^2+C_2$.
 #
 # **(11.3) The logarithmic differential** of $s=a_1a_2/(b_1b_2)$ is
 # $\mathrm ds=\dfrac{a_2\,\mathrm da_1+a_1\,\mathrm da_2}{b_1b_2}-s\Bigl(\dfrac{\mathrm db_1}{b_1}+\dfrac{\mathrm db_2}{b_2}\Bigr)$.
 #
-# **(11.4) The partial with respect to $\mu_x$.** $\mathrm da_1=2\mu_y\,\mathrm d\mu_x$,
-# $\mathrm da_2=-2\mu_y\,\mathrm d\mu_x$, $\mathrm db_1=2\mu_x\,\mathrm d\mu_x$ and $\mathrm db_2=-2\mu_x\,\mathrm d\mu_x$. So
+# **(11.4) The partial derivative with respect to $\mu_x$.** All four quantities contain $\mu_x$:
+# $\mathrm da_1=2\mu_y\,\mathrm d\mu_x$, $\mathrm da_2=-2\mu_y\,\mathrm d\mu_x$, $\mathrm db_1=2\mu_x\,\mathrm d\mu_x$
+# and $\mathrm db_2=-2\mu_x\,\mathrm d\mu_x$. With (11.3) this gives
 # $\partial s/\partial\mu_x=2\mu_y(a_2-a_1)/(b_1b_2)-2\mu_xs\,(1/b_1-1/b_2)$.
 #
-# **(11.5) The partial with respect to $X$.** Only $b_2$ contains it, with factor 1: $\partial s/\partial X=-s/b_2$.
+# **(11.5) The partial derivative with respect to $X$.** Only $b_2$ contains $X$, with the factor 1, so
+# $\partial s/\partial X=-s/b_2$.
 #
-# **(11.6) The partial with respect to $Z$.** Only $a_2$ contains it, with factor 2:
+# **(11.6) The partial derivative with respect to $Z$.** Only $a_2$ contains $Z$, with the factor 2, so
 # $\partial s/\partial Z=2a_1/(b_1b_2)$.
 #
-# **(11.7) Back through the window.** With $\nu=g_{\mathcal S}/(3n)$ on tissue and 0 elsewhere, the three partials become
-# the images $p,p_{xx},p_{xy}$. The window is symmetric and 0 outside the image, so the adjoint of $k*$ is $k*$ itself.
-# Then $\mathrm d(x^2)=2x\,\mathrm dx$ and $\mathrm d(xy)=y\,\mathrm dx$ give the last line.
+# **(11.7) Back through the window.** Let $\nu=g_{\mathcal S}/(3n)$ on tissue and 0 elsewhere. Multiplied by $\nu$, the
+# three partial derivatives are the images $p,p_{xx},p_{xy}$. The window is symmetric and the image is continued with
+# zeros, so the adjoint of $k*$ is $k*$ itself. The last line of the display follows from
+# $\mathrm d(x^2)=2x\,\mathrm dx$ and $\mathrm d(xy)=y\,\mathrm dx$.
 #
 # $$
 # \begin{aligned}
@@ -382,23 +389,26 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(11.8) Depth: each pixel.** With $m$ held fixed, $\partial|\hat D_p/m-D_p/m_D|/\partial\hat D_p=\sigma_p/m$, where
-# $\sigma_p$ is the sign of the residual on valid pixels and 0 elsewhere.
+# **(11.8) Depth: each pixel.** Let $\sigma_p$ be the sign of the residual $\hat D_p/m-D_p/m_D$ on valid pixels and 0
+# elsewhere. With $m$ held fixed, the derivative of the absolute residual with respect to $\hat D_p$ is $\sigma_p/m$.
 #
-# **(11.9) Depth: the maximum.** With the pixels held fixed, $\partial/\partial m$ of the same terms is
-# $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. The pixels $\mathcal P^\star$ of the maximum share it equally. The maximum $m_D$ of
-# the prior is held fixed.
+# **(11.9) Depth: the maximum.** The maximum $m$ depends on the rendered depth as well. With the pixels held fixed, the
+# derivative of the same sum with respect to $m$ is $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. It is divided equally among
+# the pixels $\mathcal P^\star$ at which the depth is $m$. The maximum $m_D$ of the prior does not depend on the render
+# and is held fixed.
 #
 # $$
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
 # $$
 #
-# **(11.10) Smoothness: a pair.** $(\hat D_p-\hat D_{p'})^2$ has the gradient $2(\hat D_p-\hat D_{p'})$ at $p$ and its
-# negative at $p'$. $|\bar x_p-\bar x_{p'}|$ has $\pm\operatorname{sign}(\bar x_p-\bar x_{p'})$. The adjoint of the difference of
-# neighbours along an axis is minus the difference of the padded gradients along this axis.
+# **(11.10) Smoothness: a pair.** The square $(\hat D_p-\hat D_{p'})^2$ has the gradient $2(\hat D_p-\hat D_{p'})$ at
+# $p$ and its negative at $p'$. The absolute value $|\bar x_p-\bar x_{p'}|$ has
+# $\operatorname{sign}(\bar x_p-\bar x_{p'})$ at $p$ and its negative at $p'$. For a whole image, pad the gradients of
+# the pairs along an axis with zeros. The adjoint of the difference of neighbours is minus the difference of these
+# padded gradients.
 #
-# **(11.11) Smoothness: a pixel.** A pixel has at most four neighbours; its gradient is the sum over their pairs. The
-# weights $\nu_p\nu_{p'}$ and the edges $E$ are held fixed. On tissue $\bar D=0$ for every $\hat D$, so the total
+# **(11.11) Smoothness: a pixel.** A pixel has at most four neighbours, and its gradient is the sum over these pairs.
+# The weights $\nu_p\nu_{p'}$ and the edges $E$ are held fixed. On tissue $\bar D=0$ for every $\hat D$, so the total
 # variation has no gradient there.
 #
 # $$
@@ -482,18 +492,18 @@ for found, text in zip(
 # %% [markdown]
 # ## The exposure of a frame
 #
-# A camera may change gain and white balance from frame to frame. With `model.exposure`, which no preset switches on, each
-# training frame $k$ has a logarithmic gain $\gamma_{kc}$ and a bias $b_{kc}$ for each channel:
+# A camera may change its gain and its white balance from frame to frame. With `model.exposure`, which no preset
+# switches on, each training frame $k$ has a logarithmic gain $\gamma_{kc}$ and a bias $b_{kc}$ for each channel $c$:
 #
 # $$
 # \tilde I_{cp}=e^{\gamma_{kc}}\,\hat I_{cp}+b_{kc}.
 # $$
 #
-# $\tilde I$ replaces $\hat I$ in every loss above.
+# The image $\tilde I$ then replaces $\hat I$ in every loss above.
 #
-# **(11.12) Exposure.** All pixels of a channel share two numbers, so their gradients are sums over the pixels:
-# $g_{b_c}=\sum_pg_{\tilde I_{cp}}$ and $g_{\gamma_c}=e^{\gamma_c}\sum_pg_{\tilde I_{cp}}\hat I_{cp}$. The colour has
-# $g_{\hat I_{cp}}=e^{\gamma_c}g_{\tilde I_{cp}}$.
+# **(11.12) Exposure.** All pixels of a channel share gain and bias, so the gradients of these two numbers are sums
+# over the pixels: $g_{b_c}=\sum_pg_{\tilde I_{cp}}$ and $g_{\gamma_c}=e^{\gamma_c}\sum_pg_{\tilde I_{cp}}\hat I_{cp}$.
+# The gradient with respect to the render is $g_{\hat I_{cp}}=e^{\gamma_c}g_{\tilde I_{cp}}$.
 #
 # <!-- definition: endotsr.definition.exposure.exposure_forward -->
 # ```python
@@ -525,7 +535,7 @@ for array, expected in zip(found, exposure_definition.exposure_reverse(g_I, text
 # %% [markdown]
 # ## The gradient check
 #
-# There is one pair for each loss, and one for the exposure.
+# The check has one pair for each loss, and one for the exposure.
 
 # %%
 with one_thread():
@@ -537,13 +547,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. Render and frame are equal. Which of the three partials (11.4) to (11.6) is 0 there, and why is their sum in (11.7)
-#    0 as well?
-# 2. Write the pair of (B7) from (11.2) to (11.7) and let the golden cases judge it: `--only masked_ssim`
-#    ({doc}`index`). The case `not_finite_under_mask` refuses a mask that multiplies.
+# 1. Render and frame are equal. Which of the three partial derivatives (11.4) to (11.6) is 0 there, and why is their
+#    sum in (11.7) 0 as well?
+# 2. Write the pair of (B7) from (11.2) to (11.7), and let the golden cases judge it: `--only masked_ssim`
+#    ({doc}`index`). A port that multiplies by the mask fails the case `not_finite_under_mask`.
 # 3. The cell below answers this one. The depth loss does not change when the rendered depth is multiplied by a
-#    constant. What follows for the sum $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that
-#    makes it true.
+#    constant. What follows for the sum $\sum_p g_{\hat D_p}\hat D_p$? Check the answer, and find the term of the
+#    gradient that makes it true.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The derivative along D_hat itself is zero, so the sum is 0. The term of the maximum
