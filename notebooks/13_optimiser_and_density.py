@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 13. The optimiser and density control
 #
-# The gradients of positions, colours and coefficients differ by orders of magnitude, and the number of Gaussians that a
-# scene needs is not known in advance. Adam turns gradients of any size into steps of a known size. Every hundred
-# iterations density control adds Gaussians where the screen gradient is large and removes Gaussians whose opacity is
-# small.
+# The gradients of positions, colours and coefficients differ by orders of magnitude, and the number of Gaussians that
+# a scene needs is not known in advance. Adam turns gradients of any size into steps of a known size. Density control
+# changes the number: every hundred iterations it adds Gaussians where the screen gradient is large, and removes
+# Gaussians whose opacity is small.
 #
 # The equations are {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of
 # {doc}`/specification/b11_density`.
@@ -68,24 +68,24 @@ rng = np.random.default_rng(12)
 # \end{aligned}
 # $$
 #
-# $\theta$ is one stored number, $g$ its gradient, $\eta$ its rate, and $m$, $v$ its two moments, which begin at 0. The
-# constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k=1,2,\dots$ counts the steps of one array.
+# Here $\theta$ is one stored number, $g$ its gradient and $\eta$ its rate. Its two moments $m$ and $v$ begin at 0. The
+# constants are $\beta_1=0.9$, $\beta_2=0.999$ and $\epsilon=10^{-15}$, and $k=1,2,\dots$ counts the steps of one
+# array.
 #
-# **(13.1) Two averages.** Written out from $m=0$, the recursion is
-# $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$: an average of the gradients in which old ones fade. $v_k$ is the same
-# average of $g_j^2$; with $\beta_2$ they fade more slowly, by the factor $0.1/0.001$. A first moment below the smallest
-# normal float32 number, $1.18\cdot10^{-38}$, is set to 0: it would move nothing, and such numbers are slow to compute
-# with.
+# **(13.1) Two averages.** Unrolled from $m=0$, the recursion is $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$. This
+# is an average of the gradients in which old ones fade. In the same way $v_k$ is an average of $g_j^2$; with $\beta_2$
+# old ones fade more slowly, by the factor $0.1/0.001$. A first moment below the smallest normal float32 number,
+# $1.18\cdot10^{-38}$, is set to 0: it would move nothing, and arithmetic with such numbers is slow.
 #
-# **(13.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with 0.
-# The division by $1-\beta_1^k$ makes it a weighted mean, and so does the division by $1-\beta_2^k$ for $v$.
+# **(13.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with
+# 0. Division by $1-\beta_1^k$ turns the sum into a weighted mean. Division by $1-\beta_2^k$ does the same for $v$.
 #
-# **(13.3) The first step depends on the sign only.** For $k=1$ both corrections are exact: the means are $g$ and $g^2$.
-# The step is $\eta\,g/(|g|+\epsilon)$, which is $\eta\operatorname{sign}(g)$ for a gradient of 1 as for one of
-# $10^{-10}$.
+# **(13.3) The first step depends on the sign only.** For $k=1$ both corrections are exact: the corrected moments are
+# $g$ and $g^2$. The step is $\eta\,g/(|g|+\epsilon)$. As long as $|g|$ is much larger than $\epsilon$, this is
+# $\eta\operatorname{sign}(g)$, for a gradient of 1 as for one of $10^{-10}$.
 #
-# **(13.4) A common factor cancels.** If all gradients of an array are multiplied by $c>0$, both $m$ and $\sqrt v$ have
-# the factor $c$. The steps stay the same as long as $\epsilon$ is negligible, so a factor on the whole objective
+# **(13.4) A common factor cancels.** If all gradients of an array are multiplied by $c>0$, both $m$ and $\sqrt v$ are
+# multiplied by $c$. The steps stay the same as long as $\epsilon$ is negligible, so a factor on the whole objective
 # changes no step of Adam. It does change the statistic of density control below.
 #
 # <!-- definition: endotsr.definition.adam.adam_step -->
@@ -121,8 +121,8 @@ for k in (1, 2, 3):
 np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
-# Step (13.3) has a consequence for the whole package. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a
-# full step. Every sum therefore has a fixed order. The cell checks (13.3) and (13.4).
+# Step (13.3) has a consequence for the whole package. With $\epsilon=10^{-15}$ even rounding noise can move a
+# parameter by a full step, so every sum of the package has a fixed order. The next cell checks (13.3) and (13.4).
 
 # %%
 for size in (1.0, 1e-10):
@@ -142,8 +142,9 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # %% [markdown]
 # ## The rates
 #
-# By (13.3) the rate is the size of the first step. Each array has its own, because a step of the same size means
-# something else for a position and for an opacity. In `paper`:
+# By (13.3) the rate is the size of the first step. Each array has its own rate, because a step of one size has
+# different effects on a position and on an opacity. Let $i$ be the iteration, $T=6000$ the last one, and $K_s=3000$
+# the last one without the residuals $A$ and $C$. In `paper` the rates are:
 #
 # | Array | Symbol | Rate $\eta_0$ | Course |
 # |---|---|---|---|
@@ -157,12 +158,12 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # | colour residual | $A$ | $3.125\cdot10^{-3}$ | decays from $K_s$ |
 # | translation residual | $C$ | $1.6\cdot10^{-4}$ | decays from $K_s$ |
 #
-# The harmonics are one array with one step count, although their rates differ. $A$ and $C$ enter at $i=K_s+1$ as zeros,
-# with moments 0 and step count 0.
+# The harmonics are one array with one step count, although their rates differ. At $i=K_s+1$ the arrays $A$ and $C$ are
+# added. They are filled with 0 and have moments 0 and step count 0.
 #
-# **(13.5) Exponential decay.** A decaying rate falls to $\varphi=0.01$ of its start. Every iteration multiplies it by
-# the same factor, $\varphi^{1/T}$. $i$ is the iteration, $T=6000$ the last one. The decay of the residuals starts at
-# $K_s=3000$:
+# **(13.5) Exponential decay.** A decaying rate falls to the fraction $\varphi=0.01$ of its start. Every iteration
+# multiplies it by the same factor, which is $\varphi^{1/T}$ if the decay starts at iteration 0. The decay of the
+# residuals starts at $K_s$:
 #
 # $$
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
@@ -249,68 +250,102 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # %% [markdown]
 # ## Density control
 #
-# A large gradient with respect to the screen centre of a Gaussian is taken as a sign that one Gaussian covers a region
-# that needs two. This is the heuristic of 3DGS ({doc}`/references`). The statistic is the mean norm of this gradient over
-# the views in which the Gaussian is visible.
+# The gradient with respect to the screen centre of a Gaussian says how strongly the loss would change if the Gaussian
+# moved on the screen. A large one is taken as a sign that one Gaussian covers a region that needs two. This is the
+# heuristic of 3DGS ({doc}`/references`). Density control compares a mean of this gradient with a threshold, adds a
+# Gaussian where the threshold is reached, and removes Gaussians that are almost transparent.
 #
 # | Symbol | Meaning | In `paper` |
 # |---|---|---|
 # | $g_{u_i},g_{v_i}$ | gradient of the whole objective with respect to the screen centre, per pixel ({doc}`09_compositing`) | |
 # | $W,H$ | width and height of the image in pixels | |
-# | $o_i$ | opacity | |
-# | $S_i=e^{s_i}$ | the three semi-axes, in scene units ({doc}`06_covariance`) | |
+# | $o_i$ | opacity, the sigmoid of the stored logit | |
+# | $S_i=e^{s_i}$ | the three stored semi-axes, in scene units ({doc}`06_covariance`) | |
 # | $R(q_i)$ | rotation of the Gaussian ({doc}`06_covariance`) | |
-# | $g_{\mathrm{thr}}$ | least $\bar g_i$ of a Gaussian that grows | $2\cdot10^{-4}$ |
-# | $o_{\mathrm{min}}$ | least opacity of a Gaussian that stays | 0.005 |
-# | $e$ | extent of the scene, in scene units | 10 |
-# | $p$ | the fraction of the extent that separates small from large | 0.01 |
-# | $M$ | largest number of Gaussians | 400 000 |
+# | $g_{\mathrm{thr}}$ | threshold: least $\bar g_i$ of a candidate, `density.gradient_threshold` | $2\cdot10^{-4}$ |
+# | $o_{\mathrm{min}}$ | least opacity of a Gaussian that stays, `density.prune_opacity` | 0.005 |
+# | $e$ | extent of the scene, in scene units, `density.extent` | 10 |
+# | $p$ | the fraction of the extent that separates small from large, `density.dense_fraction` | 0.01 |
+# | $M$ | largest number of Gaussians, `density.maximum` | 400 000 |
 #
-# **(13.6) The statistic, and its unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
-# $\mathrm du=\frac W2\,\mathrm dx$ and $\mathrm dv=\frac H2\,\mathrm dy$. By the chain rule $g_x=\frac W2g_u$ and
-# $g_y=\frac H2g_v$:
+# **(13.6) The statistic, and its unit.** In normalised device coordinates $(x,y)$ the image reaches from $-1$ to $1$,
+# so $\mathrm du=\frac W2\,\mathrm dx$ and $\mathrm dv=\frac H2\,\mathrm dy$. By the chain rule $g_x=\frac W2g_u$ and
+# $g_y=\frac H2g_v$. The statistic is the mean of the norm of $(g_x,g_y)$ over the views in which the Gaussian is
+# visible:
 #
 # $$
 # \bar g_i=\frac{\sum_{\text{visible}}\Bigl\|\bigl(\tfrac W2g_{u_i},\ \tfrac H2g_{v_i}\bigr)\Bigr\|_2}{\sum_{\text{visible}}1}
 # $$
 #
-# Each iteration before 4000 adds its one view to both sums. A Gaussian is *visible* in a view if it is in front of the
-# near plane and the box around its support, the ellipse with $\alpha\ge\alpha_{\mathrm{cut}}$, contains the centre of a
-# pixel. A Gaussian that no view has shown has $\bar g_i=0$. Why not leave the gradient per pixel? The losses are means over
-# pixels, so an image of twice the size has about half the gradient per pixel and about the same $\bar g_i$. One threshold
-# serves all sizes.
+# Each iteration before `density.until` adds its one view to both sums. A Gaussian is *visible* in a view if it is in
+# front of the near plane and the box around its support, the ellipse with $\alpha\ge\alpha_{\mathrm{cut}}$, contains
+# the centre of a pixel. A Gaussian that no view has shown has $\bar g_i=0$.
 #
-# The rule runs at the iterations that are multiples of 100, after 500 and before 4000. It reads and writes the stored
-# parameters after the step of Adam, not the deformed ones. Afterwards both sums of all Gaussians are 0.
+# The gradient is not left per pixel for the following reason. The losses are means over pixels, so an image of twice
+# the size has about half the gradient per pixel and about the same $\bar g_i$. One threshold serves all sizes.
 #
-# **(13.7) Prune, then choose.** A Gaussian with $o_i<o_{\mathrm{min}}$ is removed, with its moments; $N$ stay. A
-# candidate is one that stays and has $\bar g_i\ge g_{\mathrm{thr}}$. Each candidate adds one Gaussian, so there is room
-# for $M-N$ of them. If there are more, those with the largest $\bar g_i$ remain; of equal ones, those with the lower
-# index. (The presets with a budget replace threshold and room by (20.1).)
+# **When the rule runs.** The rule runs at the iterations that are multiples of `density.interval`, after
+# `density.start` and before `density.until`: in `paper` at 600, 700, …, 3900. It reads and writes the stored
+# parameters after the step of Adam, not the deformed ones. Afterwards both sums of all Gaussians are set to 0, so
+# $\bar g_i$ is a mean over the views since the rule last ran.
 #
-# **(13.8) Clone or split.** A candidate whose largest semi-axis is at most $p\,e=0.1$ scene units is small for its region:
-# an exact copy is added, at the same place. A larger candidate is replaced by two children:
+# **(13.7) Prune, then choose.** A Gaussian with $o_i<o_{\mathrm{min}}$ is removed, with its moments of Adam. $N$
+# Gaussians stay. A *candidate* is one of these whose statistic reaches the threshold, equality included:
 #
-# - $\max_kS_{ki}\le p\,e$: clone;
-# - $\max_kS_{ki}>p\,e$: two children with $\mu'=\mu_i+R(q_i)\,(S_i\odot\xi)$ and $s'=s_i-\ln1.6$, where
-#   $\xi\sim\mathcal N(0,I_3)$.
+# $$
+# o_i\ge o_{\mathrm{min}}\quad\text{and}\quad\bar g_i\ge g_{\mathrm{thr}}
+# $$
 #
-# Each child has its own $\xi$. Clones and children copy everything else: quaternion, opacity, harmonics, deformation,
-# $A$ and $C$. Their moments of Adam are 0; the step count of the array continues. The new order of the arrays is: the
-# Gaussians that stay and were not split, in their old order; the clones; the first children; the second children. The
-# normal numbers are one draw of shape (2, 3, number of splits).
+# Each candidate adds one Gaussian, so there is room for $M-N$ of them. If there are more candidates than that, those
+# with the largest $\bar g_i$ remain; of equal ones, those with the lower index. (The presets with a budget replace
+# threshold and room by (20.1).)
 #
-# **(13.9) What the children cover.** $\xi$ has the covariance $I$, so $R\,(S\odot\xi)$ has the covariance
+# **(13.8) Clone or split.** A candidate with $\max_kS_{ki}\le p\,e$, which is 0.1 scene units in `paper`, is small for
+# its region. It is *cloned*: it stays, and an exact copy is added at the same place. A candidate with
+# $\max_kS_{ki}>p\,e$ is *split*: two children replace it. Each child lies at a point that is drawn from the Gaussian
+# of its parent, and its semi-axes are shorter by the factor 1.6:
+#
+# $$
+# \mu'=\mu_i+R(q_i)\,(S_i\odot\xi),\qquad s'=s_i-\ln1.6,\qquad \xi\sim\mathcal N(0,I_3)
+# $$
+#
+# Here $\odot$ multiplies entry by entry. Everything else follows from the parent $i$ in the same way for clones and
+# children:
+#
+# | Quantity | Clone of $i$ | Each child of $i$ |
+# |---|---|---|
+# | position | $\mu_i$ | $\mu'$, with a $\xi$ of its own |
+# | log-scale | $s_i$ | $s'$ |
+# | opacity logit, quaternion, harmonics | those of $i$ | those of $i$ |
+# | time bases of the deformation, $A$, $C$ | those of $i$ | those of $i$ |
+# | moments of Adam | 0 | 0 |
+# | sums of the statistic | 0 | 0 |
+# | Gaussian $i$ itself | stays, with its moments | is removed, with its moments |
+#
+# The opacity of the parent is not divided among its children. The step count of Adam belongs to an array and
+# continues.
+#
+# **Order and random numbers.** The new order of the arrays is: the Gaussians that stay and were not split, in their
+# old order; the clones; the first children; the second children. Clones and children are in the order of their
+# parents. All $\xi$ are one draw of shape (2, 3, number of splits) from the generator of the run (`training.seed`):
+# the first axis is the first or the second child, the second axis holds the three numbers of $\xi$, and the third axis
+# is the parent. Without a split there is no draw. {doc}`/specification/rulings` lists the choices that the paper
+# leaves open, with their alternatives: *end of density control*, *density extent* and *children*.
+#
+# **(13.9) What the children cover.** The covariance of $\xi$ is $I$, so that of $R\,(S\odot\xi)$ is
 # $R\,\mathrm{diag}(S)^2R^\top=\Sigma$: a child lies where its parent had weight. The two positions have the expected
-# covariance $\frac12\Sigma$ about their mean, and each child has $\Sigma/1.6^2$. The pair has
-# $(\frac12+\frac1{2.56})\Sigma=0.89\,\Sigma$ in expectation: about the region of the parent, with twice as many parameters.
+# covariance $\frac12\Sigma$ about their mean, and each child has the covariance $\Sigma/1.6^2$. Together the pair has
+# $(\frac12+\frac1{2.56})\Sigma=0.89\,\Sigma$ in expectation. It covers about the region of the parent, with twice as
+# many parameters.
 #
-# **(13.10) The opacity stays.** Two layers of the same $\alpha$ at one place absorb $1-(1-\alpha)^2$, more than one of
-# them. A clone therefore changes the picture. Its moments are 0 and those of its parent are not, so the next step of Adam
-# moves the two apart, even if their gradients are equal. 3DGS also resets opacities at intervals; `paper` does not.
+# **(13.10) The opacity stays.** Two layers of the same $\alpha$ at one place absorb $1-(1-\alpha)^2$, which is more
+# than one of them absorbs. A clone therefore changes the picture. Its moments are 0 and those of its parent are not,
+# so the next step of Adam moves the two apart, even if their gradients are equal. 3DGS also resets opacities at
+# intervals; `paper` does not.
 #
-# With a moving camera, `density.extent = "cameras"` takes $e=1.1\max_k\|\mathbf o_k-\bar{\mathbf o}\|$ over the optical
-# centres $\mathbf o_k$ of the training frames, as 3DGS does. For a camera that rests this is 0 and is refused.
+# **The extent.** With a moving camera, `density.extent = "cameras"` sets $e=1.1\max_k\|\mathbf o_k-\bar{\mathbf o}\|$
+# over the optical centres $\mathbf o_k$ of the training frames, as 3DGS does. For a camera that rests this is 0. An
+# error is raised, because $e=0$ would split every candidate.
 #
 # <!-- definition: endotsr.definition.density_control.gather_statistics -->
 # ```python
@@ -496,7 +531,29 @@ parents = np.tile(gaussians.log_scale[:, to_split], 2)
 np.testing.assert_allclose(children, parents - np.log(1.6), rtol=1e-12)
 
 # %% [markdown]
-# The next cell writes (13.8) once more, with the draws of the same generator, and checks the room of (13.7), the
+# The next cells check (13.7) to (13.10). The first compares the new order and the table of (13.8) with the code, and
+# the threshold at equality.
+
+# %%
+source, stay = after.plan.source, after.plan.survivors
+np.testing.assert_array_equal(source, [*survivors, *to_clone, *to_split, *to_split])
+for name in ("quaternion", "opacity_logit", "harmonics"):
+    of_parent = getattr(gaussians, name)[..., source]
+    np.testing.assert_array_equal(getattr(after.gaussians, name), of_parent, name)
+clones = slice(stay, stay + len(to_clone))
+np.testing.assert_array_equal(
+    after.gaussians.log_scale[:, clones], gaussians.log_scale[:, to_clone]
+)
+
+mean_gradient = statistics.gradient_sum / np.maximum(statistics.visits, 1)
+third = float(np.sort(mean_gradient[alive])[-3])
+for threshold, count in ((third, 3), (np.nextafter(third, np.inf), 2)):
+    at_third = msgspec.structs.replace(rule, gradient_threshold=float(threshold))
+    grown_at = densify(gaussians, statistics, at_third, np.random.default_rng(5), extent)
+    assert grown_at.cloned + grown_at.split == count, "the threshold itself is reached"
+
+# %% [markdown]
+# The second writes (13.8) once more, with the draws of the same generator. It then checks the room of (13.7), the
 # covariance of (13.9) and the two statements of (13.10).
 
 # %%
@@ -544,9 +601,10 @@ assert abs(moved[0] - moved[1]) > 1e-3
 # ### Figure: growth of the running clip
 #
 # The presets `quick` and `sharp` replace the threshold by a budget: every run of density control adds the steepest
-# candidates, in equal parts until the budget is reached ({doc}`20_first_look`). Left: the number of Gaussians of the
-# running clip. Its budget is 22000. Where would the next ones be added? The statistic needs many views; the figure has
-# one, the held-out frame, and shows the steepest twentieth of the Gaussians.
+# candidates, in equal parts until the budget is reached ({doc}`20_first_look`). The left panel shows the number of
+# Gaussians of the running clip, whose budget is 22000. Where would the next ones be added? The statistic needs many
+# views. The right panel has one, the held-out frame, and marks the steepest twentieth of the Gaussians. The middle
+# panel shows the error of the render.
 
 # %% tags=["hide-input"]
 clip = load()
@@ -587,15 +645,15 @@ assert ratio > 1.2 and growth[-1] == clip.about["gaussians"]
 assert np.diff(growth).max() < 1.02 * np.diff(growth)[np.diff(growth) > 0].min()
 
 # %% [markdown]
-# They lie along vessels and around highlights, where a shift of a Gaussian changes the picture. On flat tissue there are
-# few.
+# The steepest Gaussians lie along vessels and around highlights, where a shift of a Gaussian changes the picture. On
+# flat tissue there are few.
 
 # %% [markdown]
 # ## The reverse pass
 #
-# Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are results of the reverse
-# pass of compositing, before the reverse pass of the projection. The pair to check is therefore the pair of
-# {doc}`09_compositing`, block `mean2d`.
+# Adam and density control are not differentiated; they **use** gradients. The screen gradients $g_u,g_v$ are results
+# of the reverse pass of compositing, before the reverse pass of the projection. The pair to check is therefore the
+# pair of {doc}`09_compositing`, block `mean2d`.
 
 # %%
 with one_thread():
@@ -606,13 +664,13 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. A Gaussian of opacity 0.5 covers a region that one Gaussian explains well. Its screen gradient has a random sign in
-#    every view. Is $\bar g_i$ small or large? Compare with the norm of the mean gradient.
-# 2. Write `adam_step` and let the golden cases judge it: `--only adam` ({doc}`index`). Then write `densify`:
+# 1. A Gaussian of opacity 0.5 covers a region that one Gaussian explains well. Its screen gradient has a random sign
+#    in every view. Is $\bar g_i$ small or large? Compare it with the norm of the mean gradient.
+# 2. Write `adam_step`, and let the golden cases judge it: `--only adam` ({doc}`index`). Then write `densify`:
 #    `--only density`. The case `on_the_thresholds` decides between $<$ and $\le$.
 # 3. The cell below answers this one. A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and
-#    continues. Predict from (13.2): is the first update of a child added at $k=600$ larger or smaller than $\eta$, and by
-#    what factor? What is the factor when the count is very large?
+#    continues. Use (13.2) to predict the first update of a child added at $k=600$: is it larger or smaller than
+#    $\eta$, and by what factor? What is the factor when the count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and bias
