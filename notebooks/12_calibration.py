@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 12. Calibration of the Laplacian weight
 #
-# Two losses act on the same image, and one number must say how strongly the second one pulls. The paper derives
-# $\lambda_{\mathrm{lap}}$ from gradients: at full weight and in the median over the views, the gradient of the Laplacian
-# loss with respect to the rendered image has a fixed ratio $r$ to the gradient of the photometric loss. It shares the
-# result, 0.83, over all sequences. Whether another sequence asks for another weight is not measured here.
+# The photometric loss and the Laplacian loss act on the same image, and one number sets their relative weight. The
+# paper derives this number, $\lambda_{\mathrm{lap}}$, from gradients. At full weight, and in the median over the
+# views, the gradient of the Laplacian loss with respect to the rendered image has a fixed ratio $r$ to the gradient of
+# the photometric loss. The paper uses the result, 0.83, for all sequences. Whether another sequence asks for another
+# weight is not measured here.
 #
 # | Symbol | Meaning | In `paper` |
 # |---|---|---|
@@ -52,27 +53,27 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # %% [markdown]
 # ## The equation
 #
-# The views are spread over the $n_{\mathrm{train}}$ training frames: positions
-# $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$, with halves rounded to the even number. A position
-# that occurs twice counts once. Each view is rendered by the base model, without A and S, with all harmonic degrees and
-# before a black background. This chapter uses a blurred frame in place of the base render. The results of true base
-# renders differ from those below; the last tables of {doc}`/specification/rulings` have them for two clips.
+# The views are spread evenly over the $n_{\mathrm{train}}$ training frames. Their positions are
+# $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$, with halves rounded to the even number; a
+# position that occurs twice counts once. Each view is rendered by the base model, without A and S, with all harmonic
+# degrees and before a black background. This chapter uses a blurred frame in place of the base render. The results of
+# true base renders differ from those below; the last tables of {doc}`/specification/rulings` have them for two clips.
 #
 # **(12.1) Two gradients.** The objective contains
 # $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the
 # sum of the photometric gradient and of $\lambda_{\mathrm{lap}}$ times the Laplacian gradient. Their sizes decide which
 # term changes the Gaussians more.
 #
-# **(12.2) One size per view** is the root mean square over channels and pixels, $g_{\mathrm{rgb}}(v)$ or
-# $g_{\mathrm{lap}}(v)$. Excluded pixels count in both, with the gradient 0. A weight multiplies the size: the weighted
-# Laplacian gradient has $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)$.
+# **(12.2) One size per view.** The size of a gradient in a view is its root mean square over channels and pixels,
+# $g_{\mathrm{rgb}}(v)$ or $g_{\mathrm{lap}}(v)$. Excluded pixels count in both, with the gradient 0. A weight
+# multiplies the size, so the weighted Laplacian gradient has the size $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)$.
 #
 # **(12.3) One view** has the required ratio if $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)=r\,g_{\mathrm{rgb}}(v)$, so
 # $\lambda_{\mathrm{lap}}=r\,\big/\,\bigl(g_{\mathrm{lap}}(v)/g_{\mathrm{rgb}}(v)\bigr)$.
 #
-# **(12.4) All views** share one weight. The median of $g_{\mathrm{lap}}/g_{\mathrm{rgb}}$ replaces the ratio of one view,
-# so a few unusual views do not change the weight. For an even number of views the median is the mean of the two middle
-# ratios, and its inverse is not the median of the inverse ratios.
+# **(12.4) All views** share one weight. The median of $g_{\mathrm{lap}}/g_{\mathrm{rgb}}$ over the views replaces the
+# ratio of one view, so a few unusual views do not change the weight. For an even number of views the median is the
+# mean of the two middle ratios. Its inverse is then not the median of the inverse ratios.
 #
 # $$
 # \begin{aligned}
@@ -82,14 +83,15 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # \end{aligned}
 # $$
 #
-# $\mathcal L_{\mathrm{lap}}$ has weight 1 here: the gradient is taken before any weight is applied.
+# In this equation $\mathcal L_{\mathrm{lap}}$ has weight 1: the gradient is taken before any weight is applied.
 #
-# **(12.5) The size of the L1 gradient is known.** By (11.1) each of the $3n$ tissue values has $\pm1/(3n)$, and the
-# others have 0. The root mean square over $3HW$ values is $1/(3\sqrt{nHW})$ for every render that differs from its frame
-# at every tissue value. Only the SSIM term makes $g_{\mathrm{rgb}}$ depend on the size of the error.
+# **(12.5) The size of the L1 gradient is known.** By (11.1) the gradient of L1 is $\pm1/(3n)$ at each of the $3n$
+# tissue values and 0 at the others. Its root mean square over $3HW$ values is $1/(3\sqrt{nHW})$ for every render that
+# differs from its frame at every tissue value. Only the SSIM term makes $g_{\mathrm{rgb}}$ depend on the size of the
+# error.
 #
-# **(12.6) Views without a ratio.** A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and
-# named.
+# **(12.6) Views without a ratio.** If $g_{\mathrm{rgb}}=0$ in a view, or if a value is not finite, the view has no
+# ratio. It is dropped and named.
 #
 # <!-- definition: endotsr.definition.calibration.rms -->
 # ```python
@@ -169,14 +171,15 @@ np.testing.assert_allclose(
 #
 # Before you look: where on the tissue is the gradient of the Laplacian loss 0, although the render is wrong there?
 #
-# The second and third panel have the absolute gradients of the two losses. The gradient of L1 has the same size everywhere
-# and changes only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel.
-# Near the instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.)
+# The second and the third panel show the absolute gradients of the two losses. The gradient of L1 has the same size
+# everywhere and changes only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from
+# pixel to pixel. (Its colour scale is a quarter of the other one.)
 #
-# The right panel has $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these
-# substitutes for a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. The
-# base itself, at iteration 3000, gives a result much closer to it ({doc}`/specification/rulings`). Because the result
-# depends on $w$ and on the state of the render, the preset uses the published number and does not calibrate.
+# The right panel shows $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset
+# `paper`, these substitutes for a base render give 1.3 to 1.5. The published 0.83 results from them at a weight below
+# 0.05. The base itself, at iteration 3000, gives a value much closer to 0.83 ({doc}`/specification/rulings`). Because
+# the result depends on $w$ and on the state of the render, the preset uses the published number and does not
+# calibrate.
 
 # %% tags=["hide-input"]
 weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])
@@ -213,10 +216,13 @@ axes[3].legend()
 plt.show()
 
 # %% [markdown]
+# It is 0 near the instrument, where no band value is valid.
+
+# %% [markdown]
 # ## The reverse pass
 #
-# There is no reverse pass, because $\lambda_{\mathrm{lap}}$ is held fixed in training. The calibration itself measures
-# reverse passes, those of {doc}`10_laplacian_pyramid` and {doc}`11_base_losses`. The next cell checks them:
+# There is no reverse pass, because $\lambda_{\mathrm{lap}}$ is held fixed in training. The calibration itself uses the
+# reverse passes of {doc}`10_laplacian_pyramid` and {doc}`11_base_losses`. The next cell checks them:
 
 # %%
 with one_thread():
@@ -252,7 +258,7 @@ for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
 # 2. Write `calibrate` and let the golden cases judge it: `--only calibration` ({doc}`index`). The cases have an even
 #    and an odd number of valid views.
 # 3. The cell below answers this one. Make every error of the render half as large. Does the calibrated weight change
-#    for $w=0$? Consider on what the gradient of a mean of absolute values depends.
+#    for $w=0$? Consider what the gradient of a mean of absolute values depends on.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. No. The gradient of a mean absolute value depends on the signs of the residuals, not

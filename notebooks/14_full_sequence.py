@@ -13,12 +13,12 @@
 # %% [markdown]
 # # 14. From one frame to a full sequence
 #
-# The previous chapters explain all stages. This chapter puts them together into one iteration, fits one frame and then
-# a whole clip, evaluates held-out frames, and removes the components of the paper one by one.
+# The previous chapters explain all stages. This chapter combines them into one iteration, fits one frame and then a
+# whole clip, evaluates held-out frames, and removes the components of the paper one by one.
 #
-# The settings are those of the preset `paper` with a shorter schedule and three changes that suit a few small frames:
-# wider time bases, fewer initial points, and views between the frames. They are not the published method, and the
-# numbers below are not results for it.
+# The settings are those of the preset `paper`, with a shorter schedule and three changes that suit a few small frames:
+# wider time bases, fewer initial points, and views between the frames. With these changes the runs are not the
+# published method, and the numbers below are not results for it.
 #
 # The equations are {eq}`eq-6` of {doc}`/specification/06_objective`, and {eq}`eq-m1` and {eq}`eq-m2` of
 # {doc}`/specification/metrics`.
@@ -95,8 +95,8 @@ print(
 # \end{aligned}
 # $$
 #
-# $i=1,\dots,T$ counts the iterations. A bracket $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise. The terms
-# are those of earlier chapters:
+# The index $i=1,\dots,T$ counts the iterations. A bracket $[\,\cdot\,]$ is 1 if its condition holds and 0 otherwise.
+# The terms are those of earlier chapters:
 #
 # | Term | Chapter | Weight in `paper` |
 # |---|---|---|
@@ -173,8 +173,8 @@ print(
 #
 # {doc}`/one_iteration` names the compiled function of each step.
 #
-# The transcription takes the terms that an iteration reports and forms the sum of the text. It is compared with
-# **every** iteration of the run below.
+# The next cell transcribes the objective: it takes the terms that an iteration reports and forms the weighted sum. The
+# result is compared with **every** iteration of the run below.
 
 
 # %% tags=["transcription"]
@@ -322,8 +322,8 @@ plt.show()
 # %% [markdown]
 # ## Held-out frames: the numbers
 #
-# $\hat x,x$ are render and truth with excluded pixels set to 0. $n$ is the number of tissue pixels, and $s$ is the map
-# of {eq}`eq-b7`.
+# Let $\hat x$ and $x$ be the render and the true frame, both with excluded pixels set to 0. The number of tissue
+# pixels is $n$, and $s$ is the map of {eq}`eq-b7`.
 #
 # $$
 # \begin{aligned}
@@ -388,8 +388,8 @@ for k in sequence.test_index:
 #
 # Held-out frames are not used in any part of training: neither in the losses, nor for the initial points, nor in the
 # statistics of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each
-# residual on the image. The effect of S on the picture is small in this run; the next chapters say why
-# that is no question of its learning rate ({doc}`00_why`).
+# residual on the image. The effect of S on the picture is small in this run. {doc}`00_why` shows that a larger
+# learning rate does not make S follow the motion.
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
@@ -501,18 +501,19 @@ axis.set(
 plt.show()
 
 # %% [markdown]
-# At the small size the model loses, even to a copy of the nearest frame. A thumbnail of 48x38 pixels and 240 iterations
-# are no fair trial, but a defeat is possible at full size too: `paper` is 1.5 dB<!--=paper.below_blend--> below the blend on a recorded clip with
-# little noise ({doc}`/full_size`). Its worst frame on a simulated clip shows how. Every vessel appears twice, as in the blend: the model fades one training frame into the next.
+# At the small size the model is worse even than a copy of the nearest frame. A thumbnail of 48x38 pixels and 240
+# iterations are no fair trial. At full size a defeat is possible too: `paper` is 1.5 dB<!--=paper.below_blend--> below
+# the blend on a recorded clip with little noise ({doc}`/full_size`). Its worst frame on a simulated clip shows how.
+# Every vessel appears twice, as in the blend: the model fades one training frame into the next.
 #
 # ![The worst held-out frame of paper: truth, model, copy, blend and flow](/results/full_size/paper_eighth_worst.webp)
 #
 # ## At full size, with motion
 #
-# The preset `quick` does better. Among other changes, its Gaussians start with the tracked motion of the tissue
-# ({doc}`19_tracked_motion`), and most of its iterations compare times between the frames ({doc}`18_between`);
-# {doc}`/results/README` reverts such changes one at a time. On the simulated clip of 63 frames of
-# 640x512, with every eighth frame held out, the PSNR over tissue is
+# The preset `quick` gives better results. Among other changes, its Gaussians start with the tracked motion of the
+# tissue ({doc}`19_tracked_motion`), and most of its iterations compare times between the frames ({doc}`18_between`).
+# {doc}`/results/README` reverts such changes one at a time. On the simulated clip of 63 frames of 640x512, with every
+# eighth frame held out, the PSNR over tissue is
 #
 # <!-- running_clip:start -->
 # | Prediction | dB | 3 seeds | above the blend, dB |
@@ -565,16 +566,18 @@ found = {name: psnr_tissue(p, clip.image, clip.mask) for name, p in predictions.
 assert found["model"] > found["blend"] + 4 > found["copy"] + 6
 
 # %% [markdown]
-# The blend shows every moved vessel twice, so its error has the shape of the vessels. What is left in the error of the
-# model is noise, some fine vessels, and a moving highlight, which it fits as colour of the surface ({doc}`17_effects`).
+# The blend shows every moved vessel twice, so its error has the shape of the vessels. The error of the model consists
+# of noise, some fine vessels, and a moving highlight, which the model fits as a colour of the surface
+# ({doc}`17_effects`).
 #
-# So the model is above the blend and level with flow, which needs no model. Unlike flow, it also gives depth, motion and
-# other views. `endotsr simulate pulling --out CLIP` and `endotsr train CLIP --preset quick --out RUN` repeat a run.
+# On this clip the model is better than the blend and level with flow, which needs no model. Unlike flow, the model
+# also gives depth, motion and other views. `endotsr simulate pulling --out CLIP` and
+# `endotsr train CLIP --preset quick --out RUN` repeat a run.
 #
 # ## From Python, in ten lines
 #
-# Users need none of these internals. `import endotsr` is enough: the same training with a callback, a picture at a time
-# between two frames, the metrics of the held-out frames, and a run folder for the commands.
+# Users need none of these internals. After `import endotsr`, ten lines give the same training with a callback, a
+# picture at a time between two frames, the metrics of the held-out frames, and a run folder for the commands.
 
 # %% tags=["open"]
 import tempfile
@@ -603,14 +606,14 @@ np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
 # ## The reverse pass
 #
 # The objective is a weighted sum, so its gradient with respect to the render is the weighted sum of the gradients of
-# the terms. It continues through the reverse passes of compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection
-# {eq}`eq-b3`, covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals {eq}`eq-2` and {eq}`eq-3`, in that
-# order. The gradient of $\mathcal L_{\mathrm{msp}}$ is added to $g_C$ directly.
+# the terms. From the render the gradient continues through the reverse passes of compositing {eq}`eq-b5`, harmonics
+# {eq}`eq-b4`, projection {eq}`eq-b3`, covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals {eq}`eq-2` and
+# {eq}`eq-3`, in that order. The gradient of $\mathcal L_{\mathrm{msp}}$ is added to $g_C$ directly.
 #
 # ## The gradient check
 #
-# The whole chain is checked as one scalar function of ten groups of raw parameters. Here each
-# group is one block; `endotsr gradcheck` probes the same pair in finer blocks.
+# The whole chain is checked as one scalar function of ten groups of raw parameters. Here each group is one block;
+# `endotsr gradcheck` checks the same pair in finer blocks.
 
 # %%
 pair = all_pairs()["objective"]

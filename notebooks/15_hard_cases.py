@@ -13,11 +13,11 @@
 # %% [markdown]
 # # 15. Hard cases
 #
-# Code that is correct on random input can still be wrong. Each section below has input that breaks plausible code. It
-# names the mistake and states the required result. Before you read a section, predict from its title what such code
-# returns. The last section asks whether the gradient check can fail. {doc}`/hard_cases` has the full list with a bound and
-# a test for each case, and the naive formulas evaluated in both precisions. The symbols are those of
-# {doc}`09_compositing`.
+# Code that is correct on random input can still be wrong on special input. Each section below gives an input that
+# breaks plausible code, names the mistake and states the required result. Before you read a section, predict from its
+# title what such code returns. The last section asks whether the gradient check can fail. {doc}`/hard_cases` has the
+# full list with a bound and a test for each case, and the naive formulas evaluated in both precisions. The symbols are
+# those of {doc}`09_compositing`.
 #
 # Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears again, because its **form** is what makes the
 # first case accurate.
@@ -91,10 +91,10 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 # %% [markdown]
 # ## The needle: digits lost in the inverse matrix
 #
-# Seen at an angle, a needle of $1000$ pixels has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
-# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are near $10^{12}$ and
-# $\det$ is about $3\cdot10^5$, while $q$ should be about 1: the difference of the products has lost its digits in
-# float32. The specification writes a sum of squares:
+# A needle of $1000$ pixels, seen at an angle, has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
+# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are near $10^{12}$, and
+# $\det$ is about $3\cdot10^5$, while $q$ should be about 1. In float32 the difference of such products has lost its
+# digits. The specification writes a sum of squares:
 #
 # $$
 # \begin{aligned}
@@ -157,9 +157,9 @@ np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)
 # %% [markdown]
 # ## Equal depths: an undefined order
 #
-# Stereo depth is often a whole number, so equal depths are common. A sort that is not stable may give another picture in the
-# next run. Gaussians with equal $z$ keep the order of their index. With distinct $z$, the image is bitwise independent of
-# the order of the input.
+# Stereo depth is often a whole number, so equal depths are common. With a sort that is not stable, the picture may
+# change from run to run. The required order of Gaussians with equal $z$ is that of their indices. With distinct $z$,
+# the image is bitwise independent of the order of the input.
 
 # %%
 tie = made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
@@ -199,8 +199,9 @@ np.testing.assert_allclose(jump, alpha**2 * np.array([1.0, 0.0, -1.0]), atol=1e-
 # %% [markdown]
 # ## Behind the camera, on the near plane, at the camera
 #
-# A division by $z$ gives infinity or mirrors such a Gaussian into the picture. It must not contribute. Its gradients are
-# exactly 0, not merely small, and the image is bitwise that of the scene without it.
+# For a Gaussian behind the camera or in its plane, a division by $z$ mirrors it into the picture or gives infinity.
+# Such a Gaussian must not contribute. Its gradients are exactly 0, not merely small, and the image is bitwise that of
+# the scene without it.
 
 # %%
 plain = made([[0.1], [0.0], [2.0]])
@@ -230,8 +231,9 @@ assert render_reverse(out.colour, out.depth, None, saved).d_position.shape == (3
 # %% [markdown]
 # ## Two thousand faint sheets
 #
-# For $n$ equal sheets of opacity $\alpha$ and colour $c$, the image must be $c\,\bigl(1-(1-\alpha)^n\bigr)$. The opacity
-# image is the **sum** of the weights. In float32, $1-T_n$ would be 0 for one sheet of $\alpha=10^{-8}$.
+# For $n$ equal sheets of opacity $\alpha$ and colour $c$, the image must be $c\,\bigl(1-(1-\alpha)^n\bigr)$. The
+# opacity image is the **sum** of the weights. The alternative $1-T_n$ would be 0 in float32 for one sheet of
+# $\alpha=10^{-8}$.
 
 # %%
 n, faint = 2000, 1e-3
@@ -295,8 +297,8 @@ assert np.isfinite(loss) and np.isfinite(laplacian_loss_reverse(1.0, saved)).all
 # %% [markdown]
 # ## The same scene in metres, millimetres, micrometres
 #
-# A constant with a hidden unit, such as a fixed near plane or an epsilon added to $z$, changes the picture when the unit
-# changes. The picture of the same scene must be the same in every unit, and its depth must have the factor of the unit.
+# A constant with a hidden unit, such as a fixed near plane or an epsilon added to $z$, changes the picture when the
+# unit changes. The picture of a scene must be the same in every unit, and its depth must scale with the unit.
 
 # %%
 reference = render(many, small, PAPER)[0]
@@ -313,8 +315,8 @@ for factor in (1e-3, 1e3):
 # %% [markdown]
 # ## Figure: three of these cases
 #
-# The left panel has the needle in both forms and precisions, the middle one the jump of two crossing depths, and the right
-# one the equal sheets.
+# The left panel shows the needle in both forms and precisions, the middle panel the jump of two crossing depths, and
+# the right panel the equal sheets.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(10.5, 3.2), layout="constrained")
@@ -362,8 +364,9 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass: a check that can fail
 #
-# The gradient check receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by
-# one thousandth, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
+# The gradient check is applied to one correct reverse pass and to four wrong ones: a flipped sign, a gradient that is
+# too large by one thousandth, a zero gradient, and one missing Gaussian. It must refuse all four and report where the
+# error is.
 
 # %%
 pair = all_pairs()["matern_penalty"]
@@ -415,9 +418,9 @@ assert report.passed and precision.passed
 #    sum of two squares keep?
 # 2. Run the hardest cases of the compositing on your own pair: `--only composite` ({doc}`index`). Which of your
 #    formulas fails in float32 and passes in float64?
-# 3. The cell below answers this one. A quaternion of exactly 0 is not a rotation. The deformation model can produce it,
-#    because it adds to the raw quaternion. What should the image be, and what the gradient? Why is it worse to add a
-#    small epsilon to the norm?
+# 3. The cell below answers this one. A quaternion of exactly 0 is not a rotation. The deformation model can produce
+#    it, because it adds to the raw quaternion. What should the image be, and what should the gradient be? Why would it
+#    be worse to add a small epsilon to the norm?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The identity rotation and no gradient: a defined result. With an epsilon, the matrix

@@ -14,9 +14,9 @@
 # # 16. Accuracy against time
 #
 # A Gaussian has unbounded support, and the transmittance behind an opaque stack never reaches 0. A fast renderer
-# truncates both. This notebook measures the error and the gain in time: first on a scene small enough to render exactly,
-# then on the running clip. The symbols are those of {doc}`09_compositing`; $\alpha_{\mathrm{cut}}$ is called the *cutoff*
-# and $T_{\mathrm{stop}}$ the *stop*.
+# truncates both. This chapter measures the error and the gain in time: first on a scene small enough to render
+# exactly, then on the running clip. The symbols are those of {doc}`09_compositing`. In addition,
+# $\alpha_{\mathrm{cut}}$ is called the *cutoff* and $T_{\mathrm{stop}}$ the *stop*.
 #
 # The equation is {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/tradeoff` shows the same
 # measurement for every setting.
@@ -63,7 +63,7 @@ reference = frame(prepare(study, reference_setting(study)))[0]
 # %% [markdown]
 # ## What is truncated
 #
-# The blend of a pixel, front to back:
+# From front to back, the blend of a pixel is:
 #
 # $$
 # \begin{aligned}
@@ -74,9 +74,10 @@ reference = frame(prepare(study, reference_setting(study)))[0]
 # \end{aligned}
 # $$
 #
-# By definition every Gaussian contributes. A renderer skips $\alpha_k<\alpha_{\mathrm{cut}}$, and ends the pixel before
-# $T_{k+1}$ falls below $T_{\mathrm{stop}}$. The next cell writes out both, and counts the **visits**: the pairs of pixel
-# and Gaussian whose $\alpha$ reaches the cutoff before the pixel has ended, the stopping one included.
+# By definition every Gaussian contributes. A renderer skips a Gaussian with $\alpha_k<\alpha_{\mathrm{cut}}$, and ends
+# the pixel before $T_{k+1}$ falls below $T_{\mathrm{stop}}$. The next cell writes out both rules, and counts the
+# **visits**: the pairs of pixel and Gaussian whose $\alpha$ reaches the cutoff before the pixel has ended, the
+# stopping one included.
 
 # %%
 scene, _ = scene_at(gaussians, study.spectral, model, time)
@@ -126,14 +127,15 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 # %% [markdown]
 # ## How large the error can be, and how the work grows
 #
-# At a pixel many Gaussians are skipped, each with $\alpha<\alpha_{\mathrm{cut}}$. How large is the error together: below one
-# cutoff, or many? In this scene the error never exceeds five cutoffs. That is no bound: $n$ faint Gaussians of one colour,
-# each just below the cutoff, are skipped together, and the error is $1-(1-\alpha_{\mathrm{cut}})^n$ of that colour.
+# At a pixel many Gaussians are skipped, each with $\alpha<\alpha_{\mathrm{cut}}$. Is their total error below one
+# cutoff, or can it be many? In this scene the error never exceeds five cutoffs. This is no bound for other scenes: $n$
+# faint Gaussians of one colour, each just below the cutoff, are skipped together, and the error is
+# $1-(1-\alpha_{\mathrm{cut}})^n$ of that colour.
 #
-# $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
+# The condition $\alpha\ge\alpha_{\mathrm{cut}}$ holds on the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
 # $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow at most with the **logarithm** of the
-# accuracy. Each factor of ten adds the same area. In this small picture it adds fewer visits each time; the
-# ellipses grow beyond the border, where there are no pixels.
+# accuracy: each factor of ten adds the same area. In this small picture a factor of ten adds fewer visits each time;
+# the ellipses grow beyond the border, where there are no pixels.
 
 # %%
 cutoffs = 10.0 ** -np.arange(2, 11)
@@ -176,9 +178,9 @@ plt.show()
 # %% [markdown]
 # ## What the stop can cost, at full size
 #
-# From here on the scene is that of the running clip: 22000 Gaussians in 640x512 pixels ({doc}`14_full_sequence`). The
-# reference has a cutoff of $10^{-14}$ and no stop. A pixel ends **before** the Gaussian that would take $T$ below
-# $T_{\mathrm{stop}}$. How large can the weight be that is lost? Before reading the table, guess the largest error for
+# From here on the scene is that of the running clip, with 22000 Gaussians in 640x512 pixels ({doc}`14_full_sequence`).
+# The reference has a cutoff of $10^{-14}$ and no stop. A pixel ends **before** the Gaussian that would take $T$ below
+# $T_{\mathrm{stop}}$. How large can the lost weight be? Before you read the table, guess the largest error for
 # $T_{\mathrm{stop}}=10^{-4}$.
 
 # %% tags=["hide-input"]
@@ -215,18 +217,19 @@ for alpha_max in (1 - 2**-20, 0.999, 0.99):
 print("\n".join(lines))
 
 # %% [markdown]
-# The bound is $T_{\mathrm{stop}}/(1-\alpha_{\max})$ of the range of colours. A stop of $10^{-4}$ loses a quarter of that range
-# at some pixels. The Gaussian before which a pixel ends may be the opaque one that fills it: with $\alpha=0.9999$ and
-# $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the weight $\alpha T_k$ is lost. In general
-# $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. With the clamp $\alpha_{\max}=0.99$ of the preset `paper` at
-# most a hundred times $T_{\mathrm{stop}}$ is lost. If you raise one of the two, lower the other.
+# The bound of the error is $T_{\mathrm{stop}}/(1-\alpha_{\max})$ of the range of colours. A stop of $10^{-4}$ loses a
+# quarter of that range at some pixels. The Gaussian before which a pixel ends may be the opaque one that fills the
+# pixel. With $\alpha=0.9999$ and $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the weight $\alpha T_k$
+# is lost. In general $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. With the clamp $\alpha_{\max}=0.99$
+# of the preset `paper`, at most a hundred times $T_{\mathrm{stop}}$ is lost. If you raise the stop or the clamp, lower
+# the other one.
 #
 # ## The front of settings
 #
-# Cutoff, stop, clamp and precision vary together, on the same frame. A setting is **dominated** if another setting takes
-# no more time, has no larger error, and is strictly better in one. The undominated settings form the front. The setting
-# with the smallest error for a given time is on it. Times of the same arithmetic scatter, so neighbours on the front may
-# exchange their places.
+# Cutoff, stop, clamp and precision vary together, on the same frame. A setting is **dominated** if another setting
+# takes no more time, has no larger error, and is strictly better in one of the two. The undominated settings form the
+# front. For a given time, the setting with the smallest error lies on the front. Measured times scatter even if the
+# arithmetic is the same, so neighbours on the front may exchange their places.
 
 # %%
 sweep = {
@@ -282,19 +285,19 @@ plt.show()
 # %% [markdown]
 # ## Interactive figure: cutoff and stop
 #
-# 160 Gaussians are blended from front to back. Before you move a slider: at which cutoff will the largest error be half a
-# level, and what fraction of the visits is left there? Then raise the stop above 1e-2, and look for what the picture
-# loses first.
+# The picture shows 160 Gaussians, blended from front to back. Before you move a slider: at which cutoff will the
+# largest error be half a level, and what fraction of the visits is left there? Then raise the stop above 1e-2, and
+# look for what the picture loses first.
 #
 # <div class="widget" data-widget="cutoff">The figure is live in the built book.</div>
 
 # %% [markdown]
 # ## Exercise
 #
-# 1. A pixel has $T=10^{-3}$ left. How large can the error of its colour be if the pixel ends here? Which dial sets this
-#    bound?
-# 2. Change the cutoff of your pair of {eq}`eq-b5` from $1/255$ to $10^{-6}$ and let the golden cases judge it:
-#    `--only composite` ({doc}`index`). Which cases notice?
+# 1. A pixel has $T=10^{-3}$ left. How large can the error of its colour be if the pixel ends here? Which setting
+#    determines this bound?
+# 2. Change the cutoff of your pair of {eq}`eq-b5` from $1/255$ to $10^{-6}$, and let the golden cases judge it:
+#    `--only composite` ({doc}`index`). Which cases fail?
 # 3. The cell below answers this one. The visits at the cutoffs $10^{-3}$ and $10^{-5}$ are known. How many do you
 #    expect at $10^{-7}$, and why is this estimate too large?
 

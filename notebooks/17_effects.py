@@ -14,7 +14,7 @@
 # # 17. What a scene calls for
 #
 # A static scene needs no time bases, and constant light needs no colour residual. `endotsr inspect` tests the training
-# frames of a clip for each effect and plans the components that model it. This notebook repeats four of the tests by
+# frames of a clip for each effect and plans the components that model it. This chapter repeats four of the tests by
 # hand, on clips in which every effect is known.
 #
 # The equation is {eq}`eq-1` of {doc}`/specification/01_dictionary`: the dictionary that the time stamps must resolve.
@@ -54,10 +54,11 @@ found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 # %% [markdown]
 # ## Noise first
 #
-# Every test uses the noise as its unit. Let $x_t$ be the value of a pixel in frame $t$ and $\sigma$ the standard deviation
-# of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes slow changes. Independent noise gives it
-# the deviation $\sqrt{1+4+1}\,\sigma$. The median of the absolute values is $0.6745$ deviations for a normal distribution,
-# and a few moving edges hardly change it.
+# Every test uses the noise as its unit. Let $x_t$ be the value of a pixel in frame $t$, and $\sigma$ the standard
+# deviation of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes slow changes. Independent
+# noise gives it the standard deviation $\sqrt{1+4+1}\,\sigma$. For a normal distribution the median of the absolute
+# values is $0.6745$ standard deviations. The noise is estimated from this median, which a few moving edges hardly
+# change.
 
 
 # %% tags=["transcription"]
@@ -89,10 +90,10 @@ assert abs(found["still"].noise.level / sigma - 1) < 0.15
 # %% [markdown]
 # ## Motion, in units of the flow from noise
 #
-# Even in a static scene the optical flow between two frames is not 0. The test therefore also measures the flow between
-# the reference frame and copies of it with new noise. A tile, a square of pixels, counts as moving if its flow exceeds
-# twice this value and 0.05 px<!--=effects.motion-->. Three clips follow: one is still, one has a beating spot, and one has
-# light that drifts. In which of the six panels do you expect a signal?
+# Even in a static scene the optical flow between two frames is not 0. The test therefore also measures the flow
+# between the reference frame and copies of it with new noise. A *tile* is a square of pixels. It counts as moving if
+# its flow exceeds twice the flow from noise, and also exceeds 0.05 px<!--=effects.motion-->. Three clips follow: one
+# is still, one has a beating spot, and one has light that drifts. In which of the six panels do you expect a signal?
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 3, figsize=(9.4, 5.2), layout="constrained")
@@ -128,10 +129,10 @@ assert (
 # %% [markdown]
 # ## A clip that is too short
 #
-# The beat of the second clip has five cycles. With 16 frames the same beat is found as motion, but not as a rate: the
-# verdict is *irregular*, and the plan switches off component S, which is the one made for it. A rate passes the test if its
-# line in the spectrum is significant at 1 %<!--=effects.rates--> and its wave is the same in each third of the clip. In 14
-# training frames no rate passes. The remedy is more frames of the same five beats.
+# The beat of the second clip has five cycles. With 16 frames the same beat is found as motion, but not as a rate. The
+# verdict is *irregular*, and the plan switches off component S, which is the component for periodic motion. A rate
+# passes the test if its line in the spectrum is significant at 1 %<!--=effects.rates--> and its wave is the same in
+# each third of the clip. In 14 training frames no rate passes. The remedy is more frames of the same five beats.
 
 # %% tags=["hide-input"]
 short = msgspec.structs.replace(plain, frames=16)
@@ -154,9 +155,9 @@ assert apply_plan(make_plan(found["beating"], PAPER), PAPER)[0].model.spectral_m
 # %% [markdown]
 # ## The running clip: a plan that is right
 #
-# The running clip has 63 frames of 640x512 ({doc}`14_full_sequence`). Below are the verdicts of `endotsr inspect`, stored
-# with it, beside the effects that the simulator put into it. Breathing has 1.5 cycles, fewer than the three that the
-# test of rates needs, so the one rate is the beat.
+# The running clip has 63 frames of 640x512 ({doc}`14_full_sequence`). The table below compares the verdicts of
+# `endotsr inspect`, which are stored with the clip, with the effects that the simulator put into it. Breathing has 1.5
+# cycles, fewer than the three that the test of rates needs, so the one rate that it finds is the beat.
 
 # %% tags=["hide-input"]
 stored = load().about["inspection"]
@@ -187,11 +188,11 @@ assert [round(cycles) for cycles in stored["cycles"]] == [5] and not stored["pla
 # %% [markdown]
 # ## A moving camera and a static scene
 #
-# If the camera moves, the whole picture flows. In a rigid scene one number per tile explains the flow to all frames: its
-# inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference camera and $(R_k,\mathbf t_k)$ the
-# pose from the reference camera to camera $k$. Camera $k$ sees the tile at the projection of
-# $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and the residual is motion of the tissue. Depth is not
-# needed.
+# If the camera moves, the whole picture flows. In a rigid scene one number per tile explains the flow to all frames:
+# its inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference camera, and
+# $(R_k,\mathbf t_k)$ the pose from the reference camera to camera $k$. Camera $k$ sees the tile at the projection of
+# $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and takes the residual as motion of the tissue.
+# The test needs no depth map.
 
 
 # %% tags=["transcription"]
@@ -232,12 +233,12 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
 # $$
 #
-# A clip of $n$ frames resolves at most $n/2$ cycles: at equal steps, every faster sinusoid equals a slower one. Does the
-# rank of the dictionary over the stamps, centred and scaled to RMS 1, show this for 20 frames and 16 cycles? It need not.
-# The slower sinusoid is seldom one of the eight, and the rank is full. The plan therefore limits three quantities: the
-# highest frequency, the rank, and the condition number, which is the ratio of the largest to the smallest singular
-# value. The condition number bounds the amplification of frame noise in the coefficients. It is large for the shortest
-# clips and varies little from 33 frames on.
+# A clip of $n$ frames resolves at most $n/2$ cycles: at equal steps, every faster sinusoid equals a slower one.
+# Consider 20 frames and 16 cycles. Does the rank of the dictionary over the stamps, centred and scaled to RMS 1, show
+# this limit? It need not. The slower sinusoid is seldom one of the eight of the dictionary, and the rank is then full.
+# The plan therefore limits three quantities: the highest frequency, the rank, and the condition number, which is the
+# ratio of the largest to the smallest singular value. The condition number bounds the amplification of frame noise in
+# the coefficients. It is large for the shortest clips and varies little from 33 frames on.
 
 
 # %% tags=["transcription"]
@@ -293,9 +294,10 @@ plt.show()
 # %% [markdown]
 # ## The plan and its savings
 #
-# A Gaussian always stores 11 base parameters: position, quaternion, log-scales and opacity. There are also three harmonic
-# coefficients for each of the $(d+1)^2$ functions up to degree $d$, ten channels of $B$ time bases with three numbers each,
-# and $2\cdot3F$ numbers for each of the Fourier components A and S. The optimiser stores two more numbers for each.
+# A Gaussian always stores 11 base parameters: position, quaternion, log-scales and opacity. It also stores three
+# harmonic coefficients for each of the $(d+1)^2$ functions up to degree $d$, ten channels of $B$ time bases with three
+# numbers each, and $2\cdot3F$ numbers for each of the Fourier components A and S. The optimiser stores two more
+# numbers for each of these.
 
 
 # %% tags=["transcription"]
@@ -322,8 +324,8 @@ for name, inspection in found.items():
 # %% [markdown]
 # ## Exercise
 #
-# 1. The noise of a clip is estimated from second differences in time. Why not from first differences, if the tissue
-#    breathes?
+# 1. The noise of a clip is estimated from second differences in time. Why are first differences unsuitable if the
+#    tissue breathes?
 # 2. Write `frequencies` and the statistics of the atoms {eq}`eq-1b` and let the golden cases judge them:
 #    `--only frequencies` and `--only atoms` ({doc}`index`).
 # 3. The cell below answers this one. A clip has 63 frames at 15 frames per second. The heart beats 72 times per minute,
