@@ -1,25 +1,26 @@
 """Programs that measure and write the generated parts of the documentation: python docs/make.py [NAME [WORDS ...]]
 
 Without a name: the list of all programs. `claims` runs `docs/pages/claims/page.py`; `claims.paper` runs
-`docs/pages/claims/paper.py`. The words that follow go to the program, whose docstring says what it takes. Each folder
-of `docs/pages` belongs to one page or one group of pages, and has a program that measures (its records are files in
-`docs/results`), and one that writes the page from the records.
+`docs/pages/claims/paper.py`. Without words a program rewrites its parts of the pages from its record, a file of
+`docs/results`; with the word `measure` it makes the record first. `NAME measure --help` lists the options.
 """
 
 import ast
+import re
 import sys
 from importlib import import_module
 from pathlib import Path
 
 HERE = Path(__file__).parent
 PAGES = HERE / "pages"
+STARTS = re.compile(r"^(PROGRAM = Program\(|def main\(words: list\[str\])", re.MULTILINE)  # `pages.store.program`
 
 
 def programs() -> dict[str, Path]:
     """Every program by name: a file of a folder of `docs/pages` that can be run."""
     found = {}
     for file in sorted(PAGES.glob("*/*.py")):
-        if "\ndef main(words: list[str]" in file.read_text(encoding="utf-8"):
+        if STARTS.search(file.read_text(encoding="utf-8")):
             found[file.parent.name if file.stem == "page" else f"{file.parent.name}.{file.stem}"] = file
     return found
 
@@ -43,7 +44,8 @@ def main(words: list[str]) -> int:
         return 2
     sys.path.insert(0, str(HERE))
     sys.argv = [f"docs/make.py {name}", *rest]  # the name that argparse prints
-    import_module("pages." + ".".join(found[name].relative_to(PAGES).with_suffix("").parts)).main(rest)
+    module = import_module("pages." + ".".join(found[name].relative_to(PAGES).with_suffix("").parts))
+    (module.PROGRAM.run if hasattr(module, "PROGRAM") else module.main)(rest)
     return 0
 
 

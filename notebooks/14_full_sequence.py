@@ -515,7 +515,7 @@ plt.show()
 # {doc}`/results/README` reverts such changes one at a time. On the simulated clip of 63 frames of 640x512, with every
 # eighth frame held out, the PSNR over tissue is
 #
-# <!-- running_clip:start -->
+# <!-- running_clip:table:start -->
 # | Prediction | dB | 3 seeds | above the blend, dB |
 # |---|---|---|---|
 # | model | 38.40 | 38.38 to 38.40 | +2.38 to +2.40 |
@@ -524,7 +524,7 @@ plt.show()
 # | flow | 38.42 | - | +2.41 to +2.41 |
 #
 # Preset `quick`, 1600 iterations, 22000 Gaussians; AMD EPYC, 2026-11-26.
-# <!-- running_clip:end -->
+# <!-- running_clip:table:end -->
 #
 # ![PSNR of every held-out frame at full size](/results/full_size/curves.svg)
 #

@@ -70,7 +70,7 @@ def makers(paths: list[str]) -> list[str]:
     records = {Path(path).name for path in paths if path.startswith("docs/results/") and path.endswith(".json")}
     for file in sorted((ROOT / "docs" / "pages").glob("*/*.py")):
         text = file.read_text(encoding="utf-8")
-        if "\ndef main(words: list[str]" in text and any(f'"{name}"' in text for name in records):
+        if "\nPROGRAM = Program(" in text and any(f'"{name}"' in text for name in records):
             name = file.parent.name if file.stem == "page" else f"{file.parent.name}.{file.stem}"
             found.append(f"python docs/make.py {name}")
     return list(dict.fromkeys(found))

@@ -6,29 +6,21 @@ import pytest
 from pages.bench import page as bench
 from pages.bench import start as bench_start
 from pages.bench.parts import MAIN
+from pages.store.marks import write_marked
 
 from endotsr.errors import InputError
 
 
 @pytest.fixture
 def found():
-    return bench.read(bench.RESULTS)
+    return bench.read()
 
 
-def test_command_fills_a_page_and_keeps_its_words(found, tmp_path):
-    folder, page = tmp_path / "results", tmp_path / "page.md"
-    folder.mkdir()
-    changed = found | {"start": found["start"] | {"warm": dict.fromkeys(bench_start.MOMENTS, 123.4)}}
-    for name, file in bench.FILES.items():
-        (folder / file).write_text(json.dumps(changed[name]), encoding="utf-8")
-    marked = "<!-- bench:start:start -->\nto be replaced\n<!-- bench:start:end -->"
-    page.write_text(f"before {marked} after", encoding="utf-8")
-    bench.main([str(folder)], page)
-    once = page.read_text(encoding="utf-8")
-    assert once.startswith("before ") and once.endswith(" after") and "123.4" in once and "to be replaced" not in once
-    bench.main([str(folder)], page)
-    assert page.read_text(encoding="utf-8") == once
-    assert {path.name for path in folder.glob("*.png")} == {"bench_stages.png", "scaling.png"}
+def test_pictures_are_drawn_beside_their_measurements(found, tmp_path):
+    for name, measured in found.items():
+        (tmp_path / bench.FILES[name]).write_text(json.dumps(measured), encoding="utf-8")
+    bench.draw(tmp_path)
+    assert {path.name for path in tmp_path.glob("*.png")} == {"bench_stages.png", "scaling.png"}
 
 
 def test_target_that_is_missed_says_so(found):
@@ -39,15 +31,24 @@ def test_target_that_is_missed_says_so(found):
     assert "not measured" in next(line for line in text.splitlines() if "6000" in line)
 
 
-def test_page_names_what_is_missing(tmp_path):
+def test_a_mark_without_a_meaning_and_a_missing_result_are_named(found, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("<!-- bench:colour:start -->\n<!-- bench:colour:end -->")
-    with pytest.raises(SystemExit, match=r"page\.md: mark bench:colour has no end or no meaning; allowed: machine,"):
-        bench.main([], page)
-    with pytest.raises(SystemExit, match=r"bench_stages\.json: cannot be read.*make\.py bench measure"):
-        bench.main([str(tmp_path)], page)
-    with pytest.raises(SystemExit, match=r"python docs/make\.py bench"):
-        bench.main(["one", "two"], page)
+    with pytest.raises(InputError, match=r"page\.md: mark bench:colour has no end or no meaning; allowed: machine,"):
+        write_marked(page, bench.fragments(found, {}), "bench")
+    with pytest.raises(InputError, match=r"bench_stages\.json: cannot be read.*make\.py bench measure"):
+        bench.read(tmp_path)
+
+
+def test_a_part_is_replaced_and_the_words_around_it_stay(found, tmp_path):
+    page, warm = tmp_path / "page.md", dict.fromkeys(bench_start.MOMENTS, 123.4)
+    page.write_text("before <!-- bench:start:start -->\nto be replaced\n<!-- bench:start:end --> after")
+    made = bench.fragments(found | {"start": found["start"] | {"warm": warm}}, {})
+    write_marked(page, made, "bench")
+    once = page.read_text(encoding="utf-8")
+    assert once.startswith("before ") and once.endswith(" after") and "123.4" in once and "to be replaced" not in once
+    write_marked(page, made, "bench")
+    assert page.read_text(encoding="utf-8") == once
 
 
 def test_page_refuses_results_of_other_sizes(found):

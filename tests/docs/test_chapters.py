@@ -1,10 +1,10 @@
 """Every chapter has a motive, a derivation, figures and exercises, and the table in notebooks/index.md says so."""
 
 import re
+from argparse import Namespace
 
 import pytest
 from pages.book import chapters
-from pages.store.marks import read_json
 
 from endotsr.errors import InputError
 
@@ -40,7 +40,7 @@ def test_a_chapter_that_begins_with_an_equation_has_no_motive():
 
 
 def test_every_chapter_was_timed_and_the_book_takes_ten_minutes_at_most():
-    times = read_json(chapters.FILE, chapters.COMMAND)["chapters"]
+    times = chapters.PROGRAM.read()["chapters"]
     assert set(times) == set(TEXTS)
     assert all(row["processor_seconds"] > 0 for row in times.values())
     assert sum(row["processor_seconds"] for row in times.values()) <= chapters.LONGEST
@@ -50,9 +50,10 @@ def test_some_chapters_are_timed_and_the_others_keep_their_times(monkeypatch, tm
     (tmp_path / "01_a.py").write_text("", encoding="utf-8")
     (tmp_path / "02_b.py").write_text("", encoding="utf-8")
     monkeypatch.setattr(chapters, "NOTEBOOKS", tmp_path)
-    stored = read_json(chapters.FILE, chapters.COMMAND)["chapters"]
-    found = chapters.measured(["02"])["chapters"]
+    stored = chapters.PROGRAM.read()["chapters"]
+    measured = lambda *numbers: chapters.measured(Namespace(numbers=[*numbers], record=chapters.PROGRAM.file))
+    found = measured("02")["chapters"]
     assert found == stored | {"02_b": found["02_b"]} and "01_a" not in found
-    assert set(chapters.measured([])["chapters"]) == {"01_a", "02_b"}
+    assert set(measured()["chapters"]) == {"01_a", "02_b"}
     with pytest.raises(InputError, match=r"no notebook .*03.*; allowed: 01, 02"):
-        chapters.measured(["03"])
+        measured("03")

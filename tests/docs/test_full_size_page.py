@@ -10,11 +10,11 @@ from pages.full_size import page as full_size
 from pages.full_size import pictures as full_size_pictures
 from pages.full_size import text as full_size_text
 from pages.full_size.text import psnr
-from pages.store.marks import read_json
 
 from endotsr.errors import InputError
 
-RUNS = read_json(full_size.FILE, full_size.COMMAND)
+RUNS = full_size.PROGRAM.read()
+(PAGE,) = full_size.PROGRAM.pages
 NOTEBOOK = Path(__file__).parents[2] / "notebooks" / "14_full_sequence.py"
 LARGEST = 2_000_000  # bytes of all stored files
 
@@ -22,8 +22,10 @@ LARGEST = 2_000_000  # bytes of all stored files
 def test_stored_files_are_small_and_every_one_is_shown():
     files = [file for file in full_size.FOLDER.iterdir() if file.is_file()]
     assert sum(file.stat().st_size for file in files) <= LARGEST
-    text = full_size.PAGE.read_text(encoding="utf-8")
-    assert {file.name for file in files} - {full_size.FILE.name} == set(re.findall(r"full_size/([\w.]+)\)", text))
+    text = PAGE.read_text(encoding="utf-8")
+    assert {file.name for file in files} - {full_size.PROGRAM.file.name} == set(
+        re.findall(r"full_size/([\w.]+)\)", text)
+    )
 
 
 def test_a_preset_has_one_colour_in_all_panels():
@@ -62,7 +64,7 @@ def test_what_the_page_says_of_noise_and_motion():
     of_every_eighth = [run for run in RUNS.values() if run["split"] == "eighth"]
     flow = json.loads((full_size_text.RESULTS / "against_flow.json").read_text(encoding="utf-8"))["frames"]
     frame_1 = next(row["flow"] for row in flow if row["frame"] == 1)
-    assert f"{frame_1:.2f} dB" in full_size.PAGE.read_text(encoding="utf-8")
+    assert f"{frame_1:.2f} dB" in PAGE.read_text(encoding="utf-8")
     for run in of_every_eighth:
         assert psnr(run["noise"] ** 2) < 40 < frame_1
         slow = [row for row in run["frames"] if row["motion_px"] < 1]

@@ -1,91 +1,83 @@
 """Every generated part of a page is what its program writes from the committed records."""
 
-import re
-from functools import partial
+import argparse
+import json
+import sys
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 
 import pytest
-from pages.store.marks import read_json, replaced
+from pages.store import program
+from pages.store.marks import replaced
 
-ROW = re.compile(r"<!-- (\w+):(\w+):start -->")
-
-
-def module(program):
-    """The module of a program of `docs/make.py`."""
-    room, _, name = program.partition(".")
-    return import_module(f"pages.{room}.{name or 'page'}")
+SPEC = spec_from_file_location("docs_make", program.DOCS / "make.py")
+make = module_from_spec(SPEC)  # `make` alone is that of golden
+SPEC.loader.exec_module(make)
 
 
-def of_record(*tables, **named):
-    """Parts made by functions of the module from its record: by their own name, or under a name of the page."""
-    functions = dict.fromkeys(tables) | named
-
-    def made(about):
-        record = read_json(about.FILE, "docs/make.py")
-        return {name: getattr(about, function or name)(record) for name, function in functions.items()}
-
-    return made
+def program_of(name):
+    """The declaration of a program of `docs/make.py`."""
+    room, _, stem = name.partition(".")
+    return getattr(import_module(f"pages.{room}.{stem or 'page'}"), "PROGRAM", None)
 
 
-def whole(name, about):
-    """All parts at once, from a function without arguments."""
-    return getattr(about, name)()
+PROGRAMS = {name: found for name in make.programs() if (found := program_of(name))}
+PAGES = [(name, page) for name, found in PROGRAMS.items() for page in found.pages]
 
 
-def fragments_of_record(about):
-    return about.fragments(read_json(about.FILE, about.MADE_BY))
+@pytest.mark.parametrize("name, page", PAGES, ids=[f"{name}-{page.name}" for name, page in PAGES])
+def test_a_page_is_what_its_program_writes(name, page):
+    about, text = PROGRAMS[name], page.read_text(encoding="utf-8")
+    assert f"<!-- {about.marks}:" in text
+    assert replaced(text, about.made(), page, about.marks) == text, f"run: python docs/make.py {name}"
 
 
-PARTS = partial(whole, "parts")
-GENERATED = {  # program -> its parts by name
-    "bench": lambda about: about.fragments(about.read(about.RESULTS), about.read_runs(about.RESULTS)),
-    "bench.minutes": lambda about: about.parts(read_json(about.FILE, "")),
-    "bench.scale": PARTS,
-    "bench.waiting": lambda about: about.parts(read_json(about.FILE, "")),
-    "book.chapters": lambda about: {"table": about.table(about.chapters(), read_json(about.FILE, about.COMMAND))},
-    "book.presets": lambda about: {"recorded": about.recorded(), "simulated": about.simulated()},
-    "book.readme_gaps": PARTS,
-    "book.readme_presets": PARTS,
-    "book.reliability": PARTS,
-    "book.systems": PARTS,
-    "claims.base_checkpoint": lambda about: {"calibration": about.table(read_json(about.RECORD, "")["cells"])},
-    "claims.mask_folders": lambda about: {"folders": about.table(read_json(about.RECORD, ""))},
-    "claims.paper": PARTS,
-    "effects": lambda about: about.fragments(about.read()),
-    "full_size": lambda about: import_module("pages.full_size.text").fragments(read_json(about.FILE, about.COMMAND)),
-    "full_size.depth_outliers": PARTS,
-    "full_size.interpolation": of_record("table"),
-    "full_size.sweeps": partial(whole, "fragments"),
-    "full_size.targets": of_record("table"),
-    "ports.injected": fragments_of_record,
-    "ports.unseen": fragments_of_record,
-    "recordings.any_clip": of_record(ways="table"),
-    "recordings.pose_returns": lambda about: about.tables(read_json(about.FILE, "")),
-    "recordings.hand_held": lambda about: about.tables(read_json(about.FILE, "")),
-    "recordings.inputs_tried": of_record("table"),
-    "recordings.inventories": lambda about: {"fields": about.fields(), "options": about.options()},
-    "recordings.masks": of_record(iou="table"),
-    "recordings.masks_drawn": of_record("table"),
-    "recordings.masks_training": of_record("table"),
-    "recordings.masks_keys": of_record("table", drafts="draft_table"),
-    "recordings.one_camera": of_record("table"),
-    "recordings.own_pictures": of_record(ways="table"),
-    "recordings.pose_readings": of_record("table"),
-    "recordings.poses": of_record("table"),
-    "recordings.scope_video": of_record("table"),
-    "recordings.show": of_record(sizes="table"),
-    "recordings.simulate": of_record(times="table"),
-    "recordings.sinus": of_record(rows="table"),
-    "tradeoff": PARTS,
-}
+def test_every_part_stands_on_a_page():
+    for name, about in PROGRAMS.items():
+        texts = "".join(page.read_text(encoding="utf-8") for page in about.pages)
+        parts = about.made() if about.pages else {}
+        assert [part for part in parts if f"<!-- {about.marks}:{part}:start -->" not in texts] == [], name
 
 
-@pytest.mark.parametrize("program", GENERATED)
-def test_a_page_is_what_its_program_writes(program):
-    about = module(program)
-    made, text = GENERATED[program](about), about.PAGE.read_text(encoding="utf-8")
-    rooms = {room for room, name in ROW.findall(text) if name in made}
-    mine = [room for room in rooms if {name for r, name in ROW.findall(text) if r == room} == set(made)]
-    assert mine, f"no room of marks has the parts {sorted(made)}"
-    right = any(replaced(text, made, about.PAGE, room) == text for room in mine)
-    assert right, f"run: python docs/make.py {program}"
+def test_a_program_is_found_by_its_name():
+    assert all(found.name == name for name, found in PROGRAMS.items())
+    assert "full_size" in PROGRAMS and "recordings.any_clip" in PROGRAMS and "book.preview" in make.programs()
+
+
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    """A program with a record and a page in a folder of its own."""
+    monkeypatch.setattr(program, "DOCS", tmp_path)
+    monkeypatch.setattr(program, "RESULTS", tmp_path)
+    (tmp_path / "page.md").write_text("<!-- test_generated_pages:sum:start -->\n<!-- test_generated_pages:sum:end -->")
+    options = {"--first": 1, "--second": {"type": int, "default": 2}}
+    measure = lambda options: {"sum": options.first + options.second}
+    return program.Program(__name__, "page.md", {"sum": lambda found: str(found["sum"])}, "r.json", measure, options)
+
+
+def test_a_measurement_writes_record_and_page(small, tmp_path):
+    with pytest.raises(SystemExit, match=r"error: .*r\.json: cannot be read.*make\.py .*test_generated_pages measure"):
+        small.run([])
+    small.run(["measure", "--first", "4"])
+    assert json.loads(small.file.read_text())["sum"] == 6 and "date" in json.loads(small.file.read_text())
+    assert "start -->\n6\n<!--" in (tmp_path / "page.md").read_text()
+    small.file.write_text('{"sum": 9}')
+    small.run([])
+    assert "start -->\n9\n<!--" in (tmp_path / "page.md").read_text()
+
+
+def test_a_measurement_into_another_file_leaves_record_and_page(small, tmp_path, capsys):
+    page = (tmp_path / "page.md").read_text()
+    small.run(["measure", "--record", str(tmp_path / "other.json")])
+    assert capsys.readouterr().out == "3\n" and not small.file.exists() and (tmp_path / "page.md").read_text() == page
+
+
+def test_unknown_words_show_the_usage(small, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "__doc__", "what it does")
+    with pytest.raises(SystemExit, match="what it does"):
+        small.run(["table"])
+
+
+def test_the_options_of_every_program_are_complete():
+    for found in PROGRAMS.values():
+        assert isinstance(found._parser(""), argparse.ArgumentParser)

@@ -1,6 +1,7 @@
 """docs/bench.md: the table of quality against minutes is what the stored runs say."""
 
 import json
+from argparse import Namespace
 
 import pytest
 from pages.bench import minutes
@@ -21,11 +22,12 @@ def run(folder, clip, psnr):
     return folder
 
 
-def test_row_is_the_mean_of_its_runs_and_the_time_that_of_the_iterations(tmp_path, monkeypatch):
-    monkeypatch.setattr(minutes, "FILE", tmp_path / "minutes.json")
-    minutes.add([run(tmp_path / "a", "clip", 30.0), run(tmp_path / "b", "clip", 32.0)], "sharp")
-    result = json.loads(minutes.FILE.read_text())
+def test_row_is_the_mean_of_its_runs_and_the_time_that_of_the_iterations(tmp_path):
+    record = tmp_path / "minutes.json"
+    measured = lambda name, *runs: minutes.measured(Namespace(runs=[*runs], name=name, record=record))
+    result = measured("sharp", run(tmp_path / "a", "clip", 30.0), run(tmp_path / "b", "clip", 32.0))
     assert "| `sharp` | 1 | 1.5 | 2 | 5 | 1.0 | 31.00 | 0.9000 | 0.1000 |" in minutes.table(result)
-    assert "/somewhere" not in minutes.FILE.read_text()
+    record.write_text(json.dumps(result))
+    assert "/somewhere" not in record.read_text()
     with pytest.raises(InputError, match="allowed: the clip of the other rows"):
-        minutes.add([run(tmp_path / "c", "other", 30.0)], "other")
+        measured("other", run(tmp_path / "c", "other", 30.0))

@@ -1,11 +1,8 @@
-"""docs/guides/prepare.md: its tables are what the committed results say, and every layout has its section."""
+"""docs/guides/prepare.md: every layout has its section; the errors of poses in its tables are computed rightly."""
 
-import importlib
-import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from endotsr.clips.sequences.layouts import layouts
@@ -13,28 +10,10 @@ from endotsr.method.splatting.camera import CameraPose
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"
-TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera", "hand_held_training",
-          "pose_readings")  # fmt: skip
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
             "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP", "hamlyn": "Hamlyn",
             "scared": "SCARED", "servct": "SERV-CT", "c3vd": "C3VD", "euroc": "EuRoC",
             "nerfstudio": "nerfstudio"}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_a_table_is_what_its_result_says(name):
-    made = importlib.import_module(f"pages.recordings.{name}")
-    if not made.FILE.exists():
-        pytest.skip(f"not measured yet: python docs/make.py recordings.{name}")
-    found = json.loads(made.FILE.read_text(encoding="utf-8"))
-    assert made.table(found["rows"] if name == "long_clip" else found) in PAGE.read_text(encoding="utf-8")
-
-
-def test_the_tables_of_hand_held_clips_are_what_their_result_says():
-    from pages.recordings import hand_held
-
-    made = hand_held.tables(json.loads(hand_held.FILE.read_text(encoding="utf-8")))
-    assert len(made) == 3 and all(table in PAGE.read_text(encoding="utf-8") for table in made.values())
 
 
 def turned(poses, rotation, shift, factor=1.0):

@@ -5,15 +5,18 @@ import re
 
 import pytest
 from pages.book import reliability
+from pages.store.program import DOCS, RESULTS
+
+ROOT = DOCS.parent
 
 
 @pytest.mark.parametrize("name", reliability.MAKERS)
 def test_every_result_can_be_made_again(name):
-    assert (reliability.ROOT / reliability.MAKERS[name].split()[1]).is_file()
+    assert (ROOT / reliability.MAKERS[name].split()[1]).is_file()
 
 
 def test_every_stored_trial_is_as_promised():
-    file = reliability.RESULTS / "faults.json"
+    file = RESULTS / "faults.json"
     if not file.exists():
         pytest.skip("no result of the campaign is stored yet")
     rows = json.loads(file.read_text())["faults"]
@@ -21,9 +24,10 @@ def test_every_stored_trial_is_as_promised():
 
 
 def test_every_file_that_the_page_names_exists():
-    text = reliability.PAGE.read_text(encoding="utf-8")
+    (page,) = reliability.PROGRAM.pages
+    text = page.read_text(encoding="utf-8")
     for path in re.findall(r"(tests/\S+?\.py)", text):
-        assert (reliability.ROOT / path).is_file(), path
+        assert (ROOT / path).is_file(), path
     bounds = {"256 MiB": "png.LARGEST_FILE", "64 MiB": "files.LARGEST_TEXT", "64 GiB": "checkpoint.LARGEST"}
     from endotsr.training.fitting import checkpoint
     from endotsr.untrusted import files, png

@@ -5,21 +5,12 @@ import re
 from pathlib import Path
 
 import pytest
-from pages.book import figures, readme_gaps, readme_presets
+from pages.book import figures, presets, readme_gaps
 from pages.full_size import interpolation, levers, record
 
 from endotsr.errors import InputError
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
-
-
-@pytest.mark.parametrize(
-    "study, name", [(study, name) for study, about in levers.STUDIES.items() for name in about.tables]
-)
-def test_a_table_of_the_levers_is_what_the_result_says(study, name):
-    about = levers.STUDIES[study]
-    found = json.loads(about.file.read_text(encoding="utf-8"))
-    assert about.tables[name](found) in about.page.read_text(encoding="utf-8")
 
 
 def tissue(name):
@@ -79,8 +70,8 @@ def test_on_cutting_sharp_is_ahead_in_lpips():
 
 
 def test_the_readme_states_the_minutes_that_were_timed():
-    rows = json.loads(readme_presets.RECORD.read_text(encoding="utf-8"))["rows"]
-    made = readme_presets.parts()["table"]
+    rows = json.loads((RESULTS / "minutes.json").read_text(encoding="utf-8"))["rows"]
+    made = presets.table()
     assert all(f"| `{name}` |" in made for name in ("paper", "sharp", "quick")) and "--minutes" not in made
     assert f"| {rows['quick'][0]['seconds'] / 60:.1f} |" in made and "this class of machine" in made
 
@@ -105,13 +96,6 @@ def test_the_readme_says_of_the_gaps_what_their_table_says():
     above_tissue_only = {gap: float(cells[4]) > float(cells[3]) for gap, cells in rows.items()}
     assert above_tissue_only == {1: True, 4: True, 8: True, 16: False}
     assert all(float(cells[7]) < float(cells[8]) for cells in rows.values())
-
-
-def test_the_tables_of_the_runs_are_what_their_records_say():
-    text = (RESULTS / "README.md").read_text(encoding="utf-8")
-    for clip in record.CLIPS:
-        if records := record.stored(clip):
-            assert record.table(records) in text and record.missing(clip, records) in text, clip
 
 
 def made_up(preset, seed, values):

@@ -2,28 +2,20 @@
 
 import numpy as np
 from pages.book import running_clip, running_scene
-from pages.store.marks import read_json
 from running_clip import FOLDER, load
 
 from endotsr.method.splatting.render import render_forward
 from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.training.fitting.model import raster_settings, scene_at
 
-RECORD = read_json(running_clip.FILE, running_clip.COMMAND)
-
-
-def test_the_chapter_has_the_table_of_the_record():
-    text = running_clip.CHAPTER.read_text(encoding="utf-8")
-    assert len(running_clip.MARKED.findall(text)) == 1
-    assert running_clip.with_table(text, running_clip.table(RECORD)) == text
+RECORD = running_clip.PROGRAM.read()
 
 
 def test_another_record_makes_another_table():
-    text = running_clip.CHAPTER.read_text(encoding="utf-8")
     run = RECORD["runs"][0]
     psnr = run["psnr"] | {"model": [value - 3 for value in run["psnr"]["model"]]}
     other = RECORD | {"runs": [run | {"psnr": psnr}]}
-    assert running_clip.with_table(text, running_clip.table(other)) != text
+    assert running_clip.table(other) != running_clip.table(RECORD)
 
 
 def test_three_seeds_are_above_the_blend_and_level_with_flow():

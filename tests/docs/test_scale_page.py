@@ -1,13 +1,13 @@
 """The estimates of minutes and memory on the page of times are those of the package."""
 
-import json
-
 from pages.bench import scale
+from pages.store.commands import loaded
+from pages.store.program import RESULTS
 
 
 def test_the_estimates_are_near_the_timed_trainings():
     """The ratio of estimate to time belongs to the machine and is nearly equal for all presets."""
-    rows = json.loads((scale.DOCS / "results" / "minutes.json").read_text(encoding="utf-8"))["rows"]
+    rows = loaded(RESULTS / "minutes.json")["rows"]
     ratios = {}
     for preset in scale.COLOURS:
         iterations, cost = scale.estimated(preset, 63, 640, 512)

@@ -11,9 +11,7 @@ import pytest
 from pages.claims import base_checkpoint
 from pages.full_size import depth_outliers
 from pages.full_size import page as full_size
-from pages.full_size import text as full_size_text
 from pages.hard_cases.page import rounded_up
-from pages.store.marks import read_json
 from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
 
 from endotsr.clips.sequences.between import flows_between, frame_between
@@ -95,7 +93,7 @@ def test_the_bound_of_the_hard_cases_is_not_below_the_worst():
 
 def test_the_first_sentences_of_the_page_at_full_size():
     """Simulated: `paper` and `quick` above the blend, `paper` below the blend without its noise; flow above all."""
-    made = full_size_text.fragments(read_json(RESULTS / "full_size" / "runs.json", full_size.COMMAND))
+    made = full_size.PROGRAM.made()
     noise = [line.strip("| ").split(" | ") for line in made["noise"].splitlines() if line.startswith("| `")]
     assert all(float(model) < float(blend) for _, _, model, blend, _, _ in noise)
     ahead = {name.split(",")[0]: float(bare) < float(model) for name, _, model, _, bare, _ in noise[::-1]}
@@ -147,7 +145,7 @@ def test_without_the_outliers_of_the_depth_no_seed_has_a_veil():
 
 def test_the_base_calibrates_closer_to_the_published_weight_than_a_blurred_frame():
     """Chapter 12, whose blurred frames give 1.3 and more at the weight of SSIM of `paper`; its cell asserts that."""
-    cells = read_json(base_checkpoint.RECORD, "python docs/make.py claims.base_checkpoint")["cells"]
+    cells = base_checkpoint.PROGRAM.read()["cells"]
     found = [cell["lambda_lap"] for cell in cells if cell["ssim_weight"] == PAPER.loss.ssim_weight]
     assert len(found) == 4
     assert np.abs(np.array(found) - PAPER.loss.lambda_lap).max() < 0.25 * (1.2 - PAPER.loss.lambda_lap)

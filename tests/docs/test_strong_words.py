@@ -69,7 +69,7 @@ def test_what_gains_in_every_seed():
 
 def test_what_improves_every_scene():
     """In every seed too: targets between the frames, these targets against those at rest, and the weight of SSIM."""
-    scenes = json.loads(levers.STUDIES["changes"].file.read_text(encoding="utf-8"))["scenes"]
+    scenes = levers.PROGRAM.read()["scenes"]
     psnr = {scene: {k: [run["psnr_tissue"] for run in runs] for k, runs in of.items()} for scene, of in scenes.items()}
     for without in ("no targets between the frames", "these targets at rest", "`ssim_weight` of `paper`"):
         for of in psnr.values():

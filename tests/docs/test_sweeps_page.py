@@ -60,10 +60,6 @@ def test_frozen_geometry_leaves_the_rate_of_the_colour_residual_as_it_is():
     assert (frozen.position, frozen.opacity, frozen.scale, frozen.rotation) == (0, 0, 0, 0)
 
 
-def test_the_table_is_what_the_records_say():
-    assert sweeps.fragments()["table"] in sweeps.PAGE.read_text(encoding="utf-8")
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     (tmp_path / "w.toml").write_text(
@@ -85,7 +81,7 @@ def test_differences_are_paired_by_seed(folder):
         [row("one", s, 30.0 + s) for s in range(3)] + [row("two", 0, 1.0), {**row("two", 2, 9.9), "status": "open"}],
     )
     stored(folder, [row("two", s, 30.5 + s) for s in range(2)])
-    table = sweeps.fragments()["table"]
+    table = sweeps.tables()
     assert "| `w` | Does it matter? | 6 | 5 |" in table
     assert "| one | 3 | 31.00 ± 2.48 | 29.00 ± 2.48 | 0.9000 ± 0.0000 | - |" in table
     assert "| two, difference to one | 2 | +0.50 ± 0.00 | +0.50 ± 0.00 | +0.0000 ± 0.0000 | - |" in table
@@ -94,7 +90,7 @@ def test_differences_are_paired_by_seed(folder):
 def test_a_pair_of_different_frames_is_refused(folder):
     stored(folder, [row("one", 0, 30.0), row("two", 0, 31.0, arrays_sha256={"images": "b"})])
     with pytest.raises(InputError, match="two and one, seed 0: the runs of a pair must read the same frames"):
-        sweeps.fragments()
+        sweeps.tables()
 
 
 def test_an_unknown_sweep_is_refused(folder):

@@ -1,15 +1,15 @@
 """The page on systems holds the table of the stored result, which is as expected, and names what exists."""
 
-import json
 import re
 
 import pytest
 from packaging.requirements import Requirement
 from pages.book import systems
+from pages.store.program import DOCS
 
 import platforms
 
-ROWS = json.loads(systems.RESULT.read_text(encoding="utf-8"))["rows"]
+ROWS = systems.PROGRAM.read()["rows"]
 
 
 def test_every_system_is_resolved_as_expected():
@@ -34,6 +34,7 @@ def test_every_system_asks_for_each_dependency_once(system, machine):
 
 
 def test_every_file_that_the_page_names_exists():
-    text = systems.PAGE.read_text(encoding="utf-8")
+    (page,) = systems.PROGRAM.pages
+    text = page.read_text(encoding="utf-8")
     for path in re.findall(r"((?:tests|docs)/\S+?\.py)", text):
-        assert (systems.ROOT / path).is_file(), path
+        assert (DOCS.parent / path).is_file(), path

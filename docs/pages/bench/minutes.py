@@ -1,10 +1,9 @@
 """Quality of trainings of some minutes on one clip, compared with methods that need no model.
 
-    python docs/make.py bench.minutes add RUN... --name "sharp"    add or replace a row of finished runs (seeds)
-    python docs/make.py bench.minutes                              rewrite the picture and the table
+    python docs/make.py bench.minutes measure RUN... --name "sharp"    add or replace a row of finished runs (seeds)
 
 The runs come from `endotsr train CLIP --preset sharp --seed 1 --lpips FILE` or `--minutes 3`; all rows are of one clip.
-The result is docs/results/minutes.json; the table is part of docs/bench.md.
+The table is part of docs/bench.md.
 """
 
 # A record of a page is complete, or the KeyError says what it lacks.
@@ -16,22 +15,22 @@ from statistics import mean
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.results.report.style import BLUE, GREY, INK, name_axes, new_figure, plain_axes, save
+from endotsr.results.report.style import BLUE, INK, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
 from endotsr.training.runs.log import log_until
-from pages.store.marks import read_json, write_marked
+from pages.store import figures
+from pages.store.commands import loaded
+from pages.store.program import RESULTS, RUNS, Program
 from pages.store.published import PUBLISHED
 
-DOCS = Path(__file__).parents[2]
-FILE, PICTURE, PAGE = DOCS / "results" / "minutes.json", DOCS / "results" / "minutes.svg", DOCS / "bench.md"
+PICTURE = RESULTS / "minutes.svg"
 METRICS = {"psnr_full": ("PSNR full, dB", "{:.2f}"), "ssim_full": ("SSIM", "{:.4f}"), "lpips": ("LPIPS", "{:.4f}")}
 LEVELS = {"two_neighbours": "blend", "flow_interpolation": "flow"}  # drawn baselines
 
 
 def run_row(folder: Path) -> dict[str, Any]:
     """Results of one finished run; its seconds count only its iterations."""
-    metrics = read_json(folder / "metrics.json", "endotsr train")
+    metrics = loaded(folder / "metrics.json")
     run = metrics["run"]
     return {
         "seed": run["seed"],
@@ -46,24 +45,21 @@ def run_row(folder: Path) -> dict[str, Any]:
     }
 
 
-def add(folders: list[Path], name: str) -> None:
-    """Store the runs as one row, and the baselines of their clip."""
-    metrics = read_json(folders[0] / "metrics.json", "endotsr train")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """The record with the runs as one row, and with the baselines of their clip."""
+    metrics = loaded(options.runs[0] / "metrics.json")
     source = metrics["run"]["input"]
-    clip = {
-        "name": Path(source["source"]).name,
-        "frames": source["frames"],
-        "size": f"{source['width']}x{source['height']}",
-    }
-    known = read_json(FILE, "docs/pages/bench/minutes.py") if FILE.exists() else {"clip": clip, "rows": {}}
+    size = f"{source['width']}x{source['height']}"
+    clip = {"name": Path(source["source"]).name, "frames": source["frames"], "size": size}
+    known = loaded(options.record) if options.record.exists() else {"clip": clip, "rows": {}}
     if known["clip"] != clip:
-        raise InputError(f"{folders[0]}: its clip is {clip}; allowed: the clip of the other rows, {known['clip']}")
-    known["rows"][name] = [run_row(folder) for folder in folders]
+        raise InputError(f"{options.runs[0]}: its clip is {clip}; allowed: the clip of the other rows, {known['clip']}")
+    known["rows"][options.name] = [run_row(folder) for folder in options.runs]
     known["baselines"] = {
         label: {key: metrics["baselines"][baseline]["mean"][key] for key in METRICS}
         for baseline, label in LEVELS.items()
     }
-    write_json(FILE, known)
+    return known
 
 
 def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
@@ -110,7 +106,7 @@ def about(result: dict[str, Any]) -> str:
     )
 
 
-def draw(result: dict[str, Any], path: Path) -> None:
+def draw(result: dict[str, Any]) -> None:
     """PSNR and LPIPS against minutes, a panel each, with the levels of the baselines."""
     figure = new_figure(7.4, 3.2)
     for axes, key in zip(figure.subplots(1, 2), ("psnr_full", "lpips"), strict=True):
@@ -119,34 +115,21 @@ def draw(result: dict[str, Any], path: Path) -> None:
             axes.plot(*at, "o", color=BLUE, markersize=5)
             axes.annotate(name, at, xytext=(4, 4), textcoords="offset points", fontsize=8, color=INK)
         for name, row in levels(result).items():
-            axes.axhline(row[key], color=GREY, linewidth=1, linestyle="--")
-            axes.annotate(name, (1.0, row[key]), xycoords=("axes fraction", "data"), xytext=(-4, 2),
-                          textcoords="offset points", ha="right", fontsize=8, color=GREY)  # fmt: skip
-        ticks = (1, 2, 4, 8, 16, 32)
-        axes.set(xscale="log", xlim=(0.9, 50), xticks=ticks, xticklabels=[str(n) for n in ticks])
-        axes.minorticks_off()
+            figures.level(axes, row[key], name)
+        figures.logarithmic_x(axes, (1, 2, 4, 8, 16, 32), xlim=(0.9, 50))
         name_axes(axes, "minutes of training", METRICS[key][0])
         plain_axes(axes)
-    save(figure, path)
+    save(figure, PICTURE)
 
 
-def parts(result: dict[str, Any]) -> dict[str, str]:
-    """The generated part of the page."""
+def shown(result: dict[str, Any]) -> str:
+    """Picture, table, clip and processor."""
     picture = f"![PSNR and LPIPS against minutes of training](results/{PICTURE.name})"
-    return {"table": "\n\n".join((picture, table(result), about(result)))}
+    return "\n\n".join((picture, table(result), about(result)))
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=["add"], nargs="?")
-    parser.add_argument("runs", type=Path, nargs="*")
-    parser.add_argument("--name", help="of the row: the options of the training")
-    options = parser.parse_args(words)
-    if options.what and not (options.runs and options.name):
-        parser.error("add needs finished runs and --name")
-    if options.what:
-        add(options.runs, options.name)
-    result = read_json(FILE, "python docs/make.py bench.minutes add RUN --name NAME")
-    draw(result, PICTURE)
-    write_marked(PAGE, parts(result), "minutes")
+PROGRAM = Program(
+    __name__, "bench.md", {"table": shown}, "minutes.json", measured,
+    {"runs": RUNS, "--name": {"required": True, "help": "of the row: the options of the training"}}, draw,
+    stamped=False,
+)  # fmt: skip

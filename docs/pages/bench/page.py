@@ -1,75 +1,135 @@
 """Measure the distribution of time, and write the generated parts of docs/bench.md and its pictures.
 
     python docs/make.py bench measure [WHAT ...] [--scenes FILE ...] [--out FOLDER]
-                                            on an otherwise idle machine: start, stages, peers and scaling, or the
-                                            named measurements; `effects` belongs to docs/effects.md
-    python docs/make.py bench              the page from docs/results
-    python docs/make.py bench FOLDER       from the files of another folder; pictures are written there too
 
-The command `endotsr bench` only times the stages on this machine.
+on an otherwise idle machine: start, stages, peers and scaling, or the named measurements; `effects` belongs to
+docs/effects.md. They run one after the other, each in separate processes. The command `endotsr bench` only times the
+stages on this machine.
 """
 
-import sys
-from collections.abc import Mapping
+import argparse
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
-from pages.bench import charts as bench_charts
-from pages.bench import parts as bench_parts
-from pages.bench import suite as bench_suite
-from pages.store.marks import read_json, write_marked
+from endotsr.method.kernels.threads import use_threads
+from endotsr.results.export.npz import read_arrays
+from endotsr.studies.bench import stages
+from endotsr.studies.bench.case import BenchCase, Precision, apart
+from endotsr.studies.bench.stages import Say
+from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import dated
+from pages.bench import charts, parts, peers, scaling, start
+from pages.bench import effects as bench_effects
+from pages.store.commands import loaded
+from pages.store.marks import read_json
+from pages.store.program import RESULTS, Program
 
-DOCS = Path(__file__).parents[2]
-PAGE, RESULTS = DOCS / "bench.md", DOCS / "results"
-FILES = {name: bench_suite.FILES[name] for name in ("stages", "scaling", "peers", "start")}
-COMMAND = "python docs/make.py bench measure"
+FILES = {
+    "start": "bench_start.json", "stages": "bench_stages.json", "peers": "bench_peers.json",
+    "scaling": "scaling.json", "effects": "bench_effects.json",
+}  # fmt: skip
+USUAL = ("stages", "scaling", "peers", "start")  # of the page docs/bench.md; `effects` belongs to docs/effects.md
+SIZES, THREADS, REPEATS = (20_000, 60_000, 150_000), (1, 2), 11
+PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
+LARGEST = 1_000_000  # Gaussians; takes about 10 GB
+AXES = ("gaussians", "pairs", "pixels", "bases", "frequencies", "frames")
+EFFECTS = (20_000, 15, 320, 256)  # Gaussians, repeats, columns, rows
 
 
-def read(folder: Path) -> dict[str, dict[str, Any]]:
-    """The four measurements by name. Raises: InputError if a file is missing or cannot be read."""
-    return {name: read_json(folder / file, COMMAND) for name, file in FILES.items()}
+def grid(scenes: tuple[Path, ...]) -> list[BenchCase]:
+    """The common workload in every size, precision and number of threads, then the trained scenes."""
+    cases = [
+        BenchCase(n, precision=precision, threads=threads, repeats=REPEATS)
+        for n in SIZES
+        for precision in PRECISIONS
+        for threads in THREADS
+    ]
+    return cases + [BenchCase(scene=str(path), repeats=REPEATS) for path in scenes]
 
 
-def read_runs(folder: Path) -> dict[str, dict[str, Any]]:
-    """Records of whole runs in the same folder, by name."""
-    records = {
-        path.stem: read_json(path, "docs/pages/full_size/record.py") for path in sorted(folder.glob("pulling*.json"))
+def measured_effects() -> dict[str, Any]:
+    """Of one thread; the times are processor times."""
+    use_threads(1)
+    return bench_effects.benchmark_effects(*EFFECTS) | {"threads": 1}
+
+
+def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Say = print) -> None:
+    """Measure and write into `out`. Without torch and gsplat the existing figures of the peers are kept.
+
+    Raises: InputError before anything is measured, if a name is unknown or a file of `scenes` is no trained scene.
+    """
+    if unknown := [name for name in names if name not in FILES]:
+        raise InputError(f"bench: {unknown[0]!r} is not allowed; allowed: {', '.join(FILES)}")
+    for path in scenes:
+        read_arrays(path)
+    out.mkdir(parents=True, exist_ok=True)
+    measures: dict[str, tuple[Callable[[], Any], Callable[[Any], str] | None]] = {
+        "start": (lambda: start.measure_start(3), start.table),
+        "stages": (lambda: stages.measure_stages(grid(scenes), say), None),
+        "peers": (lambda: peers.measure_peers((60_000,), PRECISIONS, 2, 2), peers.table),
+        "scaling": (lambda: scaling.measure_scaling(LARGEST, AXES, say), scaling.table),
+        "effects": (lambda: apart(measured_effects), bench_effects.table),
     }
-    return {name: record["run"] for name, record in records.items()}
+    for name, (measure, table) in measures.items():
+        if name not in names:
+            continue
+        try:
+            result = measure()
+        except InputError as error:
+            if name != "peers" or len(names) == 1:
+                raise
+            say(f"peers not measured: {error}")
+            continue
+        write_json(out / FILES[name], dated(result))
+        if table:
+            say(table(result))
+
+
+def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
+    """The four measurements by name. Raises: InputError if a file is missing or cannot be read."""
+    return {name: read_json(folder / FILES[name], "python docs/make.py bench measure") for name in USUAL}
+
+
+def read_runs() -> dict[str, dict[str, Any]]:
+    """Records of whole runs, by name."""
+    return {path.stem: loaded(path)["run"] for path in sorted(RESULTS.glob("pulling*.json"))}
 
 
 def fragments(found: Mapping[str, dict[str, Any]], runs: Mapping[str, dict[str, Any]]) -> dict[str, str]:
-    """Every generated part by name.
-
-    found   the results of the four measurements, by the names in FILES
-    runs    records of whole runs
-    """
-    stages, scaling, peers, start = (found[name] for name in FILES)
+    """Every generated part by name, from the four measurements and the records of whole runs."""
     return {
-        "machine": bench_parts.machine(stages),
-        "targets": bench_parts.targets(stages, scaling, peers, start, runs),
-        "stages": bench_parts.stages(stages),
-        "gain": bench_parts.gain(stages),
-        "cases": bench_parts.cases(stages),
-        "scaling": bench_parts.scaling(scaling),
-        "peers": bench_parts.peers(peers),
-        "start": bench_parts.start(start),
-        "runs": bench_parts.runs(runs),
+        "machine": parts.machine(found["stages"]),
+        "targets": parts.targets(found["stages"], found["scaling"], found["peers"], found["start"], runs),
+        "stages": parts.stages(found["stages"]),
+        "gain": parts.gain(found["stages"]),
+        "cases": parts.cases(found["stages"]),
+        "scaling": parts.scaling(found["scaling"]),
+        "peers": parts.peers(found["peers"]),
+        "start": parts.start(found["start"]),
+        "runs": parts.runs(runs),
     }
 
 
-def main(words: list[str], page: Path = PAGE) -> None:
-    """The command."""
-    if len(words) > 1 and words[0] != "measure":
-        sys.exit(__doc__)
-    folder = Path(words[0]) if words else RESULTS
-    try:
-        if words[:1] == ["measure"]:
-            return bench_suite.main(words[1:])
-        found = read(folder)
-        write_marked(page, fragments(found, read_runs(folder)), "bench")
-    except InputError as error:
-        sys.exit(f"error: {error}")
-    bench_charts.stage_bars(found["stages"]["cases"], folder / "bench_stages.png")
-    bench_charts.scaling_curves(found["scaling"]["axes"], folder / "scaling.png")
+def draw(folder: Path) -> None:
+    """The pictures, beside the measurements."""
+    found = read(folder)
+    charts.stage_bars(found["stages"]["cases"], folder / "bench_stages.png")
+    charts.scaling_curves(found["scaling"]["axes"], folder / "scaling.png")
+
+
+def measured(options: argparse.Namespace) -> None:
+    """The named measurements."""
+    run_all(options.out, tuple(options.what) or USUAL, tuple(options.scenes))
+
+
+PROGRAM = Program(
+    __name__, "bench.md", lambda: fragments(read(), read_runs()), "", measured,
+    {
+        "what": {"nargs": "*", "metavar": "WHAT", "help": f"{', '.join(FILES)} (default: {', '.join(USUAL)})"},
+        "--out": {"type": Path, "default": RESULTS, "metavar": "FOLDER", "help": "folder of the JSON files"},
+        "--scenes": {"type": Path, "nargs": "+", "default": [], "metavar": "FILE", "help": "trained scenes (npz)"},
+    },
+    lambda record: draw(RESULTS),
+)  # fmt: skip

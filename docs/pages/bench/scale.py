@@ -1,13 +1,8 @@
 """Tabulate and draw the minutes and the memory of a training against the number of frames, for every preset.
 
-    python docs/make.py bench.scale      rewrite the part `scale:minutes` of docs/bench.md and docs/results/scale.svg
-
 Nothing is trained. The numbers are the estimates printed by `endotsr check` and at the start of a training
 (`clips/sequences/checks/cost.py`), with the timed trainings of docs/results/minutes.json for comparison.
 """
-
-import json
-from pathlib import Path
 
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
 from endotsr.clips.sequences.checks.duration import expected_frames
@@ -15,10 +10,13 @@ from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.results.report.style import BLUE, GREEN, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import markdown
-from pages.store.marks import write_marked
+from pages.store import figures
+from pages.store.commands import loaded
+from pages.store.program import RESULTS, Program
 
-DOCS = Path(__file__).parents[2]
-PAGE, PICTURE = DOCS / "bench.md", DOCS / "results" / "scale.svg"
+PICTURE = RESULTS / "scale.svg"
+
+
 FRAMES = (16, 32, 63, 160, 256, 512)
 SIZES = ((320, 256), (640, 512), (1280, 1024))
 MEMORY = 8.0  # GB for a training; frames and targets beyond a fraction of it are kept in files
@@ -46,7 +44,7 @@ def table() -> str:
 
 def measured() -> str:
     """The timed trainings of docs/results/minutes.json with their estimates, a sentence each."""
-    lines, rows = [], json.loads((DOCS / "results" / "minutes.json").read_text(encoding="utf-8"))["rows"]
+    lines, rows = [], loaded(RESULTS / "minutes.json")["rows"]
     for preset in COLOURS:
         run, (iterations, cost) = rows[preset][-1], estimated(preset, 63, 640, 512)
         lines.append(
@@ -57,7 +55,7 @@ def measured() -> str:
     return "\n".join(lines)
 
 
-def draw(path: Path) -> None:
+def draw(record: None) -> None:
     """Minutes and memory at 640x512 against the number of frames, a panel each."""
     figure = new_figure(7.0, 2.9)
     panels = figure.subplots(1, 2)
@@ -68,21 +66,17 @@ def draw(path: Path) -> None:
         ):
             axes.plot(FRAMES, values, "o-", color=colour, markersize=3, label=preset)
     for axes, name in zip(panels, ("minutes", "memory, GB"), strict=True):
-        axes.set(xscale="log", xticks=FRAMES, xticklabels=[str(n) for n in FRAMES], ylim=(0, None))
-        axes.minorticks_off()
+        figures.logarithmic_x(axes, FRAMES, ylim=(0, None))
         name_axes(axes, "frames of 640x512", name)
         plain_axes(axes)
     legend(panels[0])
-    save(figure, path)
+    save(figure, PICTURE)
 
 
-def parts() -> dict[str, str]:
-    """The generated parts of the page."""
+def minutes() -> str:
+    """Picture, table and the timed trainings."""
     picture = f"![Minutes and memory of a training run against its number of frames](results/{PICTURE.name})"
-    return {"minutes": "\n\n".join((picture, table(), measured()))}
+    return "\n\n".join((picture, table(), measured()))
 
 
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    draw(PICTURE)
-    write_marked(PAGE, parts(), "scale")
+PROGRAM = Program(__name__, "bench.md", {"minutes": minutes}, draw=draw)

@@ -1,12 +1,11 @@
 """What trainings said about their time, what they took, and their held-out quality against seconds.
 
-    python docs/make.py bench.waiting add CLIP ... --preset quick --lpips FILE   train each clip and store what was said
-    python docs/make.py bench.waiting                                            rewrite the table and the picture
+    python docs/make.py bench.waiting measure CLIP ... --preset quick --lpips FILE
 
-`add` runs `endotsr train` on each clip in this process, with its evaluation. The first clip is forecast at the assumed
-speed of a machine, the next ones at the speed of the training before. Without --wall every time is processor time of
-one thread, which other work on the machine hardly changes; set OPENBLAS_NUM_THREADS=1 for it. The renders for the curve
-are no part of any time. The result is docs/results/waiting.json.
+`endotsr train` runs on each clip in this process, with its evaluation. The first clip is forecast at the assumed speed
+of a machine, the next ones at the speed of the training before. Without --wall every time is processor time of one
+thread, which other work on the machine hardly changes; set OPENBLAS_NUM_THREADS=1 for it. The renders for the curve are
+no part of any time.
 """
 
 import argparse
@@ -14,13 +13,11 @@ import contextlib
 import tempfile
 import time
 from collections.abc import Iterator
-from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
-from endotsr.cli.main import main as endotsr
 from endotsr.cli.parts import progress, waiting
 from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
 from endotsr.results.evaluation.metrics import psnr
@@ -31,12 +28,12 @@ from endotsr.training.fitting.model import camera_at, render_at
 from endotsr.training.runs import speed
 from endotsr.training.runs import training as runs_training
 from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.bench.waiting_text import PICTURE, draw, parts
-from pages.store.marks import read_json, write_marked
+from endotsr.training.runs.machine import machine, now
+from pages.bench.waiting_text import draw, quality, said
+from pages.store import commands
+from pages.store.kept import with_row
+from pages.store.program import CLIPS, LPIPS, Program
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "waiting.json", DOCS / "bench.md"
 MARKS = 10  # renders of every held-out frame, evenly over the iterations
 MINUTE = 60.0
 KEYS = ("psnr_full", "psnr_tissue", "lpips")
@@ -132,9 +129,8 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         stack.enter_context(mock.patch.object(speed, "speed_file", lambda threads: kept_speed))
         run = Path(root) / "run"
         threads = [] if wall else ["--threads", "1"]
-        if endotsr(["train", str(clip), "--out", str(run), *words, *threads]) != 0:
-            raise SystemExit(f"failed: endotsr train {clip}")
-        whole, metrics = watch.now(), read_json(run / "metrics.json", "endotsr train")
+        commands.said("train", clip, "--out", run, *words, *threads)
+        whole, metrics = watch.now(), commands.loaded(run / "metrics.json")
     about = metrics["run"]
     return {
         "clip": clip.resolve().name, "frames": about["input"]["frames"],
@@ -144,39 +140,30 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise, "curve": spoken.curve,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
-        "machine": machine(), "date": date.today().isoformat(),
+        "machine": machine(), "date": now()[:10],
     }  # fmt: skip
 
 
-def add(options: argparse.Namespace) -> None:
-    """Train on every clip and store what was said, in place of an earlier command of the same kind."""
-    rows = read_json(FILE, "python docs/make.py bench.waiting")["rows"] if FILE.exists() else []
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Train on every clip; what was said is stored in place of an earlier command of the same kind."""
     words = ["--preset", options.preset, "--seed", str(options.seed)]
     words += ["--lpips", str(options.lpips)] if options.lpips else []
     words += ["--iterations", str(options.iterations)] if options.iterations else []
+    found: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as root:
         for clip in options.clips:
             row = heard(clip, words, options.wall, Path(root) / "speed.json")
-            key = ("clip", "preset", "iterations", "seed", "clock")
-            rows = [other for other in rows if any(other[k] != row[k] for k in key)] + [row]
-            write_json(FILE, {"rows": sorted(rows, key=lambda r: [str(r[k]) for k in key])})
+            found = with_row(options.record, row, ("clip", "preset", "iterations", "seed", "clock"))
+            write_json(options.record, found)
+    return found
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=["add"], nargs="?")
-    parser.add_argument("clips", type=Path, nargs="*", help="sequence folders")
-    parser.add_argument("--preset", default="quick")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--iterations", type=int, help="exact length (default: that of the preset on the clip)")
-    parser.add_argument("--lpips", type=Path, help="AlexNet LPIPS weights")
-    parser.add_argument("--wall", action="store_true", help="time on the wall, with all threads")
-    options = parser.parse_args(words)
-    if options.what and not options.clips:
-        parser.error("add needs sequence folders")
-    if options.what:
-        add(options)
-    result = read_json(FILE, "python docs/make.py bench.waiting add CLIP")
-    draw(result["rows"], PICTURE)
-    write_marked(PAGE, parts(result), "waiting")
+PROGRAM = Program(
+    __name__, "bench.md", {"said": said, "quality": quality}, "waiting.json", measured,
+    {
+        "clips": {**CLIPS, "nargs": "+"}, "--preset": "quick", "--seed": 0, "--lpips": LPIPS,
+        "--iterations": {"type": int, "help": "exact length (default: that of the preset on the clip)"},
+        "--wall": {"action": "store_true", "help": "time on the wall, with all threads"},
+    },
+    draw, stamped=False,
+)  # fmt: skip

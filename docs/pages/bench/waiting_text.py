@@ -1,12 +1,15 @@
 """The table and the picture of docs/bench.md on what a training says about its time."""
 
-from pathlib import Path
 from typing import Any
 
-from endotsr.results.report.style import BLUE, GREEN, GREY, INK, ORANGE, name_axes, new_figure, plain_axes, save
+from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import duration, markdown
+from pages.store import figures
+from pages.store.program import RESULTS
+from pages.store.tables import noted, numbers
 
-PICTURE = Path(__file__).parents[2] / "results" / "waiting.svg"
+PICTURE = RESULTS / "waiting.svg"
+QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
 CLOCKS = {"processor": "processor time of one thread", "wall": "time on the wall"}
 
@@ -25,8 +28,9 @@ def named(row: dict[str, Any]) -> str:
     return f"{row['clip']}, `{row['preset']}`, {row['iterations']} iterations, seed {row['seed']}"
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def said(result: dict[str, Any]) -> str:
     """One row per command."""
+    rows = result["rows"]
     heads = ["Training", "Frames", "First line: said, left", "After 30 iterations", "After a minute",
              "Largest rise", "Evaluation", "Whole command"]  # fmt: skip
     cells = []
@@ -37,7 +41,7 @@ def table(rows: list[dict[str, Any]]) -> str:
             [named(row), str(row["frames"]), first, told(row, "forecast"), told(row, "minute"),
              f"{row['largest_rise']:.0%}", duration(after), duration(row["whole"])]
         )  # fmt: skip
-    return markdown(heads, cells)
+    return noted(heads, cells, about(rows))
 
 
 def about(rows: list[dict[str, Any]]) -> str:
@@ -50,20 +54,20 @@ def about(rows: list[dict[str, Any]]) -> str:
     )
 
 
-def qualities(rows: list[dict[str, Any]]) -> str:
-    """Held-out means of every training beside the blend of its clip."""
+def quality(result: dict[str, Any]) -> str:
+    """The picture, and held-out means of every training beside the blend of its clip."""
+    picture = f"![Held-out PSNR against seconds of training](results/{PICTURE.name})"
     heads = ["Training", "PSNR full, dB", "PSNR tissue, dB", "LPIPS", "Blend: PSNR full, dB", "Blend: LPIPS"]
-    cells = []
-    for row in rows:
-        ours, blend = row["held_out"], row["blend"]
-        numbers = (ours["psnr_full"], 2), (ours["psnr_tissue"], 2), (ours["lpips"], 4), (blend["psnr_full"], 2)
-        numbers = (*numbers, (blend["lpips"], 4))
-        cells.append([named(row), *("-" if n is None else f"{n:.{digits}f}" for n, digits in numbers)])
-    return markdown(heads, cells)
+    cells = [
+        [named(row), *numbers(row["held_out"], QUALITY), *numbers(row["blend"], (QUALITY[0], QUALITY[2]))]
+        for row in result["rows"]
+    ]
+    return f"{picture}\n\n{markdown(heads, cells)}"
 
 
-def draw(rows: list[dict[str, Any]], path: Path) -> None:
+def draw(result: dict[str, Any]) -> None:
     """Held-out PSNR against seconds of training, a panel for each clip, with the level of the blend."""
+    rows = result["rows"]
     clips = list(dict.fromkeys(row["clip"] for row in rows))
     figure = new_figure(3.7 * len(clips), 3.2)
     for axes, clip in zip(figure.subplots(1, len(clips), squeeze=False)[0], clips, strict=True):
@@ -74,18 +78,8 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
             axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=3)
             label = f"{row['preset']}, {row['iterations']}"
             axes.annotate(label, points[-1], xytext=(-4, -12), textcoords="offset points", ha="right", fontsize=8)
-        level = shown[0]["blend"]["psnr_full"]
-        axes.axhline(level, color=GREY, linewidth=1, linestyle="--")
-        axes.annotate("blend", (1.0, level), xycoords=("axes fraction", "data"), xytext=(-4, 2),
-                      textcoords="offset points", ha="right", fontsize=8, color=GREY)  # fmt: skip
+        figures.level(axes, shown[0]["blend"]["psnr_full"], "blend")
         axes.set_title(clip, fontsize=9)
         name_axes(axes, "seconds of training", "held-out PSNR, dB")
         plain_axes(axes)
-    save(figure, path)
-
-
-def parts(result: dict[str, Any]) -> dict[str, str]:
-    """The generated parts of the page."""
-    rows = result["rows"]
-    picture = f"![Held-out PSNR against seconds of training](results/{PICTURE.name})"
-    return {"said": f"{table(rows)}\n\n{about(rows)}", "quality": f"{picture}\n\n{qualities(rows)}"}
+    save(figure, PICTURE)

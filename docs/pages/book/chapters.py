@@ -2,31 +2,25 @@
 
     python docs/make.py book.chapters measure [NUMBER ...]   run these notebooks, or all, at their small size
                                                              on one thread, and keep the stored times of the others
-    python docs/make.py book.chapters                        rewrite the table in notebooks/index.md
 
-The times are docs/results/chapters.json. Everything else is read from the text of the notebooks. A test checks every
+The table is in notebooks/index.md. All but the times is read from the text of the notebooks. A test checks every
 chapter with `missing`.
 """
 
+import argparse
 import os
 import re
 import subprocess
 import sys
 import time
-from datetime import date
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import loaded
+from pages.store.program import DOCS, Program
+from pages.store.tables import noted, where_and_cores
 
-ROOT = Path(__file__).parents[3]
-NOTEBOOKS, PAGE = ROOT / "notebooks", ROOT / "notebooks" / "index.md"
-FILE = ROOT / "docs" / "results" / "chapters.json"
-COMMAND = "docs/pages/book/chapters.py measure"
+NOTEBOOKS = DOCS.parent / "notebooks"
 MEASURES = {"00_why", "16_tradeoff", "17_effects"}
 """Chapters that measure the results of other derivations and have none of their own."""
 LEAST_WORDS, EXERCISES, LONGEST = 12, 3, 600.0  # words of a motive; exercises; seconds of all chapters together
@@ -75,16 +69,17 @@ def chapters() -> dict[str, Chapter]:
     return {file.stem: chapter_of(file.read_text(encoding="utf-8")) for file in sorted(NOTEBOOKS.glob("*.py"))}
 
 
-def measured(numbers: list[str]) -> dict[str, Any]:
+def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Processor time and elapsed time of notebooks, run as scripts on one thread; all of them without numbers.
 
     Raises: InputError for a number without a notebook, and for a notebook that fails.
     """
+    numbers = options.numbers
     files = {file.name[:2]: file for file in sorted(NOTEBOOKS.glob("[0-9]*.py"))}
     if not {*numbers} <= {*files}:
         raise InputError(f"no notebook {sorted({*numbers} - {*files})}; allowed: {', '.join(files)}")
     environment = os.environ | {"ENDOTSR_NOTEBOOK_SIZE": "small", "MPLBACKEND": "Agg", "NUMBA_NUM_THREADS": "1"}
-    found = read_json(FILE, COMMAND)["chapters"] if numbers else {}
+    found = loaded(options.record)["chapters"] if numbers else {}
     for file in (files[number] for number in numbers or files):
         before, began = os.times(), time.monotonic()
         done = subprocess.run([sys.executable, str(file)], env=environment, capture_output=True, text=True)
@@ -94,13 +89,13 @@ def measured(numbers: list[str]) -> dict[str, Any]:
         spent = after.children_user + after.children_system - before.children_user - before.children_system
         found[file.stem] = {"processor_seconds": spent, "seconds": time.monotonic() - began}
         print(f"{file.stem}: {spent:.0f} s", flush=True)
-    return {"date": date.today().isoformat(), "machine": machine(), "chapters": found}
+    return {"chapters": found}
 
 
-def table(found: dict[str, Chapter], times: dict[str, Any]) -> str:
+def table(times: dict[str, Any]) -> str:
     """One row per chapter, and the total run time."""
     rows = []
-    for name, chapter in found.items():
+    for name, chapter in chapters().items():
         spent = times["chapters"].get(name, {}).get("processor_seconds")
         steps = f"{chapter.steps} steps" if chapter.steps else "reverse pass" if chapter.derived else "measures only"
         figures = f"{chapter.figures}" + (f", {chapter.plays} interactive" if chapter.plays else "")
@@ -108,21 +103,14 @@ def table(found: dict[str, Chapter], times: dict[str, Any]) -> str:
         cells = [steps, figures, exercises, "not measured" if spent is None else f"{spent:.0f} s"]
         rows.append([f"{{doc}}`{name}`", chapter.motive, *cells])
     total = sum(row["processor_seconds"] for row in times["chapters"].values())
-    about = times["machine"]
-    return (
-        markdown(("Chapter", "Motive", "Derivation", "Figures", "Exercises", "Run"), rows)
-        + f"\n\nRun: processor time at the small size on one thread, kernels compiled before; {total / 60:.1f} minutes "
-        f"together ({about['processor']}, {about['cores']} cores, {times['date']}). *Judged*: by golden cases."
+    about = (
+        f"Run: processor time at the small size on one thread, kernels compiled before; {total / 60:.1f} minutes "
+        f"together ({where_and_cores(times)}). *Judged*: by golden cases."
     )
+    return noted(("Chapter", "Motive", "Derivation", "Figures", "Exercises", "Run"), rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    try:
-        if words[:1] == ["measure"]:
-            write_json(FILE, measured(words[1:]))
-        elif words:
-            sys.exit(__doc__)
-        write_marked(PAGE, {"table": table(chapters(), read_json(FILE, COMMAND))}, "chapters")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(
+    __name__, "../notebooks/index.md", {"table": table}, "chapters.json", measured,
+    {"numbers": {"nargs": "*", "metavar": "NUMBER"}},
+)  # fmt: skip

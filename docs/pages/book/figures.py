@@ -25,18 +25,10 @@ from endotsr.errors import InputError
 from endotsr.untrusted.writing import replace_file
 from pages.book.figure_table import FIGURES, Figure, Formula, Setting
 from pages.store.marks import read_json
+from pages.store.program import DOCS, RESULTS
 
-DOCS = Path(__file__).parents[2]
-RESULTS = DOCS / "results"
-PAGES = (
-    "../*.md",
-    "*.md",
-    "guides/*.md",
-    "specification/*.md",
-    "results/*.md",
-    "../notebooks/*.md",
-    "../notebooks/*.py",
-)
+PAGES = ("../*.md", "*.md", "guides/*.md", "specification/*.md", "results/*.md", "../notebooks/*.md",
+         "../notebooks/*.py")  # fmt: skip
 UNITS = "dB|mm|ms|us|s|seconds|min|minutes|hours|[KMG]i?B|px|pixels|%|times"
 MARK = re.compile(  # a number, its unit if any, and the name of the figure
     rf"(?P<number>[-+]?\d[\d.]*)(?P<unit>(?: ?(?:{UNITS}))?)<!--=(?P<key>[\w.]+)-->"

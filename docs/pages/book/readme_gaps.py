@@ -1,22 +1,18 @@
-"""Write the table of README.md that compares `sharp` with interpolation: python docs/make.py book.readme_gaps
+"""The table of README.md that compares `sharp` with interpolation.
 
-The records are those of docs/pages/full_size/record.py and of `python docs/make.py full_size.interpolation`.
+The records are those of `full_size.record` and of `full_size.interpolation`.
 """
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.results.report.tables import markdown
+from pages.store.commands import loaded
 from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.program import RESULTS, Program
+from pages.store.tables import noted
 
-DOCS = Path(__file__).parents[2]
-PAGE, RESULTS = DOCS.parent / "README.md", DOCS / "results"
-TISSUE_ONLY = RESULTS / "interpolation.json"
 GAPS = {  # frames missing in a row: records of `sharp`, split of the interpolation
     1: ("pulling_sharp_seed?.json", "every eighth frame"),
     4: ("pulling_sharp_blocks4.json", "blocks of 4 frames"),
@@ -37,8 +33,8 @@ def by_frame(runs: list[dict[str, Any]], of: str = "", metric: str = "psnr_tissu
 def row(gap: int) -> list[str]:
     """The cells of one length of the gap; the difference is paired by frame."""
     pattern, split = GAPS[gap]
-    runs = [read_json(file, "docs/pages/full_size/record.py") for file in sorted(RESULTS.glob(pattern))]
-    splits = read_json(TISSUE_ONLY, "python docs/make.py full_size.interpolation")["clips"]["endonerf_pulling"]
+    runs = [loaded(file) for file in sorted(RESULTS.glob(pattern))]
+    splits = loaded(RESULTS / "interpolation.json")["clips"]["endonerf_pulling"]
     tissue = splits[split]["baselines"][f"{FLOW}_tissue"]["psnr_tissue"] if split in splits else None
     model, flow = by_frame(runs), by_frame(runs, FLOW)
     return [
@@ -54,17 +50,13 @@ def row(gap: int) -> list[str]:
     ]
 
 
-def parts() -> dict[str, str]:
-    """The generated part of README.md."""
+def table() -> str:
+    """One row for each length of the gap."""
     about = (
         "EndoNeRF pulling, 640x512, PSNR of the tissue in dB. ± is a 95 % interval over the held-out frames, as if "
         "they were independent. Flow and blend read every pixel of the neighbours, instruments included."
     )
-    return {"table": f"{markdown(HEADS, [row(gap) for gap in GAPS])}\n\n{about}"}
+    return noted(HEADS, [row(gap) for gap in GAPS], about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    if words:
-        sys.exit(__doc__)
-    write_marked(PAGE, parts(), "gaps")
+PROGRAM = Program(__name__, "../README.md", {"table": table}, room="gaps")

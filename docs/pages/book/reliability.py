@@ -1,52 +1,34 @@
-"""Tables of docs/guides/run_folder.md from the results of the campaigns: python docs/make.py book.reliability
+"""Tables of docs/guides/run_folder.md from the results of the campaigns of `MAKERS`."""
 
-docs/results/faults.json   python tests/faults/campaign.py --kills 50 --json docs/results/faults.json
-docs/results/fuzz.json     python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json
-docs/results/soak.json     python tests/faults/soak.py --json docs/results/soak.json --plot docs/results/soak.png
-docs/results/large.json    python tests/faults/large.py --json docs/results/large.json
-"""
-
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-from pages.store.marks import read_json, write_marked
+from pages.store.marks import read_json
+from pages.store.program import RESULTS, Program
+from pages.store.tables import noted
 
-ROOT = Path(__file__).parents[3]
-PAGE = ROOT / "docs" / "guides" / "run_folder.md"
-RESULTS = ROOT / "docs" / "results"
 MAKERS = {
     "faults": "python tests/faults/campaign.py --kills 50 --json docs/results/faults.json",
     "fuzz": "python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json",
-    "soak": "python tests/faults/soak.py --json docs/results/soak.json",
+    "soak": "python tests/faults/soak.py --json docs/results/soak.json --plot docs/results/soak.png",
     "large": "python tests/faults/large.py --json docs/results/large.json",
 }
 
 
-def parts() -> dict[str, str]:
-    """The generated parts of the page by name."""
-    written = {"faults": faults, "fuzz": fuzz, "soak": soak, "large": large}
-    return {
-        name: written[name](read_json(RESULTS / f"{name}.json", command))
-        if (RESULTS / f"{name}.json").exists()
-        else f"No result is stored yet; the command is `{command}`."
-        for name, command in MAKERS.items()
-    }
-
-
 def faults(result: dict[str, Any]) -> str:
     """One row per fault."""
-    rows = [f"| {r['fault']} | {r['as_promised']} of {r['trials']} | {r['what']} |" for r in result["faults"]]
-    return "\n".join(["| Fault | As promised | What happens |", "|---|---|---|", *rows, "", made(result)])
+    rows = [[r["fault"], f"{r['as_promised']} of {r['trials']}", r["what"]] for r in result["faults"]]
+    return noted(("Fault", "As promised", "What happens"), rows, made(result))
 
 
 def fuzz(result: dict[str, Any]) -> str:
     """One row per reader, and the sum."""
     readers = result["readers"]
-    rows = [f"| {r['reader']} | {r['inputs']} | {r['seconds']} | {r['findings']} |" for r in readers]
-    total = [sum(r[key] for r in readers) for key in ("inputs", "seconds", "findings")]
-    rows.append(f"| together | {total[0]} | {total[1]} | {total[2]} |")
+    keys = ("inputs", "seconds", "findings")
+    rows = [[r["reader"], *(str(r[key]) for key in keys)] for r in readers]
+    rows.append(["together", *(str(sum(r[key] for r in readers)) for key in keys)])
     bound = f"Memory bound: {result['memory'] >> 20} MiB above the start. {made(result)}"
-    return "\n".join(["| Reader | Inputs | Seconds | Findings in this run |", "|---|---|---|---|", *rows, "", bound])
+    return noted(("Reader", "Inputs", "Seconds", "Findings in this run"), rows, bound)
 
 
 def soak(result: dict[str, Any]) -> str:
@@ -86,6 +68,12 @@ def made(result: dict[str, Any]) -> str:
     return f"Measured on {result['date']}, {machine['processor']}, {machine['cores']} cores."
 
 
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    write_marked(PAGE, parts(), "reliability")
+def part(name: str) -> str:
+    """The part of one campaign."""
+    file, write = RESULTS / f"{name}.json", {"faults": faults, "fuzz": fuzz, "soak": soak, "large": large}[name]
+    if not file.exists():
+        return f"No result is stored yet; the command is `{MAKERS[name]}`."
+    return write(read_json(file, MAKERS[name]))
+
+
+PROGRAM = Program(__name__, "guides/run_folder.md", {name: partial(part, name) for name in MAKERS})

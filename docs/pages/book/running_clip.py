@@ -2,18 +2,15 @@
 
     endotsr simulate pulling --out CLIP
     endotsr train CLIP --preset quick --seed SEED --out RUN      once for each seed
-    python docs/make.py book.running_clip measure RUN ...        to docs/results/running_clip.json
-    python docs/make.py book.running_clip                        rewrite the table of chapter 14
+    python docs/make.py book.running_clip measure RUN ...        the table is in chapter 14
 
-The file has numbers alone.
+The record has numbers alone.
 """
 
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
-import re
-import sys
-from datetime import date
+import argparse
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +21,10 @@ import endotsr
 from endotsr.errors import InputError
 from endotsr.results.evaluation.baselines import unit_image
 from endotsr.results.evaluation.metrics import psnr_tissue
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
 from pages.full_size.page import noise_of, predictions
 from pages.full_size.text import LABELS, PREDICTIONS
-from pages.store.marks import read_json
-
-FILE = Path(__file__).parents[2] / "results" / "running_clip.json"
-CHAPTER = Path(__file__).parents[3] / "notebooks" / "14_full_sequence.py"
-MARKED = re.compile(r"^(# <!-- running_clip:start -->)$.*?^(# <!-- running_clip:end -->)$", re.MULTILINE | re.DOTALL)
-COMMAND = "docs/pages/book/running_clip.py measure RUN ..."
+from pages.store.program import RUNS, Program
+from pages.store.tables import noted
 
 
 def of_run(folder: Path) -> dict[str, Any]:
@@ -71,27 +62,15 @@ def table(record: dict[str, Any]) -> str:
         rows.append([LABELS[name], f"{values.mean():.2f}", spread, f"{above.min():+.2f} to {above.max():+.2f}"])
     run = record["runs"][0]
     about = f"{run['iterations_done']} iterations, {run['gaussians'][-1]} Gaussians; {run['machine']['processor']}"
-    return (
-        markdown(("Prediction", "dB", f"{len(record['runs'])} seeds", "above the blend, dB"), rows)
-        + f"\n\nPreset `{record['preset']}`, {about}, {record['date']}."
-    )
+    heads = ("Prediction", "dB", f"{len(record['runs'])} seeds", "above the blend, dB")
+    return noted(heads, rows, f"Preset `{record['preset']}`, {about}, {record['date'][:10]}.")
 
 
-def with_table(text: str, made: str) -> str:
-    """The notebook with the table between its marks."""
-    lines = "\n".join(f"# {line}".rstrip() for line in made.splitlines())
-    return MARKED.sub(lambda match: f"{match[1]}\n{lines}\n{match[2]}", text)
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """All runs by their seeds."""
+    return {"preset": "quick", "runs": sorted(map(of_run, options.runs), key=lambda run: run["seed"])}
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    try:
-        if words[:1] == ["measure"] and len(words) > 1:
-            runs = sorted((of_run(Path(folder)) for folder in words[1:]), key=lambda run: run["seed"])
-            write_json(FILE, {"date": date.today().isoformat(), "preset": "quick", "runs": runs})
-        elif words:
-            sys.exit(__doc__)
-        text, made = CHAPTER.read_text(encoding="utf-8"), table(read_json(FILE, COMMAND))
-        CHAPTER.write_text(with_table(text, made), encoding="utf-8", newline="\n")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(
+    __name__, "../notebooks/14_full_sequence.py", {"table": table}, "running_clip.json", measured, {"runs": RUNS}
+)

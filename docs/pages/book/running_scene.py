@@ -13,7 +13,6 @@ run of a simulated clip is accepted.
 # pyright: reportTypedDictNotRequiredAccess=false
 
 import sys
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +31,14 @@ from endotsr.results.evaluation.baselines import BASELINES, neighbours, unit_ima
 from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.training.fitting.model import raster_settings, scene_at
 from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import now
 from endotsr.training.scene.gaussians import Gaussians, arrays
 from endotsr.untrusted.writing import replace_file
 from pages.full_size.page import noise_of
-from pages.store.marks import read_json
+from pages.store.commands import loaded
+from pages.store.program import DOCS
 
-FOLDER = Path(__file__).parents[3] / "notebooks" / "running_clip"
+FOLDER = DOCS.parent / "notebooks" / "running_clip"
 BLOCK = 16  # pixels of the side of the block with the largest error
 REACH = 24  # pixels around that pixel: Gaussians with centres in this square are stored with all parameters
 Y00 = 0.5 / np.sqrt(np.pi)  # the harmonic of degree 0
@@ -87,7 +88,7 @@ def inspected(run: endotsr.Run) -> dict[str, Any]:
         "verdicts": {name: verdict.kind for name, verdict in inspection.verdicts.items()},
         "cycles": [line.cycles for line in inspection.lines],
         "plan": apply_plan(make_plan(inspection, run.config), run.config)[1],
-        "effects": read_json(truth, "endotsr simulate pulling --out CLIP")["effects"],
+        "effects": loaded(truth)["effects"],
     }
 
 
@@ -115,7 +116,7 @@ def extract(run: endotsr.Run) -> tuple[dict[str, NDArray], dict[str, NDArray], d
     about = {
         "frame": index, "size": [camera.width, camera.height], "pixel": pixel, "gaussians": model.gaussians.count,
         "growth": [entry["gaussians"] for entry in run.log[::100]],
-        "seed": run.record["seed"], "iterations": run.record["iterations_done"], "date": date.today().isoformat(),
+        "seed": run.record["seed"], "iterations": run.record["iterations_done"], "date": now()[:10],
         "inspection": inspected(run),
         "config": {part: msgspec.to_builtins(getattr(model.config, part)) for part in ("model", "raster", "loss")},
     }  # fmt: skip

@@ -12,15 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.results.report.tables import markdown
 from pages.claims.estimates import Estimate, contrast, runs_of
 from pages.claims.rules import LEAST_PAIRS, seeds_of
 from pages.claims.verdicts import CLIPS, FULL, STEPS, WHOLE
+from pages.store.commands import loaded
 from pages.store.intervals import shown, student
-from pages.store.marks import read_json
 from pages.store.published import MATCHED_PSNR, PUBLISHED
+from pages.store.tables import noted
 
-TRUTH, INTERPOLATION = "effects_truth.json", "interpolation.json"
 PREDICTIONS = ("two_neighbours", "flow_interpolation", "two_neighbours_tissue", "flow_interpolation_tissue")
 NAMES = ("the blend", "flow", "the tissue-only blend", "the tissue-only flow")  # of the predictions, in their order
 METHOD, WITHOUT_A = "`paper`", "`paper` without A"
@@ -38,7 +37,7 @@ def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record |
     parts.append(splits(found, half))
     if right_eye:
         parts.append(f"On the right camera at held-out times (half size) the components change PSNR by {right_eye}.")
-    parts.append(truth(read_json(folder / TRUTH, "python docs/make.py effects.truth")))
+    parts.append(truth(loaded(folder / "effects_truth.json")))
     parts += [f"The ablation on {clip} is not finished." for clip in CLIPS if clip not in known]
     return " ".join(part for part in parts if part) + "\n\n" + levels(folder, found)
 
@@ -97,13 +96,13 @@ def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
         "PSNR of the whole image in dB, every eighth frame held out. ± is a 95 % interval over the seeds. Blend is the"
         " mean of the two neighbouring frames; *tissue only* reads no pixel that the masks exclude, as the method does."
     )
-    return f"{markdown(head, rows)}\n\n{about}"
+    return noted(head, rows, about)
 
 
 def baselines(folder: Path, clip: str) -> dict[str, float]:
     """PSNR of the whole image of blend and flow, plain and tissue only; empty if not recorded."""
-    path = folder / INTERPOLATION
-    clips = read_json(path, "python docs/make.py full_size.interpolation")["clips"] if path.exists() else {}
+    path = folder / "interpolation.json"
+    clips = loaded(path)["clips"] if path.exists() else {}
     rows = clips.get(f"endonerf_{clip}", {}).get("every eighth frame", {}).get("baselines", {})
     return {name: float(np.mean(rows[name]["psnr_full"])) for name in PREDICTIONS if name in rows}
 

@@ -1,7 +1,6 @@
-"""Which mask folder the published metrics use: docs/results/mask_folders.json, and a table of the rulings.
+"""Which mask folder the published metrics use: a table of the rulings.
 
-    python docs/make.py claims.mask_folders PULLING CUTTING   measure both EndoNeRF clips and write the table
-    python docs/make.py claims.mask_folders                   write the table
+    python docs/make.py claims.mask_folders measure PULLING CUTTING   both EndoNeRF clips
 
 If both images are zeroed where a mask excludes, the squared error is averaged over all pixels instead of over the
 tissue. The PSNR of the whole image is then -10 log10(fraction of tissue) above that of the tissue, whatever the model.
@@ -11,18 +10,15 @@ The paper prints one of the two in each of two tables.
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
 
 from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from pages.store.marks import read_json, write_marked
+from pages.store.program import CLIP, Program
 from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
 
-DOCS = Path(__file__).parents[2]
-PAGE, RECORD = DOCS / "specification" / "rulings.md", DOCS / "results" / "mask_folders.json"
 FOLDERS, WHITE = ("masks", "gt_masks"), 128
 CLIPS = ("pulling", "cutting")
 
@@ -48,12 +44,12 @@ def table(found: dict) -> str:
     return markdown(("masks", *(f"{clip}, dB" for clip in CLIPS), "mean, dB"), rows)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    if len(words) == len(CLIPS):
-        clips = dict(zip(CLIPS, map(Path, words), strict=True))
-        write_json(RECORD, {name: {clip: offset(of / name) for clip, of in clips.items()} for name in FOLDERS})
-    elif words:
-        sys.exit(__doc__)
-    found = read_json(RECORD, "python docs/make.py claims.mask_folders")
-    write_marked(PAGE, {"folders": table(found)}, "masks")
+def measured(options: argparse.Namespace) -> dict[str, dict[str, float]]:
+    """Both folders of both clips."""
+    return {name: {clip: offset(getattr(options, clip) / name) for clip in CLIPS} for name in FOLDERS}
+
+
+PROGRAM = Program(
+    __name__, "specification/rulings.md", {"folders": table}, "mask_folders.json", measured,
+    dict.fromkeys(CLIPS, CLIP), room="masks", stamped=False,
+)  # fmt: skip

@@ -1,8 +1,5 @@
 """Write the generated parts of docs/claims.md, docs/guides/sweep.md and the answer of README.md and docs/paper.md.
 
-    python docs/make.py claims            from docs/results
-    python docs/make.py claims FOLDER     from the files of another folder
-
 The differences are recomputed from the stored runs each time, and written to the file of the ablation.
 
 To measure, on an otherwise idle machine (each command continues where it was interrupted):
@@ -27,11 +24,9 @@ To measure, on an otherwise idle machine (each command continues where it was in
 A missing result is shown as "not measured yet"; a result of some seeds is shown with their number.
 """
 
-import sys
 from pathlib import Path
 from typing import Any
 
-from endotsr.errors import InputError
 from endotsr.studies.sweeps.ablation_page import ablation_record, draw
 from endotsr.studies.sweeps.execute import FINISHED
 from endotsr.studies.sweeps.results import METRICS
@@ -41,11 +36,10 @@ from pages.claims import parts as claims_parts
 from pages.claims import power as claims_power
 from pages.claims import protocols as claims_protocols
 from pages.claims import verdicts as claims_verdicts
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import loaded
+from pages.store.marks import read_json
+from pages.store.program import RESULTS, Program
 
-DOCS = Path(__file__).parents[2]
-PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
-PAGES = (PAGE, GUIDE, DOCS / "paper.md", DOCS.parent / "README.md")  # with a part of this program
 FILES = {
     "pulling": "ablation_pulling.json",
     "cutting": "ablation_cutting.json",
@@ -92,7 +86,7 @@ def without_frames(record: Any, left_out: set[int]) -> Any:
 
 def read_runs(folder: Path, name: str = RUNS) -> list[dict[str, Any]]:
     """The records of single runs in the same folder."""
-    return [read_json(path, "docs/pages/full_size/record.py") for path in sorted(folder.glob(name))]
+    return [loaded(path) for path in sorted(folder.glob(name))]
 
 
 def parts(folder: Path = RESULTS) -> dict[str, str]:
@@ -109,18 +103,13 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
         "spread": " ".join(claims_power.common_spread(found[clip], clip) for clip in claims_verdicts.CLIPS),
         "right_eye": claims_protocols.right_eye(found["pulling_half"]),
         "power": claims_power.sentences(found["pulling"]),
-        "pulling": claims_parts.tables(found["pulling"]),
+        **{name: claims_parts.tables(record) for name, record in found.items()},
         "cutting": (PICTURE if found["cutting"] else "") + claims_parts.tables(found["cutting"]),
-        "pulling_half": claims_parts.tables(found["pulling_half"]),
-        "pulling_half_blocks": claims_parts.tables(found["pulling_half_blocks"]),
-        "pulling_half_fixed": claims_parts.tables(found["pulling_half_fixed"]),
-        "simulated": claims_parts.tables(found["simulated"]),
-        "simulated_paper": claims_parts.tables(found["simulated_paper"]),
         "protocols": claims_parts.protocols(
             [found["pulling"], found["cutting"], *half], [*runs, *read_runs(folder, CUTTING)]
         ),
         "cost": claims_parts.cost(found["pulling"], runs),
-        "divided": claims_parts.divided(read_json(cost, "docs/pages/claims/sweep_cost.py") if cost.exists() else None),
+        "divided": claims_parts.divided(loaded(cost) if cost.exists() else None),
     }
 
 
@@ -145,15 +134,7 @@ def draw_ablations(folder: Path) -> None:
             draw(found, (folder / FILES[name]).with_suffix(".svg"))
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    if len(words) > 1:
-        sys.exit(__doc__)
-    try:
-        folder = Path(words[0]) if words else RESULTS
-        made = parts(folder)
-        for page in PAGES:
-            write_marked(page, made, "claims")
-        draw_ablations(folder)
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(
+    __name__, ("claims.md", "guides/sweep.md", "paper.md", "../README.md"), parts,
+    draw=lambda record: draw_ablations(RESULTS),
+)  # fmt: skip

@@ -1,7 +1,5 @@
 """Write the generated parts of docs/paper.md: the method sentence by sentence, and the systems.
 
-    python docs/make.py claims.paper
-
 Every sentence is in our own words. Its functions, checks and notebooks come from the map of the equations, its ruling
 is a row of docs/specification/rulings.md, and its verdict a row of docs/claims.md. A name that does not exist is an
 error.
@@ -13,26 +11,24 @@ error.
 import math
 import re
 import sys
-from pathlib import Path
 from typing import Any, NamedTuple
 
+from pages.claims.estimates import runs_of
 from pages.claims.verdicts import CLIPS, HEADS
+from pages.store.commands import loaded
 from pages.store.intervals import student
-from pages.store.marks import read_json, write_marked
+from pages.store.program import DOCS, RESULTS, Program
 from pages.store.published import BY_NAME, PUBLISHED, SEVEN_OTHERS, SURGICALGS
 
-DOCS = Path(__file__).parents[2]
 sys.path.append(str(DOCS / "_extensions"))
 
-from book_map import Equation, equations  # noqa: E402  # pyright: ignore[reportMissingImports]
-from package_names import definitions  # noqa: E402  # pyright: ignore[reportMissingImports]
+from book_map import Equation, equations  # pyright: ignore[reportMissingImports]
+from package_names import definitions  # pyright: ignore[reportMissingImports]
 
-from endotsr.errors import InputError  # noqa: E402
-from endotsr.results.report.tables import markdown  # noqa: E402
+from endotsr.errors import InputError
+from endotsr.results.report.tables import markdown
 
-PAGE, CLAIMS, RULINGS = DOCS / "paper.md", DOCS / "claims.md", DOCS / "specification" / "rulings.md"
-RESULTS = DOCS / "results"
-OURS, BASELINES = "ablation_pulling.json", "pulling_paper_seed0.json"
+CLAIMS, RULINGS = DOCS / "claims.md", DOCS / "specification" / "rulings.md"
 VERDICT = HEADS.index("verdict")  # column of the tables of verdicts
 
 
@@ -122,11 +118,6 @@ SECTIONS: dict[str, tuple[Sentence, ...]] = {
 }  # fmt: skip
 
 
-def parts() -> dict[str, str]:
-    """Every generated part of the page by name."""
-    return {"method": method(), "systems": systems(), "by_name": by_name()}
-
-
 def method() -> str:
     """A heading and a table for each section."""
     rows = {row.label: row for row in equations()}
@@ -203,8 +194,8 @@ def by_name() -> str:
 
 def systems() -> str:
     """PSNR of the whole image on pulling, every eighth frame held out: published, and measured here."""
-    ablation = read_json(RESULTS / OURS, "endotsr ablate")
-    recorded = read_json(RESULTS / BASELINES, "docs/pages/full_size/record.py")["baselines"]
+    ablation = loaded(RESULTS / "ablation_pulling.json")
+    recorded = loaded(RESULTS / "pulling_paper_seed0.json")["baselines"]
     given = lambda name: f"{recorded[name]['mean']['psnr_full']:.2f}"
     rows = [
         ["SurgicalGS", f"{SURGICALGS:.2f}", level(ablation, "base"), "configuration `base`: matched input, no A, S, L"],
@@ -222,17 +213,11 @@ def systems() -> str:
 
 def level(ablation: dict[str, Any], configuration: str) -> str:
     """Mean and 95 % interval (Student) of a configuration of the ablation over its seeds."""
-    rows = [r for r in ablation["rows"] if (r["configuration"], r["split"]) == (configuration, "every_eighth")]
-    values = [row["psnr_full"] for row in rows if row.get("psnr_full") is not None]
+    values = list(runs_of(ablation, configuration, "psnr_full").values())
     if not values:
         return "not measured yet"
     mean, limits = student(values)
     return f"{mean:.2f}" if limits is None else f"{mean:.2f} ({limits[0]:.2f} to {limits[1]:.2f})"
 
 
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    try:
-        write_marked(PAGE, parts(), "paper")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(__name__, "paper.md", {"method": method, "systems": systems, "by_name": by_name})

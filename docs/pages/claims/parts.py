@@ -40,16 +40,8 @@ def protocols(ablations: list[Record | None], runs: list[Record]) -> str:
     rows = [[*key, *_protocol_cells(members)] for key, members in sorted(_by_split(ablations, runs).items(), key=_clip)]
     if not rows:
         return NOT_YET
-    heads = (
-        "clip",
-        "held out, preset",
-        "runs",
-        "training frames",
-        "model",
-        "cross-fade",
-        "blend of neighbours",
-        "optical flow",
-    )
+    heads = ("clip", "held out, preset", "runs", "training frames", "model", "cross-fade", "blend of neighbours",
+             "optical flow")  # fmt: skip
     return markdown(heads, rows)
 
 
@@ -109,7 +101,7 @@ def divided(found: Record | None) -> str:
     runs = len(found["rows"][0]["runs"])
     about = f"{runs} runs of {found['iterations']} iterations, {found['sequence']}, {found['machine']['processor']}."
     heads = ("runs at a time", "threads of each", "sweep, seconds", "one run, seconds", "speed")
-    return f"{about}\n\n" + markdown(heads, rows)
+    return f"{about}\n\n{markdown(heads, rows)}"
 
 
 def cost(found: Record | None, runs: list[Record]) -> str:

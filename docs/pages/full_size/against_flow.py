@@ -1,7 +1,6 @@
 """A run compared with optical flow between the frames, by held-out frame and by kind of pixel.
 
-    python docs/make.py full_size.against_flow RUN   write against_flow.json from a finished run, then the tables
-    python docs/make.py full_size.against_flow       rewrite the tables of the last result
+    python docs/make.py full_size.against_flow measure RUN
 
 The squared error of the tissue pixels is divided among kinds of pixels; a pixel belongs to the first kind that applies.
 The tables are written to docs/results/README.md.
@@ -11,7 +10,6 @@ The tables are written to docs/results/README.md.
 # pyright: reportTypedDictNotRequiredAccess=false
 
 import argparse
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +22,8 @@ from endotsr.clips.sequences.between import flows_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.results.evaluation.baselines import flow_interpolation, neighbours, unit_image
 from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from pages.store.marks import read_json, write_marked
+from pages.store.program import RUN, Program
 
-RESULTS = Path(__file__).parents[2] / "results"
 BRIGHT = 250  # of 255: the largest channel of a highlight, in the frame or in a neighbour
 NEAR = 8  # px from an excluded pixel or from the border of the picture
 STEEP = 0.9  # quantile of the gradient over the tissue of a frame
@@ -65,10 +61,10 @@ def kinds(sequence: Sequence, index: int) -> dict[str, NDArray[np.bool_]]:
     return out
 
 
-def measured(run: Path) -> dict[str, Any]:
+def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Sums of squared errors of model and flow, by frame and by kind of pixel."""
-    finished = endotsr.open_run(run)
-    assert isinstance(finished, Run), f"{run}: trained in windows"
+    finished = endotsr.open_run(options.run)
+    assert isinstance(finished, Run), f"{options.run}: trained in windows"
     sequence = finished.sequence
     frames, total = [], {name: np.zeros(3) for name in KINDS}
     for index in (int(i) for i in sequence.test_index):
@@ -83,7 +79,7 @@ def measured(run: Path) -> dict[str, Any]:
     columns = ("pixels", "model", "flow")
     pixels = {name: dict(zip(columns, map(float, sums), strict=True)) for name, sums in total.items()}
     clip = Path(finished.record["input"]["source"]).name
-    return {"date": date.today().isoformat(), "sequence": clip, "frames": frames, "pixels": pixels}
+    return {"sequence": clip, "frames": frames, "pixels": pixels}
 
 
 def _frame(sequence: Sequence, index: int, errors: list[NDArray[np.floating]]) -> dict[str, Any]:
@@ -120,20 +116,8 @@ def tables(result: dict[str, Any]) -> str:
         "PSNR over the tissue. *Model minus flow* is the difference of the squared errors as a fraction of the whole "
         "squared error of flow. On the pixels that both can read, the squared error of the model is "
         f"{100 * abs(ratio):.1f} % {'below' if ratio < 0 else 'above'} that of flow. {result['sequence']}, "
-        f"{result['date']}."
+        f"{result['date'][:10]}."
     )
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("run", nargs="?", type=Path)
-    options = parser.parse_args(words)
-    file = RESULTS / "against_flow.json"
-    if options.run:
-        write_json(file, measured(options.run))
-    write_marked(
-        RESULTS / "README.md",
-        {"table": tables(read_json(file, "docs/pages/full_size/against_flow.py RUN"))},
-        "against_flow",
-    )
+PROGRAM = Program(__name__, "results/README.md", {"table": tables}, "against_flow.json", measured, {"run": RUN})

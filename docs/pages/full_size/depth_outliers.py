@@ -1,20 +1,14 @@
 """`sharp` on EndoNeRF cutting with the outliers of its prior depth kept and removed: a table of the rulings.
 
-    python docs/make.py full_size.depth_outliers
-
 In: docs/results/outliers_kept_seed?.json, recorded at revision 21e07a9c, whose `sharp` kept them (today
 `--sequence.depth-outliers kept`), and docs/results/cutting_sharp_seed?.json. The two frames named are the held-out
 neighbours of the training frames with outliers, 74 and 146.
 """
 
-import json
-from pathlib import Path
-
 from endotsr.results.report.tables import markdown
-from pages.store.marks import write_marked
+from pages.store.commands import loaded
+from pages.store.program import RESULTS, Program
 
-DOCS = Path(__file__).parents[2]
-RESULTS, PAGE = DOCS / "results", DOCS / "specification" / "rulings.md"
 RULES = {"kept": "outliers_kept_seed?.json", "removed": "cutting_sharp_seed?.json"}
 BESIDE = (73, 145)
 HEAD = ("outliers", "seed", "PSNR, dB", "LPIPS [0,1]", *(f"frame {frame}, dB" for frame in BESIDE))
@@ -22,7 +16,7 @@ HEAD = ("outliers", "seed", "PSNR, dB", "LPIPS [0,1]", *(f"frame {frame}, dB" fo
 
 def runs(rule: str) -> list[dict]:
     """The recorded runs, by seed."""
-    return [json.loads(file.read_text(encoding="utf-8")) for file in sorted(RESULTS.glob(RULES[rule]))]
+    return [loaded(file) for file in sorted(RESULTS.glob(RULES[rule]))]
 
 
 def frame_psnr(run: dict, frame: int) -> float:
@@ -46,11 +40,4 @@ def table() -> str:
     return markdown(HEAD, rows)
 
 
-def parts() -> dict[str, str]:
-    """The generated part of the page by name."""
-    return {"outliers": table()}
-
-
-def main(words: list[str]) -> None:
-    """The command."""
-    write_marked(PAGE, parts(), "depth")
+PROGRAM = Program(__name__, "specification/rulings.md", {"outliers": table}, room="depth")

@@ -1,7 +1,6 @@
 """Predictions without a model on both EndoNeRF clips: the plain ones, and those that obey the masks.
 
-    python docs/make.py full_size.interpolation CLIP [--lpips FILE] [--splits NAME ...]   measure, then write the table
-    python docs/make.py full_size.interpolation                                          rewrite the table
+    python docs/make.py full_size.interpolation measure CLIP [--lpips FILE] [--splits NAME ...]
 
 A measurement replaces the splits of its clip in the record and keeps the others.
 The table is in docs/results/README.md between its marks, and the headline of README.md reads the same record.
@@ -11,7 +10,6 @@ The table is in docs/results/README.md between its marks, and the headline of RE
 # pyright: reportTypedDictNotRequiredAccess=false
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,32 +19,31 @@ from endotsr.results.evaluation.baselines import RenderFrame
 from endotsr.results.evaluation.evaluate import EVERY_BASELINE, evaluate_frames
 from endotsr.results.evaluation.lpips import load_lpips_weights
 from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine, now, versions
+from pages.store.commands import loaded
 from pages.store.intervals import interval
-from pages.store.marks import read_json, write_marked
+from pages.store.program import CLIP, LPIPS, Program
+from pages.store.tables import where
 
-DOCS = Path(__file__).parents[2]
-PAGE, FILE = DOCS / "results" / "README.md", DOCS / "results" / "interpolation.json"
 SPLITS: dict[str, dict[str, Any]] = {
     "every eighth frame": {},
-    "blocks of 4 frames": {"split": "blocks", "block_length": 4},
-    "blocks of 8 frames": {"split": "blocks", "block_length": 8},
-    "blocks of 16 frames": {"split": "blocks", "block_length": 16},
+    **{f"blocks of {n} frames": {"split": "blocks", "block_length": n} for n in (4, 8, 16)},
 }
+
+
 LEFT_OUT = {"endonerf_cutting": (73, 74)}  # in these frames the masks differ from those of their neighbours
 NAMES = [name for name in EVERY_BASELINE if name != "temporal_mean"]
-KEYS = ("psnr_full", "psnr_tissue", "ssim_full", "lpips")
+COLUMNS = (("psnr_full", 2), ("psnr_tissue", 2), ("ssim_full", 4), ("lpips", 4))
+HEADS = ("PSNR full, dB", "PSNR tissue, dB", "SSIM full", "LPIPS [0,1]")
 
 
-def measured(folder: str, split: str, weights: Any) -> dict[str, Any]:
+def of_split(folder: str, split: str, weights: Any) -> dict[str, Any]:
     """Baseline -> metric -> value of every held-out frame of a split."""
     sequence = endotsr.load_sequence(folder, **SPLITS[split])
     rows = {}
     for name in NAMES:
         render: RenderFrame = EVERY_BASELINE[name][1](sequence)
         frames = evaluate_frames(sequence, sequence.test_index, render, weights)["per_frame"]
-        rows[name] = {key: [row[key] for row in frames] for key in KEYS}
+        rows[name] = {key: [row[key] for row in frames] for key, _ in COLUMNS}
     return {"frames": [int(i) for i in sequence.test_index], "baselines": rows}
 
 
@@ -65,7 +62,7 @@ def half_width(part: dict[str, Any], name: str, key: str) -> float:
 def row(part: dict[str, Any], name: str, without: tuple[int, ...]) -> list[str]:
     """Cells of a baseline: full and tissue PSNR, SSIM, LPIPS; in brackets without the frames that are left out."""
     cells = []
-    for key, digits in (("psnr_full", 2), ("psnr_tissue", 2), ("ssim_full", 4), ("lpips", 4)):
+    for key, digits in COLUMNS:
         cell = f"{mean(part, name, key):.{digits}f}"
         cell += f" ± {half_width(part, name, key):.{digits}f}" if key == "psnr_tissue" else ""
         cells.append(cell + (f" ({mean(part, name, key, without):.{digits}f})" if without else ""))
@@ -86,35 +83,24 @@ def table(result: dict[str, Any]) -> str:
             frames = f"{len(part['frames'])} frames" + (
                 f"; in brackets without {frames_text(without)}" if without else ""
             )
-            head = (
-                f"{clip}, {split} held out ({frames})",
-                "PSNR full, dB",
-                "PSNR tissue, dB",
-                "SSIM full",
-                "LPIPS [0,1]",
-            )
+            head = (f"{clip}, {split} held out ({frames})", *HEADS)
             parts.append(markdown(head, [row(part, name, without) for name in NAMES]))
-    made = f"{result['machine']['processor']}, {result['date'][:10]}."
     note = "± is a 95 % interval over the frames, as if they were independent. "
     note += "The first three rows read every pixel of the other frames, instruments included."
     lacking = [f"{clip}, {split}" for clip, found in result["clips"].items() for split in SPLITS if split not in found]
     note += f" Not measured yet: {'; '.join(lacking)}." if lacking else ""
-    return "\n\n".join([*parts, f"{made} {note}"])
+    return "\n\n".join([*parts, f"{where(result)}. {note}"])
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("clip", nargs="?")
-    parser.add_argument("--lpips", type=Path)
-    parser.add_argument("--splits", nargs="+", choices=SPLITS, default=list(SPLITS))
-    options = parser.parse_args(words)
-    if options.clip:
-        weights = load_lpips_weights(options.lpips)
-        found = read_json(FILE, "this command") if FILE.exists() else {"clips": {}}
-        of_clip = found["clips"].setdefault(Path(options.clip).name, {})
-        for split in options.splits:
-            of_clip[split] = measured(options.clip, split, weights)
-            write_json(FILE, found | {"date": now(), "machine": machine(), "versions": versions()})
-    record = read_json(FILE, "python docs/make.py full_size.interpolation")
-    write_marked(PAGE, {"table": table(record)}, "interpolation")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """The record with the splits of one clip measured."""
+    weights = load_lpips_weights(options.lpips)
+    clips = loaded(options.record)["clips"] if options.record.exists() else {}
+    made = {split: of_split(str(options.clip), split, weights) for split in options.splits}
+    return {"clips": clips | {options.clip.name: clips.get(options.clip.name, {}) | made}}
+
+
+PROGRAM = Program(
+    __name__, "results/README.md", {"table": table}, "interpolation.json", measured,
+    {"clip": CLIP, "--lpips": LPIPS, "--splits": {"nargs": "+", "choices": SPLITS, "default": list(SPLITS)}},
+)  # fmt: skip

@@ -1,40 +1,31 @@
-"""Train `sharp` with changed settings, over seeds and scenes, and write the tables.
+"""Train `sharp`, `paper`, and `sharp` with one of its changes reverted at a time, over seeds and scenes: two tables.
 
-    python docs/make.py full_size.levers changes [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
-    python docs/make.py full_size.levers weights [CLIP ...]    several weights of the similarity, for the rulings
-    python docs/make.py full_size.levers changes --table       rewrite the tables of the last result
+    python docs/make.py full_size.levers measure [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
 
-`changes` trains `sharp`, `paper`, and `sharp` with one of its changes reverted at a time.
 Two scenes are simulated, so their true motion is known. A CLIP is a sequence folder, read at half size. Its held-out
 frames are excluded, and every eighth frame of the others is held out instead: no frame on which a preset is evaluated
 is used. Every run has the length `--iterations` and the initial points of `demo`. Finished runs are kept, and a stopped
-command continues with the missing runs. The tables are written between their marks in a page.
+command continues with the missing runs.
 """
 
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
 import argparse
-from collections.abc import Callable
 from dataclasses import replace
-from datetime import date
 from functools import partial
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import DEMO
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
 from pages.store import kept
 from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.program import CLIPS, Program
+from pages.store.tables import means, noted, where
 
-DOCS = Path(__file__).parents[2]
 SIMULATED: dict[str, dict[str, Any]] = {
     "demo": {},
     "pull and breath": {
@@ -54,12 +45,6 @@ CHANGES: Rows = {
     "position rate of `paper`": {"optimiser": {"deformation_position_factor": 1.0}},
     "`ssim_weight` of `paper`": {"loss": {"ssim_weight": 0.1}},
     "width of `paper`": {"model": {"initial_width": 0.01}},
-}
-THRESHOLD = {"density": {"gradient_threshold": 4e-4}}  # of all rows: a larger weight makes more Gaussians
-FORMER = "0.2"  # the weight that the others are compared with
-WEIGHTS: Rows = {
-    **{weight: {"loss": {"ssim_weight": float(weight)}, **THRESHOLD} for weight in (FORMER, "0.5", "0.7", "0.9")},
-    "0.7, `lambda_lap` 3": {"loss": {"ssim_weight": 0.7, "lambda_lap": 3.0}, **THRESHOLD},
 }
 SHOWN = (("psnr_tissue", "held-out PSNR tissue, dB", 2), ("scene_units", "trajectory error, mm", 3))
 MOTION = (
@@ -92,13 +77,10 @@ def inner(sequence: Sequence) -> Sequence:
     )  # fmt: skip
 
 
-def measured(
-    key: str, runs: dict[str, tuple[str, str, int]], iterations: int, clips: dict[str, str], rows: Rows
-) -> dict[str, Any]:
-    """Train one run (scene, row, seed), and measure it, with trajectories if the truth is known."""
+def of_run(scene: str, label: str, seed: int, iterations: int, clips: dict[str, str], rows: Rows) -> dict[str, Any]:
+    """Train one run, and measure it, with trajectories if the truth is known."""
     import endotsr
 
-    scene, label, seed = runs[key]
     sections: dict[str, dict[str, Any]] = {
         "training": {"seed": seed},
         "initialisation": POINTS,
@@ -116,21 +98,15 @@ def measured(
     }
 
 
-def found(file: Path, rows: Rows, clips: dict[str, str], seeds: int, iterations: int, jobs: int) -> dict[str, Any]:
+def trained(options: argparse.Namespace, rows: Rows) -> dict[str, Any]:
     """Scene -> row -> numbers of the runs in the order of their seeds; finished runs are not repeated."""
-    about, scenes = {"iterations": iterations, "sources": kept.sources("")}, (*SIMULATED, *clips)
-    runs = {
-        f"{scene}, {label}, seed {seed}": (scene, label, seed)
-        for seed in range(seeds)
-        for scene in scenes
-        for label in rows
-    }
-    train = partial(measured, runs=runs, iterations=iterations, clips=clips, rows=rows)
-    answers = kept.measured(file, about, runs, train, jobs)
-    return {
-        scene: {label: [answers[f"{scene}, {label}, seed {seed}"] for seed in range(seeds)] for label in rows}
-        for scene in scenes
-    }
+    clips = {folder.name: str(folder.resolve()) for folder in options.clips}
+    scenes, seeds = (*SIMULATED, *clips), range(options.seeds)
+    runs = [(scene, label, seed) for seed in seeds for scene in scenes for label in rows]
+    about = {"iterations": options.iterations, "sources": kept.sources("")}
+    train = partial(of_run, iterations=options.iterations, clips=clips, rows=rows)
+    found = kept.nested(kept.measured(options.record, about, runs, train, options.jobs))
+    return {"seeds": options.seeds, "iterations": options.iterations, "scenes": found}
 
 
 def motion_table(result: dict[str, Any]) -> str:
@@ -139,10 +115,10 @@ def motion_table(result: dict[str, Any]) -> str:
     for scene in SIMULATED:
         for label in (PAPER, SHARP):
             runs = result["scenes"][scene][label]
-            cells = [shown([run[key] for run in runs], digits) for key, _, digits in MOTION]
+            cells = means(runs, [(key, digits) for key, _, digits in MOTION])
             rows.append([f"{scene}, {label}", f"{runs[0]['motion_scene_units']:.3f}", *cells])
     head = ["Scene and preset", "the tissue moves, mm", *(label for _, label, _ in MOTION)]
-    return markdown(head, rows) + f"\n\nMean ± 95 % interval; {_about(result)}"
+    return noted(head, rows, f"Mean ± 95 % interval; {about(result)}")
 
 
 def table(result: dict[str, Any]) -> str:
@@ -152,29 +128,13 @@ def table(result: dict[str, Any]) -> str:
         for label, runs in variants.items():
             cells = [cell(runs, variants[SHARP], key, digits) for key, _, digits in SHOWN]
             rows.append([scene, label, *cells])
-    about = f"Difference from {SHARP} on the same seed, mean ± 95 % interval; {_about(result)}"
-    return markdown(["Scene", "Settings", *(name for _, name, _ in SHOWN)], rows) + "\n\n" + about
+    note = f"Difference from {SHARP} on the same seed, mean ± 95 % interval; {about(result)}"
+    return noted(["Scene", "Settings", *(name for _, name, _ in SHOWN)], rows, note)
 
 
-def weights_table(result: dict[str, Any]) -> str:
-    """Paired differences from the former weight, with 95 % intervals: held-out PSNR and trajectory error."""
-    columns = [
-        (f"{name}, {words.rsplit(', ', 1)[1]}", scene, key, digits)
-        for name, scene in result["scenes"].items()
-        for key, words, digits in SHOWN
-        if key in scene[FORMER][0]
-    ]
-    rows = [
-        [label, *(cell(scene[label], scene[FORMER], key, digits) for _, scene, key, digits in columns)]
-        for label in WEIGHTS
-    ]
-    about = f"The first row is a level, the others are differences; {_about(result)}"
-    return markdown(["$w$", *(column[0] for column in columns)], rows) + "\n\n" + about
-
-
-def _about(result: dict[str, Any]) -> str:
-    where = f"{result['machine']['processor']}, {result['date']}"
-    return f"{result['seeds']} seeds, {result['iterations']} iterations; {where}."
+def about(result: dict[str, Any]) -> str:
+    """Length and place of the trainings."""
+    return f"{result['seeds']} seeds, {result['iterations']} iterations; {where(result)}."
 
 
 def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:
@@ -186,41 +146,8 @@ def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, 
     return shown([run[key] - other[key] for run, other in zip(runs, sharp, strict=True)], digits, "+")
 
 
-class Study(NamedTuple):
-    """Compared rows, and the locations of their tables."""
-
-    rows: Rows
-    file: Path  # of the result
-    page: Path
-    room: str  # of its marks
-    tables: dict[str, Callable[[dict[str, Any]], str]]  # by mark
-
-
-RULINGS, RESULTS = DOCS / "specification" / "rulings.md", DOCS / "results"
-STUDIES = {
-    "changes": Study(
-        CHANGES, RESULTS / "levers.json", RESULTS / "README.md", "levers", {"table": table, "motion": motion_table}
-    ),
-    "weights": Study(WEIGHTS, RESULTS / "similarity.json", RULINGS, "similarity", {"table": weights_table}),
-}
-
-
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("study", choices=STUDIES)
-    parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--iterations", type=int, default=1500)
-    parser.add_argument("--jobs", type=int, default=2, help="runs at a time; the numbers do not depend on it")
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    study = STUDIES[options.study]
-    if not options.table:
-        clips = {folder.name: str(folder.resolve()) for folder in options.clips}
-        scenes = found(study.file, study.rows, clips, options.seeds, options.iterations, options.jobs)
-        about = {"seeds": options.seeds, "iterations": options.iterations, "date": date.today().isoformat()}
-        write_json(study.file, about | {"machine": machine(), "scenes": scenes})
-        kept.finished(study.file)
-    result = read_json(study.file, f"docs/pages/full_size/levers.py {options.study}")
-    write_marked(study.page, {name: made(result) for name, made in study.tables.items()}, study.room)
+OPTIONS = {"clips": CLIPS, "--seeds": 3, "--iterations": 1500, "--jobs": 2}
+PROGRAM = Program(
+    __name__, "results/README.md", {"table": table, "motion": motion_table}, "levers.json",
+    partial(trained, rows=CHANGES), OPTIONS,
+)  # fmt: skip

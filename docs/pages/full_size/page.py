@@ -3,7 +3,6 @@
     endotsr simulate pulling --out CLIP
     endotsr train CLIP --preset PRESET --out RUN [--sequence.split blocks --sequence.block-length 8]
     python docs/make.py full_size measure RUN ...    finished runs of the clip, to docs/results/full_size
-    python docs/make.py full_size                    rewrite the page docs/full_size.md from the stored files
 
 A run is stored under its preset and its held-out frames, and replaces the previous one. The folder contains numbers and
 small pictures, no model. Only runs of a simulated clip are accepted: pictures of patients are not stored.
@@ -12,8 +11,7 @@ small pictures, no model. Only runs of a simulated clip are accepted: pictures o
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
-import sys
-from datetime import date
+import argparse
 from pathlib import Path
 from typing import Any
 
@@ -27,23 +25,21 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 from endotsr.results.evaluation.baselines import BASELINES, RenderFrame, neighbours, unit_image
 from endotsr.results.report.style import save
-from endotsr.training.runs.files import write_json
+from endotsr.training.runs.machine import now
 from endotsr.untrusted.writing import replace_file
 from pages.full_size import text as full_size_text
 from pages.full_size.against_flow import KINDS, kinds
 from pages.full_size.pictures import curves_figure, maps_picture, sample_picture
 from pages.full_size.text import PREDICTIONS
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import loaded
+from pages.store.program import RESULTS, RUNS, Program
 
-DOCS = Path(__file__).parents[2]
-PAGE, FOLDER = DOCS / "full_size.md", DOCS / "results" / "full_size"
-FILE = FOLDER / "runs.json"
-COMMAND = "docs/pages/full_size/page.py measure RUN ..."
+FOLDER = RESULTS / "full_size"
 MODEL = "model"
 SHOWN = ("worst", "median", "best")
 
 
-def measured(folder: Path) -> tuple[str, dict[str, Any], dict[str, NDArray[np.uint8]]]:
+def of_run(folder: Path) -> tuple[str, dict[str, Any], dict[str, NDArray[np.uint8]]]:
     """Name, numbers and pictures {file stem: picture} of one finished run."""
     run = endotsr.open_run(folder)
     if not isinstance(run, endotsr.Run):
@@ -88,7 +84,7 @@ def about_run(run: endotsr.Run) -> dict[str, Any]:
     sequence = run.sequence
     kept = {key: run.record[key] for key in ("iterations_done", "seed", "threads", "machine")}
     size = {"width": sequence.width, "height": sequence.height, "frame_count": sequence.count}
-    return kept | size | {"gaussians": run.log[-1]["gaussians"], "date": date.today().isoformat()}
+    return kept | size | {"gaussians": run.log[-1]["gaussians"], "date": now()[:10]}
 
 
 def noise_of(clip: Path, scale: float) -> float:
@@ -124,32 +120,19 @@ def chosen(frames: list[dict[str, Any]]) -> dict[str, int]:
     return dict(zip(SHOWN, (order[0], order[len(order) // 2], order[-1]), strict=True))
 
 
-def store(folders: list[Path]) -> None:
-    """Measure runs, and add their numbers and pictures to the stored ones."""
-    stored = read_json(FILE, COMMAND) if FILE.exists() else {}
-    for folder in folders:
-        name, numbers, pictures = measured(folder)
-        stored[name] = numbers
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """The numbers of all runs by name, those of the given runs new; their pictures are written beside the record."""
+    stored = loaded(options.record) if options.record.exists() else {}
+    for folder in options.runs:
+        name, stored[name], pictures = of_run(folder)
         for stem, picture in pictures.items():
             content = full_size_text.encoded(picture)
-            replace_file(FOLDER / f"{stem}.webp", lambda path, content=content: path.write_bytes(content))
-    write_json(FILE, dict(sorted(stored.items())))
+            file = options.record.parent / f"{stem}.webp"
+            replace_file(file, lambda path, content=content: path.write_bytes(content))
+    return dict(sorted(stored.items()))
 
 
-def write_page() -> None:
-    """The curves, and the generated parts of the page."""
-    runs = read_json(FILE, COMMAND)
-    save(curves_figure(runs), FOLDER / "curves.svg")
-    write_marked(PAGE, full_size_text.fragments(runs), "full_size")
-
-
-def main(words: list[str]) -> None:
-    """The command."""
-    try:
-        if words[:1] == ["measure"] and len(words) > 1:
-            store([Path(word) for word in words[1:]])
-        elif words:
-            sys.exit(__doc__)
-        write_page()
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(
+    __name__, "full_size.md", full_size_text.fragments, "full_size/runs.json", measured, {"runs": RUNS},
+    lambda runs: save(curves_figure(runs), FOLDER / "curves.svg"), stamped=False,
+)  # fmt: skip

@@ -1,16 +1,14 @@
 """Record a run: docs/results/NAME.json from RUN/metrics.json, and the tables made from all recorded runs.
 
-    python docs/make.py full_size.record RUN NAME COMMIT   add or replace one record, then rewrite the tables
-    python docs/make.py full_size.record                   rewrite the tables only
+    python docs/make.py full_size.record measure RUN NAME COMMIT   add or replace one record, then rewrite the tables
 
 COMMIT is the revision of this repository that made the run. The first part of NAME is `pulling` or `cutting`.
 
-The tables stand in docs/results/README.md, between the `results:start` and `results:end` marks. README.md has
-the one of every eighth frame of pulling. The tables of cutting give in brackets the means without frames 73 and 74.
+The tables stand in docs/results/README.md; README.md has the one of every eighth frame of pulling. The tables of
+cutting give in brackets the means without frames 73 and 74.
 """
 
-import json
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +16,11 @@ import numpy as np
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
 from pages.full_size.interpolation import LEFT_OUT, frames_text
+from pages.store.commands import loaded
 from pages.store.intervals import interval
+from pages.store.program import RESULTS, RUN, Program
 from pages.store.published import PUBLISHED
 
-FOLDER = Path(__file__).parents[2] / "results"
-START, END = "<!-- results:start (made by docs/pages/full_size/record.py) -->", "<!-- results:end -->"
 EVERY_EIGHTH = "every eighth frame"
 CLIPS = ("pulling", "cutting")
 PLANNED = {"pulling": {"paper": 3, "sharp": 3}, "cutting": {"paper": 5, "quick": 3, "sharp": 3}}  # seeds of a preset
@@ -36,14 +34,14 @@ COLUMNS = (
 )
 
 
-def record(run: Path, name: str, commit: str) -> None:
+def record(options: argparse.Namespace) -> None:
     """Copy the metrics of a run; paths of the machine are reduced to the name of the folder."""
-    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    metrics = loaded(options.run / "metrics.json")
     source = metrics["run"]["input"]
     source["source"] = Path(source["source"]).name
-    metrics["run"]["commit"] = commit
+    metrics["run"]["commit"] = options.commit
     metrics["published"] = [row for clip, row in PUBLISHED.items() if clip in source["source"]]
-    write_json(FOLDER / f"{name}.json", metrics)
+    write_json(RESULTS / f"{options.name}.json", metrics)
 
 
 def split_of(metrics: dict) -> str:
@@ -152,29 +150,26 @@ def about(name: str, metrics: dict) -> str:
     )
 
 
-def replace_marked(path: Path, text: str) -> None:
-    """Put `text` between the marks of a file."""
-    old = path.read_text(encoding="utf-8")
-    head, _, rest = old.partition("<!-- results:start")
-    tail = rest.partition(END)[2]
-    path.write_text(f"{head}{START}\n{text}\n{END}{tail}", encoding="utf-8")
-
-
-def main(words: list[str]) -> None:
-    """The command."""
-    if len(words) == 3:
-        record(Path(words[0]), words[1], words[2])
-    elif words:
-        sys.exit(__doc__)
-    clips = {clip: stored(clip) for clip in CLIPS}
-    found = {clip: records for clip, records in clips.items() if records}
-    made = [part for clip, records in found.items() for part in (table(records), missing(clip, records))]
-    runs = "\n".join(about(name, metrics) for records in found.values() for name, metrics in records.items())
-    replace_marked(FOLDER / "README.md", "\n\n".join([*filter(None, made), runs]))
-    short = {name: metrics for name, metrics in clips["pulling"].items() if split_of(metrics) == EVERY_EIGHTH}
-    replace_marked(FOLDER.parents[1] / "README.md", f"{table(short)}\n\n{MORE}")
-
-
 def stored(clip: str) -> dict[str, dict]:
     """The recorded runs on a clip by name."""
-    return {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(FOLDER.glob(f"{clip}_*.json"))}
+    return {file.stem: loaded(file) for file in sorted(RESULTS.glob(f"{clip}_*.json"))}
+
+
+def every_clip() -> str:
+    """The tables of all clips, and a line for each run."""
+    found = {clip: records for clip in CLIPS if (records := stored(clip))}
+    made = [part for clip, records in found.items() for part in (table(records), missing(clip, records))]
+    runs = "\n".join(about(name, metrics) for records in found.values() for name, metrics in records.items())
+    return "\n\n".join([*filter(None, made), runs])
+
+
+def of_pulling() -> str:
+    """The table of every eighth frame of pulling."""
+    short = {name: metrics for name, metrics in stored("pulling").items() if split_of(metrics) == EVERY_EIGHTH}
+    return f"{table(short)}\n\n{MORE}"
+
+
+PROGRAM = Program(
+    __name__, ("results/README.md", "../README.md"), {"runs": every_clip, "pulling": of_pulling}, "", record,
+    {"run": RUN, "name": {}, "commit": {}},
+)  # fmt: skip

@@ -2,14 +2,12 @@
 
     ln -s /path/to/endonerf_pulling docs/results/sweeps/               and the other clip, where a file names it
     endotsr sweep docs/results/sweeps/NAME.toml --out DIR
-    python docs/make.py full_size.sweeps NAME DIR/results.json         store the finished runs, then write the tables
-    python docs/make.py full_size.sweeps                               rewrite the tables
+    python docs/make.py full_size.sweeps measure NAME DIR/results.json store the finished runs, then write the tables
 
 The first lines of a file are its question. The tables are in docs/results/README.md. Differences are paired by clip,
 split and seed, and are taken to the first configuration, or to the first one that continues a shared checkpoint.
 """
 
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -21,10 +19,13 @@ from endotsr.studies.sweeps.spec import Spec, spec_of
 from endotsr.training.runs.files import write_json
 from endotsr.untrusted.toml import read_toml
 from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.marks import read_json
+from pages.store.program import RESULTS, Program
+from pages.store.tables import means
 
-DOCS = Path(__file__).parents[2]
-PAGE, FOLDER = DOCS / "results" / "README.md", DOCS / "results" / "sweeps"
+FOLDER = RESULTS / "sweeps"
+
+
 PLACE = "simulated"  # stands for the clips, which need not be at hand to read a file
 KEPT = ("sequence", "split", "configuration", "seed", "iterations", "gaussians", "seconds", "measures",
         "arrays_sha256", "machine", "versions", "psnr_full", "psnr_tissue", "ssim_full", "lpips")  # fmt: skip
@@ -102,19 +103,19 @@ def table(file: Path) -> str:
 def _line(rows: list[Row], name: str, to: str) -> list[str]:
     of = [row for row in rows if row["configuration"] == name]
     if name == to:
-        cells = [shown([row[key] for row in of if row[key] is not None], digits) for key, _, digits in COLUMNS]
+        cells = means(of, [(key, digits) for key, _, digits in COLUMNS])
     else:
         cells = [shown(differences(rows, name, to, key), digits, "+") for key, _, digits in COLUMNS]
     return [name if name == to else f"{name}, difference to {to}", str(len(of)), *cells]
 
 
-def fragments() -> dict[str, str]:
+def tables() -> str:
     """The list of the sweeps, and the tables of those that are measured."""
     lines = [
         [f"`{file.stem}`", question(file), str(planned(file)), str(len(rows_of(file)))] for file in files()
     ]  # fmt: skip
     listed = markdown(["Sweep", "Question", "runs", "of them measured"], lines)
-    return {"table": "\n\n".join([listed, *filter(None, map(table, files()))])}
+    return "\n\n".join([listed, *filter(None, map(table, files()))])
 
 
 def store(name: str, results: Path) -> None:
@@ -123,8 +124,8 @@ def store(name: str, results: Path) -> None:
     if file not in files():
         raise InputError(f"{name}: not a sweep of {FOLDER}; use one of: {', '.join(f.stem for f in files())}")
     found = read_json(results, "endotsr sweep")["rows"]
-    merged = {_run(row): row for row in [*rows_of(file), *_finished(found)]}
-    write_json(file.with_suffix(".json"), {"rows": [merged[run] for run in sorted(merged)]})
+    by_run = {_run(row): row for row in [*rows_of(file), *_finished(found)]}
+    write_json(file.with_suffix(".json"), {"rows": [by_run[run] for run in sorted(by_run)]})
 
 
 def _run(row: Row) -> tuple[str, ...]:
@@ -135,13 +136,7 @@ def _finished(rows: Iterable[Row]) -> list[Row]:
     return [{key: row.get(key) for key in KEPT} for row in rows if row["status"] == FINISHED]
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    try:
-        if len(words) == 2:
-            store(words[0], Path(words[1]))
-        elif words:
-            sys.exit(__doc__)
-        write_marked(PAGE, fragments(), "sweeps")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(
+    __name__, "results/README.md", {"table": tables}, "", lambda options: store(options.name, options.results),
+    {"name": {}, "results": {"type": Path}},
+)  # fmt: skip

@@ -1,14 +1,11 @@
 """PSNR of the targets between the frames (B14) against held-out frames, which they do not read.
 
-    python docs/make.py full_size.targets SEQUENCE [--scale S]   write docs/results/targets.json, then the table
-    python docs/make.py full_size.targets                        rewrite the table of the last result
+    python docs/make.py full_size.targets measure SEQUENCE [--scale S]
 
 The table is in docs/specification/b14_between.md between its marks.
 """
 
 import argparse
-from datetime import date
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,22 +15,14 @@ from endotsr.clips.opencv import warp_cubic
 from endotsr.clips.sequences.between import Flows, flows_between, frame_between, motion_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.results.evaluation.baselines import neighbours, two_neighbours, unit_image
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from pages.store.marks import read_json, write_marked
+from pages.full_size.interpolation import SPLITS
+from pages.store.program import CLIP, Program
+from pages.store.tables import noted
 
-DOCS = Path(__file__).parents[2]
-PAGE, FILE = DOCS / "specification/b14_between.md", DOCS / "results/targets.json"
-SPLITS: dict[str, dict[str, Any]] = {
-    "every eighth frame": {},
-    "blocks of 4 frames": {"split": "blocks", "block_length": 4},
-    "blocks of 8 frames": {"split": "blocks", "block_length": 8},
-    "blocks of 16 frames": {"split": "blocks", "block_length": 16},
-}
 KINDS = {"still": "both frames as they are", "moved": "both frames moved", "target": "the target"}
 
 
-def measured(sequence: Sequence) -> dict[str, float]:
+def of_sequence(sequence: Sequence) -> dict[str, float]:
     """PSNR in dB over the tissue with a target, for every kind; `covered` is the fraction of such tissue."""
     flows: dict[tuple[int, int], Flows] = {}
     error, covered, tissue = dict.fromkeys(KINDS, 0.0), 0, 0
@@ -69,21 +58,20 @@ def table(result: dict[str, Any]) -> str:
         for split, row in result["splits"].items()
     ]
     head = ["Held out", *(f"{label}, dB" for label in KINDS.values()), "tissue with a target"]
-    about = f"PSNR over the tissue with a target; {result['sequence']}, scale {result['scale']:g}, {result['date']}."
-    return markdown(head, rows) + "\n\n" + about
+    about = (
+        f"PSNR over the tissue with a target; {result['sequence']}, scale {result['scale']:g}, {result['date'][:10]}."
+    )
+    return noted(head, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("sequence", nargs="?")
-    parser.add_argument("--scale", type=float, default=1.0)
-    options = parser.parse_args(words)
-    if options.sequence:
-        splits = {
-            name: measured(endotsr.load_sequence(options.sequence, scale=options.scale, **settings))
-            for name, settings in SPLITS.items()
-        }
-        about = {"date": date.today().isoformat(), "sequence": Path(options.sequence).name, "scale": options.scale}
-        write_json(FILE, about | {"splits": splits})
-    write_marked(PAGE, {"table": table(read_json(FILE, "python docs/make.py full_size.targets SEQUENCE"))}, "targets")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Every split."""
+    load = lambda of: endotsr.load_sequence(options.clip, scale=options.scale, **of)
+    splits = {name: of_sequence(load(of)) for name, of in SPLITS.items()}
+    return {"sequence": options.clip.name, "scale": options.scale, "splits": splits}
+
+
+PROGRAM = Program(
+    __name__, "specification/b14_between.md", {"table": table}, "targets.json", measured,
+    {"clip": CLIP, "--scale": 1.0},
+)  # fmt: skip

@@ -1,8 +1,6 @@
 """Generated parts of docs/full_size.md as Markdown, from the numbers of docs/results/full_size and of recorded runs."""
 
 import io
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,15 +8,16 @@ from numpy.typing import NDArray
 
 from endotsr.results.report.tables import markdown
 from pages.full_size.against_flow import KINDS
+from pages.store.commands import loaded
+from pages.store.program import RESULTS
+from pages.store.tables import where_with_cores
 
-RESULTS = Path(__file__).parents[2] / "results"
 PREDICTIONS = ("model", "nearest_frame", "two_neighbours", "flow_interpolation")
 LABELS = {"model": "model", "nearest_frame": "copy", "two_neighbours": "blend", "flow_interpolation": "flow"}
 SPLITS = {"eighth": "every eighth frame held out", "blocks8": "blocks of 8 frames held out"}
 RECORDED = {"every_eighth": "every eighth frame", "blocks 4": "blocks of 4", "blocks 8": "blocks of 8",
             "blocks 16": "blocks of 16"}  # fmt: skip
 PRESETS = ("paper", "quick", "sharp")
-NOT_YET = "Not measured yet: `python docs/make.py full_size measure RUN ...`."
 
 
 def split_name(sequence: dict[str, Any]) -> str:
@@ -88,7 +87,7 @@ def recorded() -> dict[tuple[str, str], list[dict[str, Any]]]:
     """The recorded runs on endonerf_pulling (docs/pages/full_size/record.py) by held-out frames and preset."""
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for file in sorted(RESULTS.glob("pulling_*.json")):
-        record = json.loads(file.read_text(encoding="utf-8"))
+        record = loaded(file)
         settings = record["run"]["settings"]
         sequence = settings["sequence"]
         split = sequence["split"] + (f" {sequence['block_length']}" if sequence["split"] == "blocks" else "")
@@ -195,7 +194,6 @@ def made(runs: dict[str, Any]) -> str:
         "Simulated clip: `endotsr simulate pulling`, "
         f"{first['frame_count']} frames of {first['width']}x{first['height']}, "
         f"noise and rounding of {255 * first['noise']:.2f} grey levels. One seed each, "
-        f"{first['machine']['processor']} ({first['machine']['cores']} cores), "
-        f"{first['date']}. {'; '.join(each)}. Recorded clip: `endonerf_pulling`, 63 frames of 640x512, the runs of "
-        "{doc}`results/README`; its pictures are not published."
+        f"{where_with_cores(first)}. {'; '.join(each)}. Recorded clip: `endonerf_pulling`, 63 frames of "
+        "640x512, the runs of {doc}`results/README`; its pictures are not published."
     )

@@ -1,37 +1,28 @@
 """One simulated scene through two layouts, one command per step, and the table of the cost of each input route.
 
-    python docs/make.py recordings.any_clip                measure, a few minutes on two cores
-    python docs/make.py recordings.any_clip --ways stereo  repeat the measurement of one route
-    python docs/make.py recordings.any_clip --table        rewrite the table of the last result
+    python docs/make.py recordings.any_clip measure [--ways stereo ...]      a few minutes on two cores
 
 A scene with a moving camera and an instrument is written as a lossless EndoNeRF folder, and as raw recordings in the
 layout of StereoMIS. A recording is processed by prepare, depth, check, train and render. Two intermediate routes, the
 EndoNeRF folder with depth from its stereo pairs and a recording with lossless video, separate the cost of the depth, of
 the layout and of the compression.
-The result is docs/results/any_clip.json; the table is in docs/guides/prepare.md.
 """
 
 import argparse
-import json
 import tempfile
 from collections.abc import Callable, Iterator
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from endotsr.cli.main import main as endotsr
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.simulator.truth import read_truth
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import held_out, loaded, said
+from pages.store.program import Program
+from pages.store.tables import noted
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "any_clip.json", DOCS / "guides" / "prepare.md"
 SCENE = ["moving-camera", "--instrument.on", "--width", "240", "--height", "192", "--frames", "25"]
 TRAINING = ["--preset", "demo", "--iterations", "600"]
 DEPTH = ["--nearest", "25", "--farthest", "120"]
@@ -41,14 +32,6 @@ WAYS = {
     "lossless": "StereoMIS layout, video without loss, `prepare`, `depth`",
     "stereomis": "StereoMIS layout, compressed video, `prepare`, `depth`",
 }
-
-
-def said(*words: object) -> None:
-    """Run a command. Raises SystemExit if it fails."""
-    command = [str(word) for word in words]
-    print("endotsr", *command, flush=True)
-    if endotsr(command) != 0:
-        raise SystemExit(f"failed: endotsr {' '.join(command)}")
 
 
 def made(root: Path, way: str) -> list[object]:
@@ -68,7 +51,7 @@ def made(root: Path, way: str) -> list[object]:
     return [clip]
 
 
-def measured(root: Path, way: str) -> dict[str, float]:
+def of_way(root: Path, way: str) -> dict[str, float]:
     """Held-out metrics of a route, metrics of its renders against the lossless pictures, and its input."""
     clean, run, report = root / "clean", root / f"run-{way}", root / f"{way}.json"
     said("train", *made(root, way), "--out", run, *TRAINING)
@@ -78,12 +61,11 @@ def measured(root: Path, way: str) -> dict[str, float]:
         "evaluate", "--pictures", root / f"renders-{way}" / "colour", "--sequence", clean,
         "--sequence.masks", "gt_masks", "--json", report,
     )  # fmt: skip
-    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
     found = {
-        "own": metrics["held_out"]["mean"]["psnr_tissue"],
-        "lossless": json.loads(report.read_text(encoding="utf-8"))["held_out"]["mean"]["psnr_tissue"],
-        "ssim": metrics["held_out"]["mean"]["ssim_full"],
-        "flow": metrics["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
+        "own": held_out(run)["psnr_tissue"],
+        "lossless": held_out(report)["psnr_tissue"],
+        "ssim": held_out(run)["ssim_full"],
+        "flow": loaded(run / "metrics.json")["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
     }
     if way == "endonerf":
         return found
@@ -141,30 +123,31 @@ def table(result: dict[str, Any]) -> str:
         "the raw layout": ("lossless", "stereo"),
         "the compression of the video": ("stereomis", "lossless"),
     }
-    if "lossless" not in ways:
-        steps = {"the depth from stereo": ("stereo", "endonerf"), "layout and video": ("stereomis", "stereo")}
-    changes = [f"{what} {ways[a]['lossless'] - ways[b]['lossless']:+.2f} dB" for what, (a, b) in steps.items()]
+    changes = [
+        f"{what} {ways[a]['lossless'] - ways[b]['lossless']:+.2f} dB" for what, (a, b) in steps.items()
+        if a in ways and b in ways
+    ]  # fmt: skip
     about = (
         f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR"
         f" against the lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A"
         " compressed video loses sensor noise, which makes its own held-out frames easier to predict."
-        f" {result['date']}."
+        f" {result['date'][:10]}."
     )
-    return markdown(headings, rows) + "\n\n" + about
+    return noted(headings, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--table", action="store_true")
-    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
-    options = parser.parse_args(words)
-    if not options.table:
-        about = {"scene": " ".join(SCENE), "training": " ".join(TRAINING)}
-        known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-        ways = known["ways"] if {key: known.get(key) for key in about} == about else {}
-        with tempfile.TemporaryDirectory() as root:
-            said("simulate", *SCENE, "--out", Path(root) / "clean")
-            ways |= {way: measured(Path(root), way) for way in options.ways}
-        write_json(FILE, about | {"date": date.today().isoformat(), "machine": machine(), "ways": ways})
-    write_marked(PAGE, {"ways": table(read_json(FILE, "python docs/make.py recordings.any_clip"))}, "any_clip")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """The chosen routes; stored results of the other routes of the same scene and training are kept."""
+    about = {"scene": " ".join(SCENE), "training": " ".join(TRAINING)}
+    known = loaded(options.record) if options.record.exists() else {}
+    ways = known["ways"] if {key: known.get(key) for key in about} == about else {}
+    with tempfile.TemporaryDirectory() as root:
+        said("simulate", *SCENE, "--out", Path(root) / "clean")
+        ways |= {way: of_way(Path(root), way) for way in options.ways}
+    return about | {"ways": ways}
+
+
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"ways": table}, "any_clip.json", measured,
+    {"--ways": {"nargs": "+", "choices": list(WAYS), "default": list(WAYS)}},
+)  # fmt: skip

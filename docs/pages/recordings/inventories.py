@@ -6,7 +6,6 @@ The tables are the inventories beside the readers and the relations of the comma
 """
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from endotsr.cli.parts.related_options import RELATIONS
 from endotsr.cli.parts.relations import Needs, shown
@@ -27,9 +26,8 @@ from endotsr.clips.sequences.trajectory_lines import FIELDS as TRAJECTORY
 from endotsr.clips.sequences.video_marks import MATROSKA, MP4
 from endotsr.results.export.ply import GAUSSIAN
 from endotsr.results.report.tables import markdown
-from pages.store.marks import write_marked
+from pages.store.program import Program
 
-PAGE = Path(__file__).parents[2] / "guides" / "prepare.md"
 INVENTORIES = (
     FIELDS, FRAME_FIELDS, COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF, TRAJECTORY, KALIBR, ROS, OPENCV, INI, ORB,
     EUROC, MATLAB, MATLAB_PAIR, BOUGUET, servct.FILES, servct.CAMERA, hamlyn.FILES, c3vd.FILES,
@@ -67,7 +65,4 @@ def _code(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def main(words: list[str]) -> int:
-    """Rewrite both tables."""
-    write_marked(PAGE, {"fields": fields(), "options": options()}, "inventories")
-    return 0
+PROGRAM = Program(__name__, "guides/prepare.md", {"fields": fields, "options": options})

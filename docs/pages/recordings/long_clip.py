@@ -1,23 +1,20 @@
 """Measure the memory of a training on a long clip that repeats the frames of a short one.
 
-    python docs/make.py recordings.long_clip --frames 2000 --memory 4     half the memory of an 8 GB machine
-    python docs/make.py recordings.long_clip --frames 300 --memory 0.6    the same proportions, in a few minutes
-    python docs/make.py recordings.long_clip --table                      rewrite the table of the measured clips
+    python docs/make.py recordings.long_clip measure --frames 2000 --memory 4     half the memory of an 8 GB machine
+    python docs/make.py recordings.long_clip measure --frames 300 --memory 0.6    the same proportions, some minutes
 
 The frames of the source (--source, by default ../shared/data/endonerf_pulling) are linked repeatedly into a temporary
 folder. The training has as many iterations as training frames, so every frame is used about once, and ends with the
 whole evaluation. Meanwhile /proc reports its own memory (RssAnon) and pages of files that the system can drop at any
-time (RssFile). Results are added to docs/results/long_clip.json; the table is in docs/guides/prepare.md.
+time (RssFile). A result replaces that of the same frames, memory and preset.
 """
 
 import argparse
-import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +25,13 @@ from endotsr.clips.sequences.checks.cost import estimated_cost
 from endotsr.clips.sequences.checks.duration import expected_frames
 from endotsr.config import config_from_dict, with_iterations
 from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.store.marks import write_marked
+from endotsr.training.runs.machine import dated
+from pages.store.commands import loaded
+from pages.store.kept import with_row
+from pages.store.program import DATA, Program
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "long_clip.json", DOCS / "guides" / "prepare.md"
 NAMES = ("images", "masks", "depth")
+KEY = ("frames", "memory", "preset")
 
 
 def repeated(source: Path, clip: Path, frames: int) -> tuple[int, int]:
@@ -69,7 +66,7 @@ def peaks(command: list[str]) -> dict[str, float]:
     return found
 
 
-def measured(options: argparse.Namespace) -> dict[str, Any]:
+def trained(options: argparse.Namespace) -> dict[str, Any]:
     """One training."""
     with tempfile.TemporaryDirectory() as root:
         clip, run = Path(root) / "clip", Path(root) / "run"
@@ -79,12 +76,12 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
         limit = ["--sequence.memory", f"{options.memory:g}"]
         begun = time.monotonic()
         found = peaks([sys.executable, "-m", "endotsr", *words, *limit])
-        metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+        metrics = loaded(run / "metrics.json")
     config = config_from_dict({"preset": options.preset, "sequence": {"memory": options.memory}})
     frames = expected_frames(options.frames, config)
     cost = estimated_cost(frames, width, height, with_iterations(config, iterations))
     about = {"frames": options.frames, "width": width, "height": height, "preset": options.preset}
-    return about | {
+    return dated(about) | {
         "memory": options.memory,
         "iterations": iterations,
         "gaussians": metrics["run"]["gaussians"],
@@ -94,12 +91,10 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
         "both_bytes": found["both"],
         "estimated_bytes": cost.total_bytes,
         "estimated_file_bytes": cost.file_bytes,
-        "date": date.today().isoformat(),
-        "machine": machine(),
     }
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def table(result: dict[str, Any]) -> str:
     """One row per measured training."""
     headings = ["Frames", "Size", "Preset", "`sequence.memory`, GB", "estimated, GB", "own memory, GB",
                 "file of the frames, GB"]  # fmt: skip
@@ -107,23 +102,17 @@ def table(rows: list[dict[str, Any]]) -> str:
         [f"{row['frames']}", f"{row['width']}x{row['height']}", f"`{row['preset']}`", f"{row['memory']:g}",
          f"{row['estimated_bytes'] / 1e9:.2f}", f"{row['own_bytes'] / 1e9:.2f}",
          f"{row['estimated_file_bytes'] / 1e9:.2f}"]
-        for row in rows
+        for row in result["rows"]
     ]  # fmt: skip
     return markdown(headings, cells)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--source", type=Path, default=DOCS.parents[1] / "shared" / "data" / "endonerf_pulling")
-    parser.add_argument("--frames", type=int, default=300)
-    parser.add_argument("--memory", type=float, default=0.6)
-    parser.add_argument("--preset", default="paper")
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    rows = json.loads(FILE.read_text(encoding="utf-8"))["rows"] if FILE.exists() else []
-    if not options.table:
-        key = (options.frames, options.memory, options.preset)
-        rows = [row for row in rows if (row["frames"], row["memory"], row["preset"]) != key] + [measured(options)]
-        write_json(FILE, {"rows": sorted(rows, key=lambda row: row["frames"])})
-    write_marked(PAGE, {"memory": table(rows)}, "long_clip")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """One more training beside the stored ones."""
+    return with_row(options.record, trained(options), KEY)
+
+
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"memory": table}, "long_clip.json", measured,
+    {"--source": DATA / "endonerf_pulling", "--frames": 300, "--memory": 0.6, "--preset": "paper"}, stamped=False,
+)  # fmt: skip

@@ -14,13 +14,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from endotsr.cli.main import main as endotsr
 from endotsr.clips.opencv import area_resize, read_png
 from endotsr.clips.sequences.mask_shapes import shapes_of
 from endotsr.results.report.figures import encode
+from pages.store.commands import said
+from pages.store.program import DOCS, RESULTS
 
-DOCS = Path(__file__).parents[2]
-RESULTS = DOCS / "results"
 SCENE = ("pulling", "--frames", "24")
 KEY_FRAMES, DRAWN = 4, 2  # frames of the page, and those that are drawn in the browser
 CARRIED_WIDTH = 1280
@@ -72,19 +71,14 @@ def main(words: list[str]) -> None:
     with tempfile.TemporaryDirectory() as temporary, contextlib.chdir(temporary):
         root = Path(temporary)
         scene, clip, page = Path("scene"), Path("clip"), Path("draw.html")  # the page shows these names
-        for line in (
-            ("simulate", *SCENE, "--out", scene),
-            ("prepare", scene, "--out", clip),
-            ("masks", clip, "--draw", page, "--key-frames", KEY_FRAMES),
-        ):
-            if endotsr([str(word) for word in line]):
-                raise SystemExit(f"endotsr {line[0]} failed")
+        said("simulate", *SCENE, "--out", scene)
+        said("prepare", scene, "--out", clip)
+        said("masks", clip, "--draw", page, "--key-frames", KEY_FRAMES)
         with Remote(root / "profile") as remote:
             draw(remote.open(root / page, root), scene, root)
         for name in ("page", "page_800"):
             (RESULTS / f"masks_{name}.webp").write_bytes(encode(read_png(root / f"{name}.png"), "webp"))
-        if endotsr(["masks", str(clip), "--keys", str(root / "keys.json"), "--replace"]):
-            raise SystemExit("endotsr masks failed")
+        said("masks", clip, "--keys", root / "keys.json", "--replace")
         shown = read_png(clip / "proposed_masks.png")
         size = (CARRIED_WIDTH, round(shown.shape[0] * CARRIED_WIDTH / shown.shape[1]))
         (RESULTS / "masks_carried.webp").write_bytes(encode(area_resize(shown, *size), "webp"))

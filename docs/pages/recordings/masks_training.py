@@ -1,19 +1,15 @@
 """Train with carried masks and with the given ones, over seeds, and write the table of docs/guides/masks.md.
 
-    python docs/make.py recordings.masks_training CLIP ...   train, some minutes a run
-    python docs/make.py recordings.masks_training            rewrite the table of the last result
+    python docs/make.py recordings.masks_training measure CLIP ... [--seeds 3]   some minutes a run
 
 A CLIP is a folder in the layout of EndoNeRF. The key frames are evenly spaced, and their masks are those of `gt_masks`.
 All runs of a clip are measured on the same pixels of the held-out frames: tissue in the given masks and in the carried
-masks of every row. Finished runs are kept, and a stopped command continues. The result is
-docs/results/masks_training.json.
+masks of every row. Finished runs are kept, and a stopped command continues.
 """
 
 import argparse
 from dataclasses import replace
-from datetime import date
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,25 +18,17 @@ import endotsr
 from endotsr.clips.sequences.carry_masks import carry_masks
 from endotsr.clips.sequences.clip_flows import motion_of
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.results.evaluation.metrics import psnr_tissue
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
 from pages.store import kept
 from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.program import CLIPS, Program
+from pages.store.tables import noted, where
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "masks_training.json", DOCS / "guides" / "masks.md"
 GIVEN, PRESET = "given", "quick"
 ROWS = {GIVEN: (0, 0), "8 keys, margin 2": (8, 2), "4 keys, margin 2": (4, 2), "8 keys, margin 0": (8, 0)}
 SEEDS = {GIVEN: 3, "8 keys, margin 2": 3, "4 keys, margin 2": 1, "8 keys, margin 0": 1}
-
-
-def even_keys(frames: int, count: int) -> list[int]:
-    """`count` evenly spaced frames with the first and the last one; one key is the middle frame."""
-    return [frames // 2] if count == 1 else np.unique(np.linspace(0, frames - 1, count).round().astype(int)).tolist()
 
 
 @cache
@@ -51,7 +39,7 @@ def sequences(folder: str) -> dict[str, Sequence]:
     found = {GIVEN: given}
     for name, (count, margin) in ROWS.items():
         if name != GIVEN:
-            keys = {k: ~given.masks[k] for k in even_keys(given.count, count)}
+            keys = {k: ~given.masks[k] for k in even_frames(given.count, count)}
             found[name] = replace(given, masks=~np.stack(carry_masks(motion, keys, margin).excluded))
     return found
 
@@ -61,9 +49,8 @@ def common_tissue(folder: str) -> BoolArray:
     return np.logical_and.reduce([sequence.masks for sequence in sequences(folder).values()])
 
 
-def measured(key: str, runs: dict[str, tuple[str, str, int]]) -> dict[str, Any]:
+def of_run(folder: str, row: str, seed: int) -> dict[str, Any]:
     """PSNR on the common tissue of every held-out frame, dB, and the tissue that the training sees."""
-    folder, row, seed = runs[key]
     sequence, common = sequences(folder)[row], common_tissue(folder)
     run = endotsr.train(sequence, preset=PRESET, training={"seed": seed}, on_message=lambda text: None)
     held_out = [int(i) for i in sequence.test_index]
@@ -84,35 +71,22 @@ def table(result: dict[str, Any]) -> str:
             differences = [float(a - b) for a, b in zip(means, base)]
             against = "-" if name == GIVEN else shown(differences, 2)
             rows.append([f"`{clip}`", name, str(len(runs)), f"{runs[0]['tissue']:.1%}", shown(means, 2), against])
-    about = (
-        f"Preset `{PRESET}`, mean ± 95 % interval over the seeds; {result['machine']['processor']}, {result['date']}."
-    )
+    about = f"Preset `{PRESET}`, mean ± 95 % interval over the seeds; {where(result)}."
     head = ["Clip", "Masks", "seeds", "tissue in training", "PSNR of common tissue, dB", "against given, dB"]
-    return markdown(head, rows) + "\n\n" + about
+    return noted(head, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP")
-    parser.add_argument("--seeds", type=int, default=max(SEEDS.values()), help="at most so many")
-    options = parser.parse_args(words)
-    if options.clips:
-        folders = [str(folder.resolve()) for folder in options.clips]
-        runs = {
-            f"{Path(folder).name}, {row}, seed {seed}": (folder, row, seed)
-            for folder in folders
-            for seed in range(options.seeds)
-            for row in ROWS
-            if seed < SEEDS[row]
-        }
-        about = {"sources": kept.sources("method", "training"), "rows": ROWS, "preset": PRESET}
-        answers = kept.measured(FILE, about, runs, lambda key: measured(key, runs))
-        clips: dict[str, Any] = {}
-        for key, (folder, row, _) in runs.items():
-            clips.setdefault(Path(folder).name, {}).setdefault(row, []).append(answers[key])
-        write_json(FILE, {"date": date.today().isoformat(), "machine": machine(), "clips": clips})
-        kept.finished(FILE)
-    write_marked(
-        PAGE, {"table": table(read_json(FILE, "python docs/make.py recordings.masks_training"))}, "mask_training"
-    )
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Clip -> row -> numbers of the runs in the order of their seeds."""
+    folders = {folder.name: str(folder.resolve()) for folder in options.clips}
+    seeds = range(options.seeds)
+    runs = [(clip, row, seed) for clip in folders for seed in seeds for row in ROWS if seed < SEEDS[row]]
+    about = {"sources": kept.sources("method", "training"), "rows": ROWS, "preset": PRESET}
+    answers = kept.measured(options.record, about, runs, lambda clip, *run: of_run(folders[clip], *run))
+    return {"clips": kept.nested(answers)}
+
+
+PROGRAM = Program(
+    __name__, "guides/masks.md", {"table": table}, "masks_training.json", measured,
+    {"clips": {**CLIPS, "nargs": "+"}, "--seeds": max(SEEDS.values())}, room="mask_training",
+)  # fmt: skip

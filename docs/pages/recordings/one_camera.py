@@ -1,20 +1,16 @@
 """Cost of missing depth with one camera: a network's relative depth, and no depth, compared with the true depth.
 
-    python docs/make.py recordings.one_camera              measure, some minutes on two cores
-    python docs/make.py recordings.one_camera --table      rewrite the table of the last result
+    python docs/make.py recordings.one_camera measure              some minutes on two cores
 
 Two scenes are simulated: with a fixed camera, scale and shift of the relative depth are assumed; with a moving
 camera, they are fitted to sparse points in every frame. The relative depth is an affine map of the true 1 / z, rounded
 to 16 bits, with a different map in every frame of the moving camera. The points have the true depth at a few hundred
-pixels per frame; 10 % of them are wrong. The result is docs/results/one_camera.json; the table is in
-docs/guides/prepare.md.
+pixels per frame; 10 % of them are wrong.
 """
 
 import argparse
-import json
 import shutil
 import tempfile
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +19,10 @@ import numpy as np
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.simulator.truth import read_truth
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.recordings.any_clip import said
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import held_out, said
+from pages.store.program import Program
+from pages.store.tables import noted
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "one_camera.json", DOCS / "guides" / "prepare.md"
 SIZE = ["--relief", "2", "--width", "240", "--height", "192", "--frames", "25"]
 SCENES = {"fixed": ["pulling", *SIZE], "moving": ["moving-camera", "--instrument.on", *SIZE]}
 TRAINING = ["--preset", "demo", "--iterations", "600"]
@@ -127,12 +119,11 @@ def _interpolate(clip: Path) -> None:
         write_png(file, np.rint(planes / step).astype(np.uint16))
 
 
-def measured(root: Path, scene: str, way: str) -> dict[str, float]:
+def of_way(root: Path, scene: str, way: str) -> dict[str, float]:
     """Held-out metrics of a route, and its depth against the true one after the best scale for the clip."""
     clip, run = made(root, scene, way), root / f"run-{scene}-{way}"
     said("train", clip, "--out", run, *TRAINING)
-    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
-    mean = metrics["held_out"]["mean"]
+    mean = held_out(run)
     return {"psnr": mean["psnr_tissue"], "ssim": mean["ssim_full"]} | _depth_error(clip, root / scene)
 
 
@@ -165,21 +156,19 @@ def table(result: dict[str, Any]) -> str:
         f"Simulated scenes of 25 frames of 240x192, trained with `{' '.join(TRAINING)}`, one seed. Error of the depth:"
         f" median over tissue, after one scale for the clip where nothing is metric. The true depth and the points are"
         " rounded, to whole millimetres and to hundredths, the relative depth to 16 bits. Held-out frames are seen from"
-        f" the cameras of the clip, from which a wrong shape costs little. {result['date']}."
+        f" the cameras of the clip, from which a wrong shape costs little. {result['date'][:10]}."
     )
-    return markdown(headings, rows) + "\n\n" + about
+    return noted(headings, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    if not options.table:
-        scenes: dict[str, dict[str, Any]] = {}
-        with tempfile.TemporaryDirectory() as root:
-            for scene, words in SCENES.items():
-                said("simulate", *words, "--out", Path(root) / scene)
-                scenes[scene] = {way: measured(Path(root), scene, way) for way in WAYS[scene]}
-        write_json(FILE, {"date": date.today().isoformat(), "machine": machine(), "scenes": scenes})
-    write_marked(PAGE, {"table": table(read_json(FILE, "python docs/make.py recordings.one_camera"))}, "one_camera")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Every route of both scenes."""
+    scenes: dict[str, dict[str, Any]] = {}
+    with tempfile.TemporaryDirectory() as root:
+        for scene, words in SCENES.items():
+            said("simulate", *words, "--out", Path(root) / scene)
+            scenes[scene] = {way: of_way(Path(root), scene, way) for way in WAYS[scene]}
+    return {"scenes": scenes}
+
+
+PROGRAM = Program(__name__, "guides/prepare.md", {"table": table}, "one_camera.json", measured)

@@ -1,18 +1,14 @@
 """Train on a clip from its own stereo pictures, as png, jpg and video, without its depth, and write the table.
 
-    python docs/make.py recordings.own_pictures CLIP [--seeds 3] [--iterations 1500]
-    python docs/make.py recordings.own_pictures --table    rewrite the table of the last result
+    python docs/make.py recordings.own_pictures measure CLIP [--seeds 3] [--iterations 1500]
 
 CLIP is a folder in the layout of EndoNeRF with right pictures. All routes use `prepare` at half size. The first route
 keeps the depth of the folder; the others compute it by `depth` from the pictures. The distance of the cameras is fitted
-once to the given depth. The renders of every route are also compared with the lossless pictures. The result is
-docs/results/own_pictures.json; the table is in docs/guides/prepare.md.
+once to the given depth. The renders of every route are also compared with the lossless pictures.
 """
 
 import argparse
-import json
 import tempfile
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +16,15 @@ import numpy as np
 
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.layouts import describe
+from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.recordings.any_clip import depth_error, said, video_psnr
+from pages.recordings.any_clip import depth_error, video_psnr
 from pages.store import kept
-from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import held_out, said
+from pages.store.program import CLIP, Program
+from pages.store.tables import means, noted, where
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "own_pictures.json", DOCS / "guides" / "prepare.md"
-QUALITY = 90  # of the jpg pictures
-SCALE = 0.5
+QUALITY, SCALE = 90, 0.5  # of the jpg pictures, and of the size of all
 GIVEN = "given depth"
 WAYS = {
     GIVEN: "png, depth of the folder",
@@ -53,7 +45,7 @@ def rectified_pair(clip: Path) -> tuple[Camera, float]:
     right = sorted((clip / "images_right").iterdir())
     found = stereo_baseline(sequence, lambda i: read_png(right[i]).transpose(2, 0, 1))
     if found is None:
-        raise SystemExit(f"{clip}: left and right pictures have too few common pixels with depth")
+        raise InputError(f"{clip}: left and right pictures have too few common pixels with depth")
     return sequence.cameras[0], found[0]
 
 
@@ -96,18 +88,16 @@ def prepared(clip: Path, root: Path) -> dict[str, Path]:
     return {way: root / "clips" / way for way in sources}
 
 
-def measured(key: str, clips: dict[str, Path], iterations: int) -> dict[str, float]:
-    """Train one run "way, seed n", and measure it."""
-    way, _, seed = key.partition(", seed ")
-    clean = clips[GIVEN]
+def of_run(way: str, seed: int, clips: dict[str, Path], iterations: int) -> dict[str, float]:
+    """Train one run, and measure it."""
     with tempfile.TemporaryDirectory() as scratch:
         run, report = Path(scratch) / "run", Path(scratch) / "report.json"
         words = ["--preset", "sharp", "--iterations", iterations, "--seed", seed]
         said("train", clips[way], "--out", run, *words)
         said("render", run, "--frames", "test", "--out", Path(scratch) / "renders")
-        said("evaluate", "--pictures", Path(scratch) / "renders" / "colour", "--sequence", clean, "--json", report)
-        own = json.loads((run / "metrics.json").read_text(encoding="utf-8"))["held_out"]["mean"]
-        against = json.loads(report.read_text(encoding="utf-8"))["held_out"]["mean"]
+        said("evaluate", "--pictures", Path(scratch) / "renders" / "colour", "--sequence", clips[GIVEN],
+             "--json", report)  # fmt: skip
+        own, against = held_out(run), held_out(report)
     return {"own": own["psnr_tissue"], "lossless": against["psnr_tissue"], "ssim": against["ssim_tissue"]}
 
 
@@ -125,40 +115,30 @@ def table(result: dict[str, Any]) -> str:
     """One row per route."""
     rows = []
     for way, found in result["ways"].items():
-        runs = [[run[key] for run in found["runs"]] for key, _ in RUN]
-        inputs = [[found["input"][key]] if key in found["input"] else [] for key, _ in INPUT]
-        digits = [digits for _, digits in RUN + INPUT]
-        rows.append([WAYS[way], *map(shown, runs + inputs, digits)])
+        rows.append([WAYS[way], *means(found["runs"], RUN), *means([found["input"]], INPUT)])
     head = ["Way", "PSNR tissue, dB", "against the lossless pictures, dB", "SSIM tissue, as well",
             "PSNR of the prepared pictures, dB", "depth from the given one, mm", "coverage of the tissue"]  # fmt: skip
     about = (
         f"`{result['clip']}` at half size, preset `sharp`, {result['iterations']} iterations, {result['seeds']} seeds,"
-        f" mean ± 95 % interval; {result['machine']['processor']}, {result['date']}."
+        f" mean ± 95 % interval; {where(result)}."
     )
-    return markdown(head, rows) + "\n\n" + about
+    return noted(head, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("clip", type=Path, nargs="?", metavar="CLIP")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--iterations", type=int, default=1500)
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    if not options.table:
-        if options.clip is None:
-            parser.error("CLIP is needed")
-        keys = [f"{way}, seed {seed}" for seed in range(options.seeds) for way in WAYS]
-        about = {"clip": options.clip.resolve().name, "seeds": options.seeds, "iterations": options.iterations}
-        with tempfile.TemporaryDirectory() as root:
-            clips = prepared(options.clip, Path(root))
-            sources = {"iterations": options.iterations, "sources": kept.sources("")}
-            found = kept.measured(FILE, sources, keys, lambda key: measured(key, clips, options.iterations))
-            inputs = {way: about_input(clips, way) for way in WAYS}
-        seeds = range(options.seeds)
-        runs = {way: [found[f"{way}, seed {seed}"] for seed in seeds] for way in WAYS}
-        ways = {way: {"input": inputs[way], "runs": runs[way]} for way in WAYS}
-        write_json(FILE, about | {"date": date.today().isoformat(), "machine": machine(), "ways": ways})
-        kept.finished(FILE)
-    write_marked(PAGE, {"ways": table(read_json(FILE, "docs/pages/recordings/own_pictures.py CLIP"))}, "own_pictures")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Every route with every seed."""
+    runs = [(way, seed) for seed in range(options.seeds) for way in WAYS]
+    about = {"iterations": options.iterations, "sources": kept.sources("")}
+    with tempfile.TemporaryDirectory() as root:
+        clips = prepared(options.clip, Path(root))
+        train = lambda *run: of_run(*run, clips=clips, iterations=options.iterations)
+        found = kept.nested(kept.measured(options.record, about, runs, train))
+        ways = {way: {"input": about_input(clips, way), "runs": found[way]} for way in WAYS}
+    clip = options.clip.resolve().name
+    return {"clip": clip, "seeds": options.seeds, "iterations": options.iterations, "ways": ways}
+
+
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"ways": table}, "own_pictures.json", measured,
+    {"clip": CLIP, "--seeds": 3, "--iterations": 1500},
+)  # fmt: skip

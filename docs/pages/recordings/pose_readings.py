@@ -1,19 +1,16 @@
 """Give right and wrongly read poses to the check of poses, and write the table of its verdicts.
 
-    python docs/make.py recordings.pose_readings [--data ../shared/data] [--seeds 3]
-    python docs/make.py recordings.pose_readings --table     rewrite the table of the last result
+    python docs/make.py recordings.pose_readings measure [--data ../shared/data] [--seeds 3]
 
 The simulated clips are those of `hand_held` with a hand-held camera; their true poses are known. `sinus_endoscopy` is
 real, with the poses of a reconstruction. Each wrong set of poses is made by a formula of this file, independent of the
 readings that the check knows. A verdict is right if it names the reading that gives the true poses back. For the still
-camera of EndoNeRF pulling, poses of a hand-held path are given. The result is docs/results/pose_readings.json; the
-table is in docs/guides/prepare.md.
+camera of EndoNeRF pulling, poses of a hand-held path are given.
 """
 
 import argparse
 import time
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +23,10 @@ from endotsr.clips.poses.readings import readings
 from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.recordings.hand_held import FRAMES, SMALL, recorded, simulated
-from pages.store.marks import read_json, write_marked
+from pages.recordings.hand_held_clips import FRAMES, SMALL, recorded, simulated
+from pages.store.program import DATA, Program
+from pages.store.tables import noted, where
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "pose_readings.json", DOCS / "guides" / "prepare.md"
 CLIPS = ("rigid", "breathing", "breathing, pull, instrument")
 REAL, STILL, OTHER = "sinus_endoscopy", "endonerf_pulling", "poses of a moving camera"
 EQUAL = 1e-6  # rotations, and centres relative to their spread
@@ -100,7 +93,7 @@ def verdicts(sequence: Sequence, wrong: dict[str, list[CameraPose]]) -> dict[str
     return {"frames": sequence.count, "pairs": len(pairs), "verdicts": found}
 
 
-def measured(clip: str, seed: int, data: Path) -> dict[str, Any]:
+def of_clip(clip: str, seed: int, data: Path) -> dict[str, Any]:
     """Every wrong reading of a clip."""
     if clip == STILL:
         import endotsr
@@ -138,28 +131,18 @@ def table(result: dict[str, Any]) -> str:
     about = (
         f"Simulated clips of {FRAMES} frames of {SMALL[0]}x{SMALL[1]}, {result['seeds']} seeds; a recorded clip once."
         f" A check takes {min(seconds):.1f} to {max(seconds):.1f} s of processor time for 60 frames,"
-        f" {result['machine']['processor']}, {result['date']}."
+        f" {where(result)}."
     )
-    return (
-        markdown(["Poses are read as", *(f"`{head}`" if "_" in head else head for head in heads)], rows)
-        + f"\n\n{about}"
-    )
+    return noted(["Poses are read as", *(f"`{head}`" if "_" in head else head for head in heads)], rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--data", type=Path, default=DOCS.parents[1] / "shared" / "data")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    if not options.table:
-        wanted = [(clip, seed) for clip in CLIPS for seed in range(options.seeds)] + [(REAL, 0), (STILL, 0)]
-        answers = []
-        for clip, seed in wanted:
-            print(clip, seed, flush=True)
-            answers.append({"clip": clip, "seed": seed} | measured(clip, seed, options.data))
-        about = {"seeds": options.seeds, "date": date.today().isoformat(), "machine": machine()}
-        write_json(FILE, about | {"answers": answers})
-    found = read_json(FILE, "docs/pages/recordings/pose_readings.py")
-    write_marked(PAGE, {"table": table(found)}, "pose_readings")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Every clip with its seeds."""
+    wanted = [(clip, seed) for clip in CLIPS for seed in range(options.seeds)] + [(REAL, 0), (STILL, 0)]
+    answers = [{"clip": clip, "seed": seed} | of_clip(clip, seed, options.data) for clip, seed in wanted]
+    return {"seeds": options.seeds, "answers": answers}
+
+
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"table": table}, "pose_readings.json", measured, {"--data": DATA, "--seeds": 3}
+)

@@ -1,35 +1,27 @@
 """The error of poses with and without returns, on simulated clips whose camera goes far and comes back.
 
-    python docs/make.py recordings.pose_returns [--seeds 3]
-    python docs/make.py recordings.pose_returns --table     rewrite the table of the last result
+    python docs/make.py recordings.pose_returns measure [--seeds 3]
 
 A hand-held camera moves over rigid or breathing tissue, farther than one picture shows. Depth is in whole millimetres.
-The result is docs/results/pose_returns.json; the table is in docs/guides/prepare.md.
 """
 
 import argparse
 import time
-from datetime import date
-from pathlib import Path
 from typing import Any
 
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.recordings.hand_held import SMALL, simulated
+from pages.recordings.hand_held_clips import SMALL, simulated
 from pages.recordings.path_errors import path_errors
 from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.program import Program
+from pages.store.tables import means, noted, where
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "pose_returns.json", DOCS / "guides" / "prepare.md"
 FRAMES, SHIFT, CYCLES = 200, 20.0, 1.5  # largest sideways shift in mm, and the rate of the path
 TISSUE = ("rigid", "breathing")
 WAYS = {"without returns": False, "with returns": True}
 
 
-def measured(kind: str, seed: int) -> list[dict[str, Any]]:
+def of_clip(kind: str, seed: int) -> list[dict[str, Any]]:
     """Errors and processor time of both ways on one clip."""
     import cv2
     import numba
@@ -52,31 +44,28 @@ def measured(kind: str, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
-def tables(result: dict[str, Any]) -> dict[str, str]:
-    """The table: means over the seeds."""
+def table(result: dict[str, Any]) -> str:
+    """Means over the seeds."""
     rows = []
     for kind in TISSUE:
         for way in WAYS:
             runs = [row for row in result["rows"] if (row["tissue"], row["way"]) == (kind, way)]
-            cells = [shown([run[key] for run in runs], digits) for key, digits in (("error", 3), ("seconds", 3))]
-            share = shown([100 * run["of_path"] for run in runs], 2)
-            rows.append([kind, way, cells[0], f"{share} %", cells[1], shown([run["returns"] for run in runs], 0)])
+            error, *others = means(runs, (("error", 3), ("seconds", 3), ("returns", 0)))
+            rows.append([kind, way, error, f"{shown([100 * run['of_path'] for run in runs], 2)} %", *others])
     head = ["Tissue", "`endotsr poses`", "error, mm", "of the path", "s per frame", "returns"]
     about = (
         f"{FRAMES} frames of {SMALL[0]}x{SMALL[1]}; mean ± 95 % interval over {result['seeds']} seeds of the simulator;"
-        f" processor time on one thread of {result['machine']['processor']}, {result['date']}."
+        f" processor time on one thread of {where(result)}."
     )
-    return {"table": markdown(head, rows) + "\n\n" + about}
+    return noted(head, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    if not options.table:
-        rows = [row for seed in range(options.seeds) for kind in TISSUE for row in measured(kind, seed)]
-        result = {"date": date.today().isoformat(), "machine": machine(), "seeds": options.seeds, "rows": rows}
-        write_json(FILE, result)
-    write_marked(PAGE, tables(read_json(FILE, "docs/pages/recordings/pose_returns.py")), "pose_returns")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Both kinds of tissue with every seed."""
+    rows = [row for seed in range(options.seeds) for kind in TISSUE for row in of_clip(kind, seed)]
+    return {"seeds": options.seeds, "rows": rows}
+
+
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"table": table}, "pose_returns.json", measured, {"--seeds": 3},
+)  # fmt: skip

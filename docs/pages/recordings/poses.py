@@ -1,20 +1,16 @@
 """Train with disturbed poses, with and without their correction (B16), over seeds, and write the table.
 
-    python docs/make.py recordings.poses [CLIP ...] [--seeds 3] [--jobs 2]
-    python docs/make.py recordings.poses --table     rewrite the table of the last result
+    python docs/make.py recordings.poses measure [CLIP ...] [--seeds 3] [--jobs 2]
 
 Two simulated scenes have a moving camera; in one of them the tissue also breathes. Their poses are disturbed by a
 smooth error of some pixels, like the error of a tracking program. The pose error is the distance in pixels of points of
 the surface, after the best common motion and scale of all cameras. A CLIP is a sequence folder with a pose for each
-frame, which is used unchanged. Finished runs are kept, and a stopped command continues. The result is
-docs/results/poses.json; the table is in docs/guides/prepare.md.
+frame, which is used unchanged. Finished runs are kept, and a stopped command continues.
 """
 
 import argparse
 from dataclasses import replace
-from datetime import date
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,15 +19,10 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import DEMO, with_settings
 from endotsr.method.equations.pose import pose_forward
 from endotsr.method.splatting.camera import Camera, backproject, project
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
 from pages.store import kept
-from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.program import CLIPS, Program
+from pages.store.tables import means, noted, where
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "poses.json", DOCS / "guides" / "prepare.md"
 SIZE, FRAMES, ITERATIONS, CLIP_ITERATIONS = (160, 128), 24, 800, 1000
 SWING, BREATH = 8.0, 1.0  # mm, of the camera and of the tissue
 ERROR = (0.006, 0.3)  # rad and mm, of one sine of the disturbance; there are three
@@ -85,12 +76,11 @@ def pose_error(cameras: list[Camera], sequence: Sequence) -> float:
     return float(np.sqrt(2 * np.mean(least_squares(apart, np.zeros(7)).fun ** 2)))
 
 
-def measured(key: str, runs: dict[str, tuple[str, str, str, int]], clips: dict[str, str]) -> dict[str, float | None]:
+def of_run(scene: str, label: str, poses: str, seed: int, clips: dict[str, str]) -> dict[str, float | None]:
     """Train one run (scene, row of `SETTINGS`, one of `POSES`, seed) and measure it."""
     import endotsr
     from endotsr.training.fitting.model import corrected_cameras
 
-    scene, label, poses, seed = runs[key]
     given = endotsr.load_sequence(clips[scene]) if scene in clips else scene_of(scene, seed)
     shown = disturbed(given, seed) if scene in SCENES and poses != "true" else given
     sections: dict[str, Any] = {
@@ -111,26 +101,23 @@ def measured(key: str, runs: dict[str, tuple[str, str, str, int]], clips: dict[s
     return found
 
 
-def found(clips: dict[str, str], seeds: int, jobs: int) -> dict[str, Any]:
+def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Scene -> settings -> poses -> numbers of the runs in the order of their seeds."""
+    clips = {folder.name: str(folder.resolve()) for folder in options.clips}
     rows = [
         (scene, label, poses)
         for scene in (*SCENES, *clips)
         for label in (SETTINGS if SCENES.get(scene) == () else (MOVING,))
         for poses in (POSES if scene in SCENES else POSES[1:])
     ]
-    runs = {f"{', '.join(row)}, seed {seed}": (*row, seed) for seed in range(seeds) for row in rows}
+    runs = [(*row, seed) for seed in range(options.seeds) for row in rows]
     about = {
         "sources": kept.sources("", beside=("effects/study",)),
         "size": SIZE, "frames": FRAMES, "iterations": (ITERATIONS, CLIP_ITERATIONS),
         "swing": SWING, "breath": BREATH, "error": ERROR, "step": STEP, "settings": SETTINGS, "scenes": SCENES,
     }  # fmt: skip
-    answers = kept.measured(FILE, about, runs, partial(measured, runs=runs, clips=clips), jobs)
-    result: dict[str, Any] = {}
-    for scene, label, poses in rows:
-        values = [answers[f"{scene}, {label}, {poses}, seed {seed}"] for seed in range(seeds)]
-        result.setdefault(scene, {}).setdefault(label, {})[poses] = values
-    return result
+    answers = kept.measured(options.record, about, runs, partial(of_run, clips=clips), options.jobs)
+    return {"seeds": options.seeds, "scenes": kept.nested(answers)}
 
 
 def table(result: dict[str, Any]) -> str:
@@ -140,28 +127,16 @@ def table(result: dict[str, Any]) -> str:
         for label, by_poses in variants.items():
             for poses, runs in by_poses.items():
                 named = "given" if poses == "disturbed" and scene not in SCENES else poses
-                cells = [shown([run[key] for run in runs if key in run], 2) for key in ("pixels", "psnr_tissue")]
-                rows.append([scene, label, named, *cells])
+                rows.append([scene, label, named, *means(runs, (("pixels", 2), ("psnr_tissue", 2)))])
     about = (
         f"Mean ± 95 % interval over {result['seeds']} seeds, {ITERATIONS} iterations (a clip: {CLIP_ITERATIONS});"
-        f" {result['machine']['processor']}, {result['date']}."
+        f" {where(result)}."
     )
     head = ["Scene", "Settings", "Poses", "error of the poses, px", "held-out PSNR tissue, dB"]
-    return markdown(head, rows) + "\n\n" + about
+    return noted(head, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--jobs", type=int, default=2, help="runs at a time; the numbers do not depend on it")
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    if not options.table:
-        clips = {folder.name: str(folder.resolve()) for folder in options.clips}
-        scenes = found(clips, options.seeds, options.jobs)
-        about = {"seeds": options.seeds, "date": date.today().isoformat(), "machine": machine()}
-        write_json(FILE, about | {"scenes": scenes})
-        kept.finished(FILE)
-    write_marked(PAGE, {"table": table(read_json(FILE, "docs/pages/recordings/poses.py"))}, "poses")
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"table": table}, "poses.json", measured,
+    {"clips": CLIPS, "--seeds": 3, "--jobs": 2},
+)  # fmt: skip

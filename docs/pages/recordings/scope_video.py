@@ -1,18 +1,15 @@
 """From the video of a scope in a hand to a scene, with nothing else at hand: four commands and a guessed angle.
 
-    python docs/make.py recordings.scope_video [--data ../shared/data/sinus_endoscopy] [--seeds 3]
-    python docs/make.py recordings.scope_video --table    rewrite the table of the last result
+    python docs/make.py recordings.scope_video measure [--data ../shared/data/sinus_endoscopy] [--seeds 3]
 
 The pictures of `sinus_endoscopy` become an H.264 video of 640x360; its poses, intrinsics, points and mask are not used.
 `prepare --field-of-view`, `poses --sfm` and `train --preset quick` follow. By the intrinsics
-of the clip, the angle is 110 degrees. Finished runs are kept. The result is docs/results/scope_video.json; the table is
-in docs/guides/prepare.md.
+of the clip, the angle is 110 degrees. Finished runs are kept.
 """
 
 import argparse
-import json
 import tempfile
-from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +17,12 @@ from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.film_file import write_video
 from endotsr.clips.sequences.sequence_file import read_sequence_file
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
-from pages.recordings.any_clip import said
 from pages.store import kept
+from pages.store.commands import loaded, said
 from pages.store.intervals import shown
-from pages.store.marks import read_json, write_marked
+from pages.store.program import DATA, Program
+from pages.store.tables import noted, where
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "scope_video.json", DOCS / "guides" / "prepare.md"
 SIZE, RATE = (640, 360), 15.0
 GUESSED = 100  # degrees; the angle with all seeds
 ANGLES = (GUESSED, 80, 110, 130)
@@ -47,56 +40,46 @@ def video_of(data: Path, place: Path) -> Path:
     return place / "scope.mp4"
 
 
-def measured(key: str, runs: dict[str, tuple[int, int]], data: Path) -> dict[str, Any]:
+def of_run(angle: str, seed: int, data: Path) -> dict[str, Any]:
     """PSNR of held-out tissue of one run and of the predictions without a model, dB, and the excluded border."""
-    angle, seed = runs[key]
     with tempfile.TemporaryDirectory() as root:
         clip, run = Path(root) / "clip", Path(root) / "run"
-        said("prepare", video_of(data, Path(root)), "--out", clip, "--field-of-view", angle)
+        said("prepare", video_of(data, Path(root)), "--out", clip, "--field-of-view", angle.split()[0])
         said("poses", clip, "--sfm")
         said("train", clip, "--preset", "quick", "--out", run, "--seed", seed)
-        metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+        metrics = loaded(run / "metrics.json")
         masks = read_sequence_file(clip).masks
     found = {name: metrics["baselines"][name]["mean"]["psnr_tissue"] for name in BASELINES}
     return {"psnr": metrics["held_out"]["mean"]["psnr_tissue"], "origin": masks.origin if masks else "", **found}
 
 
-def plan(seeds: int) -> dict[str, tuple[int, int]]:
+def plan(seeds: int) -> list[tuple[str, int]]:
     """Angle and seed of every run."""
-    wanted = [(angle, seed) for angle in ANGLES for seed in range(seeds if angle == GUESSED else 1)]
-    return {f"{angle} degrees, seed {seed}": (angle, seed) for angle, seed in wanted}
+    return [(f"{angle} degrees", seed) for angle in ANGLES for seed in range(seeds if angle == GUESSED else 1)]
 
 
 def table(result: dict[str, Any]) -> str:
     """A row for each angle, and the predictions without a model."""
-    runs = plan(result["seeds"])
-    rows = []
-    for angle in ANGLES:
-        values = [result["answers"][key]["psnr"] for key, (of, _) in runs.items() if of == angle]
-        rows.append([f"`quick`, {angle} degrees", str(len(values)), shown(values, 2)])
-    first = result["answers"][next(iter(runs))]
+    found = kept.nested({run: result["answers"][kept.key_of(run)] for run in plan(result["seeds"])})
+    rows = [[f"`quick`, {a}", str(len(of)), shown([run["psnr"] for run in of], 2)] for a, of in found.items()]
+    first = next(iter(found.values()))[0]
     rows += [[label, "-", f"{first[name]:.2f}"] for name, label in BASELINES.items()]
     about = (
         f"`sinus_endoscopy` as a video of {SIZE[0]}x{SIZE[1]}, 35 frames, 5 of them held out; excluded:"
         f" {first['origin']}. By its intrinsics the angle is 110 degrees."
-        f" {result['machine']['processor']}, {result['date']}."
+        f" {where(result)}."
     )
-    return markdown(["Held-out frames", "seeds", "PSNR tissue, dB"], rows) + "\n\n" + about
+    return noted(["Held-out frames", "seeds", "PSNR tissue, dB"], rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--data", type=Path, default=DOCS.parents[1] / "shared" / "data" / "sinus_endoscopy")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args(words)
-    if not options.table:
-        runs = plan(options.seeds)
-        about = {"sources": kept.sources("method", "training", "clips"), "size": SIZE}
-        answers = kept.measured(FILE, about, runs, lambda key: measured(key, runs, options.data))
-        result = {"seeds": options.seeds, "answers": answers, "date": date.today().isoformat(), "machine": machine()}
-        write_json(FILE, result)
-        kept.finished(FILE)
-    made = {"table": table(read_json(FILE, "python docs/make.py recordings.scope_video"))}
-    write_marked(PAGE, made, "scope_video")
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """Every angle."""
+    about = {"sources": kept.sources("method", "training", "clips"), "size": SIZE}
+    answers = kept.measured(options.record, about, plan(options.seeds), partial(of_run, data=options.data))
+    return {"seeds": options.seeds, "answers": {kept.key_of(run): answer for run, answer in answers.items()}}
+
+
+PROGRAM = Program(
+    __name__, "guides/prepare.md", {"table": table}, "scope_video.json", measured,
+    {"--data": DATA / "sinus_endoscopy", "--seeds": 3},
+)  # fmt: skip

@@ -1,10 +1,11 @@
-"""The table of docs/guides/show.md: python docs/make.py recordings.show RUN
+"""The table of docs/guides/show.md: python docs/make.py recordings.show measure RUN
 
 Measures the cost of a viewer page, films and files of a trained run: seconds of the command on all cores (start of
 Python included) and megabytes of its output. A headless browser opens the page and draws with the processor:
 milliseconds per picture, and PSNR of its picture against the reference renderer.
 """
 
+import argparse
 import subprocess
 import sys
 import tempfile
@@ -15,16 +16,10 @@ from typing import Any
 import numpy as np
 
 from endotsr.api import Run, open_run
-from endotsr.errors import InputError
 from endotsr.results.evaluation.metrics import psnr
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import dated
-from pages.effects.parts import machine
-from pages.store.marks import write_marked
+from pages.store.program import DOCS, RUN, Program
+from pages.store.tables import noted, where_with_cores
 
-DOCS = Path(__file__).parents[2]
-PAGE, FILE = DOCS / "guides" / "show.md", DOCS / "results" / "show.json"
 COMMANDS = {
     "page": ("export", "--out", "page.html"),
     "film of all frames": ("render", "--film", "frames.mp4", "--frames", "all"),
@@ -40,8 +35,9 @@ COMMANDS = {
 MOMENT = 0.5  # time at which the page is compared
 
 
-def measure(run: Path) -> dict[str, Any]:
+def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Every command on this run, and the page in a browser."""
+    run = options.run
     opened = open_run(run)
     assert isinstance(opened, Run), f"{run}: trained in windows"
     sequence, megabytes = opened.sequence, (run / "checkpoint.npz").stat().st_size / 1e6
@@ -87,18 +83,9 @@ def table(result: dict[str, Any]) -> str:
         f"A run of {result['gaussians']} Gaussians on {result['frames']} frames of {size}, whose checkpoint has "
         f"{result['checkpoint_mb']:.0f} MB; the slim model is {slim:.0%} of it. A headless browser that draws with the "
         f"processor needs {page['milliseconds']:.0f} ms per picture of the page, with a PSNR of {page['psnr']:.1f} "
-        f"dB against the reference renderer ({machine(result)})."
+        f"dB against the reference renderer ({where_with_cores(result)})."
     )
-    return f"{markdown(('Written', 'Time', 'Size'), rows)}\n\n{note}"
+    return noted(("Written", "Time", "Size"), rows, note)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    if len(words) != 1:
-        sys.exit(__doc__)
-    try:
-        result = dated(measure(Path(words[0])))
-        write_json(FILE, result)
-        write_marked(PAGE, {"sizes": table(result)}, "show")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(__name__, "guides/show.md", {"sizes": table}, "show.json", measured, {"run": RUN})

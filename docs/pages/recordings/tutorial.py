@@ -10,25 +10,19 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 
-from endotsr.cli.main import main as endotsr
 from endotsr.clips.opencv import read_png
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.propose_masks import overlay
 from endotsr.clips.sequences.video_file import video_pictures
+from pages.store.commands import said
+from pages.store.program import RESULTS
 
-RESULTS = Path(__file__).parents[2] / "results"
 SCENE = ["pulling", "--camera-motion.on", "--width", "240", "--height", "192", "--frames", "10"]
 TRAINING = ["--preset", "demo", "--iterations", "200"]
 DEPTH = ["--nearest", "25", "--farthest", "120"]
 SHOWN = (0, 5, 9)  # frames; 9 is held out
 Picture = np.ndarray
-
-
-def said(*words: object) -> None:
-    """Run a command. Raises SystemExit if it fails."""
-    if endotsr([str(word) for word in words]) != 0:
-        raise SystemExit(f"failed: endotsr {' '.join(map(str, words))}")
 
 
 def coloured(depth: np.ndarray, low: float, high: float) -> Picture:

@@ -1,12 +1,11 @@
 """Measure recordings in windows: quality, minutes, memory and the flicker at seams.
 
-    python docs/make.py recordings.windows WORDS, where WORDS is one of
+    python docs/make.py recordings.windows measure WORDS, where WORDS is one of
 
     recording --frames 240 --size 160x128 --windows 48          raw recording -> film, by commands
     recording --frames 2000 --size 320x256 --windows auto --chain 4 --preset quick
     clip SEQUENCE --windows 64 36 27 --preset quick             one clip in 1, 2 and 3 windows
     warm RUN                                                    iterations saved by warm starts
-    table                                                       rewrite the tables
 
 `recording` simulates breathing, pulsation, a moving camera, an instrument and a drift of the light as a StereoMIS
 recording, and renders the film with the commands of the guide; with `--keep` an interrupted command continues. `warm`
@@ -16,13 +15,11 @@ docs/guides/recording.md.
 """
 
 import argparse
-import json
 import resource
 import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -37,12 +34,11 @@ from endotsr.studies.windows.record import read_record
 from endotsr.studies.windows.scene import WindowFrames, open_windows
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.log import log_until
-from endotsr.training.runs.machine import machine
+from endotsr.training.runs.machine import dated
 from pages.recordings.seam_errors import seam_errors
-from pages.store.marks import write_marked
+from pages.store.commands import loaded
+from pages.store.program import Program
 
-DOCS = Path(__file__).parents[2]
-FILE, PAGE = DOCS / "results" / "windows.json", DOCS / "guides" / "recording.md"
 EFFECTS = "breathing,pulsation,camera_motion,exposure,instrument,highlights,noise"
 FRAMES_A_BREATH, FRAMES_A_BEAT, FRAMES_A_SWING = 80, 24, 160
 LONGEST = 10**9  # iterations: the whole log
@@ -58,9 +54,9 @@ def command(*words: str) -> tuple[float, float]:
 
 def row_of(run: Path, name: str, seconds: float, preset: str) -> dict[str, Any]:
     """Results of a trained and measured run of windows."""
-    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    metrics = loaded(run / "metrics.json")
     means = {"model": metrics["held_out"]["mean"]} | {k: v["mean"] for k, v in metrics["baselines"].items()}
-    return {
+    found = {
         "name": name,
         "preset": preset,
         "windows": len(metrics["windows"]),
@@ -74,9 +70,8 @@ def row_of(run: Path, name: str, seconds: float, preset: str) -> dict[str, Any]:
         "psnr_full": {key: mean["psnr_full"] for key, mean in means.items()},
         "lpips": means["model"]["lpips"],
         "seams": metrics["seams"],
-        "date": date.today().isoformat(),
-        "machine": machine(),
     }
+    return dict(dated(found))
 
 
 def trained(source: Path, run: Path, name: str, options: argparse.Namespace, windows: str) -> dict[str, Any]:
@@ -98,7 +93,7 @@ class Steps:
 
     def __init__(self, folder: Path) -> None:
         self._file = folder / "steps.json"
-        self.seconds = json.loads(self._file.read_text(encoding="utf-8")) if self._file.exists() else {}
+        self.seconds = loaded(self._file) if self._file.exists() else {}
 
     def make(self, name: str, out: Path, *words: str) -> None:
         """Run a command unless its output exists."""
@@ -182,12 +177,12 @@ def losses(folder: Path) -> np.ndarray:
     return np.array([entry["loss"] for entry in log_until(folder / "log.jsonl", LONGEST)])
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def table(result: dict[str, Any]) -> str:
     """One row per run."""
     headings = ["Recording, preset", "Windows (warm)", "Steps", "Time, min", "Memory, GB",
                 "PSNR, dB", "blend", "flow", "LPIPS", "Flicker"]  # fmt: skip
     cells = []
-    for row in rows:
+    for row in result["rows"]:
         psnr, ratio, lpips = row["psnr_tissue"], row["seams"]["model"]["ratio"], row["lpips"]
         cells.append([
             f"{row['name']}, `{row['preset']}`", f"{row['windows']} ({row['warm']})", f"{row['iterations']}",
@@ -198,12 +193,12 @@ def table(rows: list[dict[str, Any]]) -> str:
     return markdown(headings, cells)
 
 
-def seam_table(rows: list[dict[str, Any]]) -> str:
+def seam_table(result: dict[str, Any]) -> str:
     """Points followed for 16 frames, and the minutes of the commands, for every raw recording."""
     headings = ["Recording", "Seams", "Across, of the motion", "Inside, of the motion",
                 "Minutes: prepare, depth, train, film", "Page, largest window, MB"]  # fmt: skip
     cells = []
-    for row in rows:
+    for row in result["rows"]:
         if (f := row.get("followed")) is None:
             continue
         minutes = ", ".join(f"{row['steps'][name] / 60:.1f}" for name in ("prepare", "depth", "train", "film"))
@@ -215,8 +210,9 @@ def seam_table(rows: list[dict[str, Any]]) -> str:
     return markdown(headings, cells) if cells else "Not measured yet."
 
 
-def warm_table(rows: list[dict[str, Any]]) -> str:
+def warm_table(result: dict[str, Any]) -> str:
     """One row per warm window."""
+    rows = result["warm"]
     if not rows:
         return "Not measured yet."
     headings = ["Window", "Iterations, warm", "Loss at the end", "A cold start reaches it after", "Its loss at the end"]
@@ -227,7 +223,7 @@ def warm_table(rows: list[dict[str, Any]]) -> str:
     ])  # fmt: skip
 
 
-def chain_table(windows: int = 64) -> str:
+def chain_table(result: dict[str, Any], windows: int = 64) -> str:
     """Work and time of chains, in schedules of a cold window, for 2 to 64 workers with equal windows."""
     rows = []
     for chain in (1, 4, 16):
@@ -238,25 +234,9 @@ def chain_table(windows: int = 64) -> str:
     return markdown(headings, rows)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("what", choices=["recording", "clip", "warm", "table"])
-    parser.add_argument("source", type=Path, nargs="?", help="a sequence (clip), or a run (warm)")
-    parser.add_argument("--frames", type=int, default=240)
-    parser.add_argument("--size", default="160x128")
-    parser.add_argument("--windows", nargs="+", default=["auto"])
-    parser.add_argument("--chain", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--iterations", type=int)
-    parser.add_argument("--most", type=int, default=1000, help="warm windows that are trained again (warm)")
-    parser.add_argument("--preset", default="quick")
-    parser.add_argument("--scale", type=float, default=1.0, help="of the pictures of a clip")
-    parser.add_argument("--split", choices=["every_eighth", "every_second", "blocks"], default="every_eighth")
-    parser.add_argument("--lpips", type=Path)
-    parser.add_argument("--keep", type=Path, help="folder for what is made (default: a temporary one)")
-    options = parser.parse_args(words)
-    known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {"rows": [], "warm": []}
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """The record with one more measurement."""
+    known = loaded(options.record) if options.record.exists() else {"rows": [], "warm": []}
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
@@ -266,10 +246,25 @@ def main(words: list[str]) -> None:
             for number in options.windows:
                 run = folder / f"windows{number}"
                 known["rows"].append(trained(options.source, run, options.source.name, options, number))
-        elif options.what == "warm":
+        else:
             known["warm"] = warm(options.source, options.most)
-    write_json(FILE, known)
-    if PAGE.exists():
-        tables = {"runs": table(known["rows"]), "seams": seam_table(known["rows"]), "warm": warm_table(known["warm"])}
-        tables["chains"] = chain_table()
-        write_marked(PAGE, tables, "windows")
+    return known
+
+
+PROGRAM = Program(
+    __name__, "guides/recording.md",
+    {"runs": table, "seams": seam_table, "warm": warm_table, "chains": chain_table}, "windows.json", measured,
+    {
+        "what": {"choices": ["recording", "clip", "warm"]},
+        "source": {"type": Path, "nargs": "?", "help": "a sequence (clip), or a run (warm)"},
+        "--frames": 240, "--size": "160x128", "--chain": 1, "--workers": 1, "--preset": "quick",
+        "--windows": {"nargs": "+", "default": ["auto"]},
+        "--iterations": {"type": int},
+        "--most": {"type": int, "default": 1000, "help": "warm windows that are trained again (warm)"},
+        "--scale": {"type": float, "default": 1.0, "help": "of the pictures of a clip"},
+        "--split": {"choices": ["every_eighth", "every_second", "blocks"], "default": "every_eighth"},
+        "--lpips": {"type": Path},
+        "--keep": {"type": Path, "help": "folder for what is made (default: a temporary one)"},
+    },
+    stamped=False,
+)  # fmt: skip

@@ -17,15 +17,17 @@ import endotsr
 from endotsr.errors import InputError
 from endotsr.method.kernels.machine import usable_cores
 
+Run = tuple[Any, ...]  # names of what is compared, and a seed
+
 
 def measured(
     result: Path,
     about: dict[str, Any],
-    keys: Iterable[str],
-    measure: Callable[[str], dict[str, Any]],
+    runs: Iterable[Run],
+    measure: Callable[..., dict[str, Any]],
     jobs: int = 1,
-) -> dict[str, dict[str, Any]]:
-    """The answers for all keys; stored answers are read, the others are measured and stored.
+) -> dict[Run, dict[str, Any]]:
+    """What `measure(*run)` returns for every run, in their order; stored answers are read, the others are measured.
 
     about    JSON-serialisable identity of the measurement, which stored answers must match
     jobs     concurrent processes, which share the cores. More than one needs a picklable `measure`: a function of a
@@ -33,31 +35,48 @@ def measured(
 
     Raises: InputError with the name of the file if it belongs to another measurement or is damaged.
     """
-    path = part_of(result)
+    path, by_key = part_of(result), {key_of(run): run for run in runs}
     about = json.loads(json.dumps(about))
     found = _read(path, about)
     if not path.exists():
         path.write_text(json.dumps(about) + "\n", encoding="utf-8")
-    missing = [key for key in keys if key not in found]
+    missing = {key: run for key, run in by_key.items() if key not in found}
     with path.open("a", encoding="utf-8") as file:
         for key, answer in _answers(missing, measure, jobs):
             found[key] = answer
             file.write(json.dumps({"key": key, "answer": answer}) + "\n")
             file.flush()
+            print(key, flush=True)
+    return {run: found[key] for key, run in by_key.items()}
+
+
+def key_of(run: Run) -> str:
+    """A run as text: its names, and its seed as `seed 3`."""
+    return ", ".join(f"seed {part}" if isinstance(part, int) else str(part) for part in run)
+
+
+def nested(answers: dict[Run, dict[str, Any]]) -> dict[str, Any]:
+    """Answers of runs (name, ..., seed) as dictionaries by name, with the list of the seeds innermost."""
+    found: dict[str, Any] = {}
+    for (*names, last, _), answer in answers.items():
+        place = found
+        for name in names:
+            place = place.setdefault(name, {})
+        place.setdefault(last, []).append(answer)
     return found
 
 
 def _answers(
-    missing: list[str], measure: Callable[[str], dict[str, Any]], jobs: int
+    missing: dict[str, Run], measure: Callable[..., dict[str, Any]], jobs: int
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Keys and answers, in the order of their completion."""
     if jobs < 2:
-        yield from ((key, measure(key)) for key in missing)
+        yield from ((key, measure(*run)) for key, run in missing.items())
         return
     with ProcessPoolExecutor(
         jobs, multiprocessing.get_context("spawn"), _with_threads, (usable_cores() // jobs,)
     ) as pool:
-        running = {pool.submit(measure, key): key for key in missing}
+        running = {pool.submit(measure, *run): key for key, run in missing.items()}
         yield from ((running[done], done.result()) for done in as_completed(running))
 
 
@@ -111,3 +130,10 @@ def _read(path: Path, about: dict[str, Any]) -> dict[str, dict[str, Any]]:
     if whole != text:
         path.write_text(whole, encoding="utf-8")
     return answers
+
+
+def with_row(record: Path, row: dict[str, Any], key: tuple[str, ...]) -> dict[str, Any]:
+    """The rows of a record with one more, which replaces the row of the same key."""
+    rows = json.loads(record.read_text(encoding="utf-8"))["rows"] if record.exists() else []
+    others = [other for other in rows if any(other[name] != row[name] for name in key)]
+    return {"rows": sorted([*others, row], key=lambda one: [one[name] for name in key])}

@@ -1,6 +1,6 @@
 """Generated parts of a page, between marks `<!-- ROOM:NAME:start -->` and `<!-- ROOM:NAME:end -->`.
 
-The text between two marks is replaced; all other text is written by hand.
+The text between two marks is replaced; all other text is written by hand. In a notebook it is a comment.
 """
 
 import json
@@ -29,7 +29,10 @@ def replaced(text: str, made: Mapping[str, str], page: Path, room: str) -> str:
         _, end, tail = rest.partition(f"<!-- {room}:{name}:end -->")
         if not end or name not in made:
             raise InputError(f"{page}: mark {room}:{name} has no end or no meaning; allowed: {', '.join(made)}")
-        text = f"{head}<!-- {room}:{name}:start -->\n{made[name]}\n{end}{tail}"
+        lines = f"{made[name]}\n{end}"
+        if page.suffix == ".py":  # a cell of text of a notebook
+            lines = "\n".join(f"# {line}".rstrip() for line in lines.splitlines())
+        text = f"{head}<!-- {room}:{name}:start -->\n{lines}{tail}"
     return text
 
 

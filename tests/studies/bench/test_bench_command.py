@@ -10,7 +10,6 @@ from pages.bench import page as bench
 from pages.bench import peers as bench_peers
 from pages.bench import scaling as bench_scaling
 from pages.bench import start as bench_start
-from pages.bench import suite as bench_suite
 
 from endotsr.cli.bench import BenchOptions, cases_of
 from endotsr.cli.main import main
@@ -41,8 +40,8 @@ def results():
     axis = bench_scaling.axes(1000)["gaussians"]._replace(along=lambda result: float(result["view"]["visible"]))
     grown = {"gaussians": bench_scaling.summary(axis, measured)}
     return {
-        bench_suite.FILES["stages"]: {"peaks": [PEAKS], "cases": measured},
-        bench_suite.FILES["scaling"]: {"axes": grown, "memory": bench_scaling.memory(grown)},
+        bench.FILES["stages"]: {"peaks": [PEAKS], "cases": measured},
+        bench.FILES["scaling"]: {"axes": grown, "memory": bench_scaling.memory(grown)},
     }
 
 
@@ -56,17 +55,17 @@ def keys(result) -> object:
 def test_results_have_the_keys_of_the_committed_ones(results):
     """The pages are made from the committed files: a key that changes has to change there too."""
     committed = {name: json.loads((RESULTS / name).read_text(encoding="utf-8")) for name in results}
-    made = dated(results[bench_suite.FILES["stages"]])
-    known = committed[bench_suite.FILES["stages"]]
+    made = dated(results[bench.FILES["stages"]])
+    known = committed[bench.FILES["stages"]]
     records = [found | {"versions": {}} for found in (made, known)]  # other libraries are others
     assert keys(records[0]) == keys(records[1])
-    grown, known = (found[bench_suite.FILES["scaling"]]["axes"]["gaussians"] for found in (results, committed))
+    grown, known = (found[bench.FILES["scaling"]]["axes"]["gaussians"] for found in (results, committed))
     assert keys(grown) == keys(known)
 
 
 def test_pictures_are_drawn(results, tmp_path):
-    bench_charts.stage_bars(results[bench_suite.FILES["stages"]]["cases"], tmp_path / "bars.png")
-    bench_charts.scaling_curves(results[bench_suite.FILES["scaling"]]["axes"], tmp_path / "curves.svg")
+    bench_charts.stage_bars(results[bench.FILES["stages"]]["cases"], tmp_path / "bars.png")
+    bench_charts.scaling_curves(results[bench.FILES["scaling"]]["axes"], tmp_path / "curves.svg")
     assert (tmp_path / "bars.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "curves.svg").read_text()
 
@@ -74,7 +73,7 @@ def test_pictures_are_drawn(results, tmp_path):
 def test_cases_are_every_combination():
     """The common workload first, grouped by size, for the command and for the page."""
     chosen = BenchOptions((10, 20), (Path("a.npz"),), ("float32", "float64"), (1, 2))
-    for cases, sizes in ((cases_of(chosen), 2), (bench_suite.grid((Path("a.npz"),)), 3)):
+    for cases, sizes in ((cases_of(chosen), 2), (bench.grid((Path("a.npz"),)), 3)):
         assert len(set(cases)) == len(cases) and {(c.precision, c.threads) for c in cases[:4]} == {
             (precision, threads) for precision in ("float32", "float64") for threads in (1, 2)
         }
@@ -82,7 +81,7 @@ def test_cases_are_every_combination():
 
 
 @pytest.mark.parametrize("measure", [lambda scene: main(["bench", "--scenes", scene]),
-                                     lambda scene: bench.main(["measure", "--scenes", scene])])  # fmt: skip
+                                     lambda scene: bench.PROGRAM.run(["measure", "--scenes", scene])])  # fmt: skip
 def test_wrong_scene_is_refused_before_anything_is_measured(measure, tmp_path, monkeypatch, capsys):
     measured = lambda *arguments: pytest.fail("measured before the scenes were looked at")
     monkeypatch.setattr(stages, "apart", measured)
@@ -97,7 +96,7 @@ def test_wrong_scene_is_refused_before_anything_is_measured(measure, tmp_path, m
 
 def test_an_unknown_measurement_is_refused():
     with pytest.raises(SystemExit, match="'iteration' is not allowed; allowed: start, stages, peers,"):
-        bench.main(["measure", "iteration"])
+        bench.PROGRAM.run(["measure", "iteration"])
 
 
 @pytest.mark.parametrize("names", [("peers",), ("peers", "scaling")])
@@ -108,10 +107,10 @@ def test_peers_without_torch_say_what_to_install(names, monkeypatch, tmp_path):
     monkeypatch.setattr(bench_scaling, "measure_scaling", lambda *_: {"axes": {}, "memory": {}})
     if len(names) == 1:
         with pytest.raises(InputError) as refusal:
-            bench_suite.run_all(tmp_path, names, (), said.append)
+            bench.run_all(tmp_path, names, (), said.append)
         said.append(str(refusal.value))
     else:
-        bench_suite.run_all(tmp_path, names, (), said.append)
+        bench.run_all(tmp_path, names, (), said.append)
     assert [path.name for path in tmp_path.iterdir()] == ["scaling.json"] * (len(names) - 1)
     assert "No module named 'torch'" in said[0] and all(line in said[0] for line in bench_peers.PIP_LINES)
 
