@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 18. Targets between the frames
 #
-# Every loss so far compares a render with a training frame. No loss reads a render between two training frames. In
-# {doc}`00_why` a clip breathes four times: the colour residual is right at the training times and several decibels
-# wrong between them. The preset `sharp` therefore also renders times between the frames and compares them with targets
-# made from both frames, moved along their optical flow.
+# Every loss so far compares a render with a training frame, and none reads a render between two training frames. In
+# {doc}`00_why` a clip breathes four times. There the colour residual is right at the training times and several
+# decibels wrong between them. The preset `sharp` therefore also renders times between the frames. It compares these
+# renders with targets that are made from both frames, moved along their optical flow.
 #
 # The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is optional and not in the paper.
 
@@ -39,10 +39,11 @@ from endotsr.results.evaluation.trajectories import trajectory_error
 # %% [markdown]
 # ## The problem
 #
-# The clip is the one of {doc}`00_why` that breathes four times: 24 frames, three held out. It is trained twice with the
-# preset `paper`, shortened: once unchanged, and once with 70 %<!--=sharp.bridged--> of the iterations at times between the
-# frames, the fraction of `sharp`. The simulator also renders the true picture at three times between any two frames. Sketch
-# the PSNR over time of both runs before you look at the figure: where are its peaks?
+# The clip is the one of {doc}`00_why` that breathes four times: 24 frames, of which three are held out. It is trained
+# twice with the preset `paper`, shortened. The first run is unchanged. In the second, 70 %<!--=sharp.bridged--> of the
+# iterations are at times between the frames, which is the fraction of `sharp`. The simulator also renders the true
+# picture at three times between any two frames. Sketch the PSNR over time of both runs before you look at the figure:
+# where are its peaks?
 
 # %%
 FRAMES, MOMENTS, ITERATIONS = 24, 4, 500
@@ -114,9 +115,9 @@ print("from the worst to the best time:", {name: f"{v:.1f} dB" for name, v in sw
 assert swing[both] < swing[alone] - 2
 
 # %% [markdown]
-# If the model is trained only on frames, its PSNR peaks at the training times and falls on both sides, most around a
-# held-out frame, where the gap is twice as wide. With targets it still varies, but less: the training frames lose less than a
-# decibel, and the held-out frames gain several.
+# If the model is trained only on frames, its PSNR peaks at the training times and falls on both sides of each. It
+# falls most around a held-out frame, where the gap is twice as wide. With targets it still varies, but less: the
+# training frames lose less than a decibel, and the held-out frames gain several.
 #
 # ## The equation
 #
@@ -152,37 +153,41 @@ assert swing[both] < swing[alone] - 2
 # **(18.1) The path of a point.** Between two frames a point moves along a straight line at constant speed, by $v$ in
 # total. If it is at $x$ at time $a$, it is at $x-av$ in $I_0$ and at $x+(1-a)v$ in $I_1$.
 #
-# **(18.2) The forward flow** at the place in $I_0$ is the whole displacement: $v=f(x-av)$. The unknown is on both
-# sides, because the place at which to read the flow depends on the flow.
+# **(18.2) The forward flow** at the place in $I_0$ is the whole displacement: $v=f(x-av)$. The unknown $v$ is on both
+# sides, because the place at which the flow is read depends on $v$ itself.
 #
-# **(18.3) The backward flow** at the place in $I_1$ leads back: $v=-g(x+(1-a)v)$.
+# **(18.3) The backward flow** at the place in $I_1$ leads back to $I_0$, which gives a second equation:
+# $v=-g(x+(1-a)v)$.
 #
-# **(18.4) Three steps of a fixed-point iteration** solve both. Start from $v^{(0)}=f(x)$ and repeat
-# $v^{(k+1)}=f(x-av^{(k)})$. If $f$ changes by at most $L$ from one pixel to the next, then
-# $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: the error shrinks by the factor $aL$ in every step, if $aL<1$. Tissue that neither
+# **(18.4) Three steps of a fixed-point iteration** solve each equation. For the first, start from $v^{(0)}=f(x)$ and
+# repeat $v^{(k+1)}=f(x-av^{(k)})$. If $f$ changes by at most $L$ from one pixel to the next, then
+# $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: if $aL<1$, every step reduces the error by the factor $aL$. Tissue that neither
 # folds nor stretches to twice its length has $L<1$, and then $aL<1$ at every $a$. The start has the error
 # $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
 #
-# **(18.5) Which of the two.** $v_0$ is read $a|v|$ away from $x$, and $v_1$ is read $(1-a)|v|$ away. The nearer one has
-# the larger weight: $v=(1-a)v_0+av_1$. Exchange the frames and replace $a$ by $1-a$: $f$ and $g$ change places, $v_0$
-# becomes $-v_1$, and $v$ changes its sign only.
+# **(18.5) Which of the two.** The solutions $v_0$ of (18.2) and $v_1$ of (18.3) are read at different places: $v_0$ at
+# the distance $a|v|$ from $x$, and $v_1$ at the distance $(1-a)|v|$. The nearer one has the larger weight:
+# $v=(1-a)v_0+av_1$. This rule treats both frames alike. If the frames are exchanged and $a$ is replaced by $1-a$, then
+# $f$ and $g$ change places, $v_0$ becomes $-v_1$, and $v$ changes its sign only.
 #
 # **(18.6) The moved pair.** $J_0$ and $J_1$ are two pictures of the same point, so they differ by noise and by a change
 # of light. Their blend has less noise than a frame: its variance is $\bigl((1-a)^2+a^2\bigr)\sigma^2$, half the variance
 # of a frame at $a=\frac12$.
 #
 # **(18.7) Two pairs, one pixel.** Flow can be wrong at a highlight, at an occlusion, or for a fast motion. Then the
-# static pair may be better. Let the blends of the two pairs have independent errors of variance $e_{\mathrm m}$ and
-# $e_{\mathrm s}$. Their mix $(1-q)B_{\mathrm m}+qB_{\mathrm s}$ has the variance
-# $(1-q)^2e_{\mathrm m}+q^2e_{\mathrm s}$. Its derivative with respect to $q$ is 0 where
+# static pair may be better. Assume that the blends $B_{\mathrm m}$ and $B_{\mathrm s}$ of the two pairs have
+# independent errors of variance $e_{\mathrm m}$ and $e_{\mathrm s}$. The mix $(1-q)B_{\mathrm m}+qB_{\mathrm s}$ has
+# the variance $(1-q)^2e_{\mathrm m}+q^2e_{\mathrm s}$. Its derivative with respect to $q$ is 0 where
 # $(1-q)e_{\mathrm m}=qe_{\mathrm s}$, so $q=e_{\mathrm m}/(e_{\mathrm m}+e_{\mathrm s})$.
 #
 # **(18.8) The variances** are not known. The two pictures of a pair disagree where the pair is wrong, so their squared
-# difference is used as the variance. The window $G_2$ averages it over the noise. The smallest difference of 8-bit
-# pictures, $1/255$, is added, so that two equal pairs have $q=\frac12$ and not $0/0$.
+# difference is used in place of the variance. The window $G_2$ averages this difference, which reduces its noise. The
+# square of $1/255$, the smallest difference of 8-bit pictures, is added, so that two equal pairs have $q=\frac12$ and
+# not $0/0$.
 #
-# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue, it is
-# the target. Where one of the four pictures is excluded, the static pair is not evidence, and $q=0$.
+# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue,
+# this one is the target. Where one of the four pictures is excluded, the comparison with the static pair says nothing,
+# and $q=0$.
 #
 # <!-- definition: endotsr.clips.sequences.between.motion_between -->
 # ```python
@@ -258,8 +263,8 @@ assert swing[both] < swing[alone] - 2
 # %% [markdown]
 # ## The steps in numbers
 #
-# Step (18.4): a stretch $f(x)=sx$ has the exact field $v=sx/(1+as)$, and the backward flow $g(x)=-sx/(1+s)$. With $L=s$
-# the error after three steps is below $(as)^4|v|$, away from the border of the picture.
+# For step (18.4) the flow is a stretch $f(x)=sx$. Its exact field is $v=sx/(1+as)$, and its backward flow is
+# $g(x)=-sx/(1+s)$. With $L=s$ the error after three steps is below $(as)^4|v|$, away from the border of the picture.
 
 # %%
 HEIGHT, WIDTH = 8, 200
@@ -284,7 +289,8 @@ for s, a in ((1.5, 0.75), (0.9, 0.75), (-0.9, 0.75)):  # stretched to 2.5 times,
 
 # %% [markdown]
 # The next cell checks step (18.5) by exchanging two frames of the clip and replacing $a$ by $1-a$. It checks step
-# (18.6) on a clip without motion: two frames with noise of variance $\sigma^2$, and the variance of their blends.
+# (18.6) on a clip without motion. Two frames have noise of variance $\sigma^2$, and the cell measures the variance of
+# their blends.
 
 # %%
 first, second = (int(k) for k in clip.sequence.train_index[4:6])
@@ -338,10 +344,10 @@ assert q[8:40, 16:-16].mean() < 0.02 and q[56:-8, 16:-16].mean() > 0.98
 # %% [markdown]
 # ## Figure: one time between two frames
 #
-# A clip with breathing, a beat, a pulled spot, highlights and a grasper, here with 16 frames. One frame is omitted and
-# predicted from its neighbours, two frames away on either side. Below each picture is its error, from 0 (black) to 0.15
-# (white). The last panel shows $q$. It is about one half where nothing moves and both pairs agree. It is small where
-# the static frames disagree, most of all at the highlights.
+# The clip has breathing, a beat, a pulled spot, highlights and a grasper, here with 16 frames. One frame is omitted
+# and predicted from two frames, which are two frames away on either side. Below each picture is its error, from 0
+# (black) to 0.15 (white). The last panel shows $q$. It is about one half where nothing moves and both pairs agree. It
+# is small where the static frames disagree, most of all at the highlights.
 
 # %% tags=["hide-input"]
 scene = replace(named_scene("pulling"), width=160, height=128, frames=16)
@@ -382,8 +388,8 @@ assert found["the target"] > found["both frames as they are"] + 2
 # %% [markdown]
 # ## The limit of the targets
 #
-# A target is a picture. It determines the colour at a time, but not which Gaussian should have it. The clip above shows
-# the difference: the pictures between the frames are right, but the Gaussians still do not move.
+# A target is a picture. It determines the colour at a time, but not which Gaussian should have this colour. The clip
+# above shows the difference: the pictures between the frames are right, but the Gaussians still do not move.
 
 # %%
 for name, run in runs.items():
@@ -393,18 +399,18 @@ for name, run in runs.items():
 
 # %% [markdown]
 # The Gaussians are nearly at rest in both models, so the colours must imitate the motion at the intermediate times as
-# well. The motion itself is the subject of {doc}`19_tracked_motion`.
+# well. {doc}`19_tracked_motion` treats the motion itself.
 #
-# On the real clip the target is closer to the held-out frames than either pair alone when four or more frames in a row
-# are missing. With every eighth frame held out the moved pair alone is a little closer. The table is on the page of
-# {eq}`eq-b14`. {doc}`/results/README` gives the effect of the targets on training.
+# On the real clip the target is closer to the held-out frames than either pair alone if four or more frames in a row
+# are missing. With every eighth frame held out, the moved pair alone is a little closer. The page of {eq}`eq-b14` has
+# the table, and {doc}`/results/README` the effect of the targets on training.
 #
 # ## The reverse pass
 #
 # There is none. A target is made from training frames and flow, which do not depend on any parameter of the model, so
-# it is held fixed like a frame. The losses of {doc}`11_base_losses` differentiate the render at the intermediate time.
-# Time enters the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are valid at any time. The
-# pair to check is the loss that uses the target.
+# it is held fixed like a frame. The losses of {doc}`11_base_losses` are differentiated with respect to the render at
+# the intermediate time. Time enters the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are
+# valid at any time. The pair to check is the loss that uses the target.
 
 # %%
 with one_thread():
@@ -415,8 +421,9 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. The tissue moves by $6$ px between two frames and the flow says 7. Use (18.1) to find where $J_0$ and $J_1$ are read
-#    at $a=\frac12$, and how far apart the two pictures of the point are. Is their blend sharper or softer than a frame?
+# 1. The tissue moves by $6$ px between two frames, and the flow is 7. Use (18.1) to find where $J_0$ and $J_1$ are
+#    read at $a=\frac12$, and how far apart the two pictures of the point are. Is their blend sharper or softer than a
+#    frame?
 # 2. Write `motion_between` from (18.2) to (18.5) and let the cells of this chapter judge it: assign your function to
 #    the name `motion_between` and run the cells below *The steps in numbers* again. No golden case contains a flow,
 #    because a port may use any. The loss that uses the target has cases: `--only masked_l1` ({doc}`index`).

@@ -14,9 +14,9 @@
 # # 19. Gaussians that start with the motion of the tissue
 #
 # A model can show a moving clip without moving: it changes colours ({doc}`00_why`), or it fades one Gaussian out and
-# another one in. The runs below do so. Our explanation, which is not tested, is that such changes lower the loss at once,
-# whereas motion lowers it when many Gaussians move together. The preset `sharp` therefore measures the motion before
-# training, from optical flow and the prior depth, and the Gaussians start with it.
+# another one in. The runs below do so. Our explanation, which is not tested, is that a change of colour or opacity
+# lowers the loss at once, whereas motion lowers it when many Gaussians move together. The preset `sharp` therefore
+# measures the motion before training, from optical flow and the prior depth, and the Gaussians start with this motion.
 #
 # The equation is {eq}`eq-b15` of {doc}`/specification/b15_tracked_motion`. It is optional and not in the paper.
 
@@ -51,9 +51,9 @@ rho = matern_weights(omega, length)
 # ## The problem
 #
 # A clip breathes twice in 24 frames. It is trained three times for 500 iterations: as in the paper, with tracked
-# motion, and with tracked motion and the targets of {doc}`18_between`. *Trajectory error* is the distance between the
-# motion of the model and the true motion. The last column is the error of a model that stands still. What do you expect of
-# the first run: does a good PSNR on training frames imply a small trajectory error?
+# motion, and with tracked motion and the targets of {doc}`18_between`. The *trajectory error* is the distance between
+# the motion of the model and the true motion. The last column is the error of a model that stands still. What do you
+# expect of the first run: does a good PSNR on training frames imply a small trajectory error?
 
 # %%
 settings = with_effects(SimulatorSettings(width=96, height=76, frames=24), "breathing", "noise")
@@ -97,9 +97,10 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # %% [markdown]
 # ## The equation
 #
-# A track is the position $X_p(t_i)$ of a point $p$ at every training time $t_i$. Its weight $a_{pi}$ is 1 where the point
-# was followed and 0.1 elsewhere. $\phi$ are the raw atoms {eq}`eq-1`, and $\rho_f$ is the Matérn weight {eq}`eq-4` of
-# frequency $f$. For each point, the position $\mu_p$ and the motion coefficients $C_p$ of {eq}`eq-3` minimise
+# A track is the position $X_p(t_i)$ of a point $p$ at every training time $t_i$. Its weight $a_{pi}$ is 1 where the
+# point was followed and 0.1 elsewhere. The raw atoms {eq}`eq-1` are $\phi$, and $\rho_f$ is the Matérn weight
+# {eq}`eq-4` of frequency $f$. For each point, the position $\mu_p$ and the motion coefficients $C_p$ of {eq}`eq-3`
+# minimise
 #
 # $$
 # \sum_i a_{pi}\,\bigl\lVert\mu_p+C_p\,\phi(t_i)-X_p(t_i)\bigr\rVert^2
@@ -108,19 +109,21 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 #
 # ## Step by step: the tracks
 #
-# **(19.1) From pixel to position.** A point at pixel $x$ of one training frame is at $x'=x+f(x)$ in the next one. The
-# prior depth at $x'$ gives its position on the ray of $x'$.
+# **(19.1) From pixel to position.** Let $f$ be the flow from one training frame to the next, and $g$ the flow back. A
+# point at pixel $x$ of the first frame is at $x'=x+f(x)$ in the next one. The prior depth at $x'$ gives its position
+# on the ray of $x'$.
 #
-# **(19.2) Do the flows agree?** Exact flows lead back to the start: $f(x)+g(x')=0$. A flow has an error that grows with
-# the motion and an error of some fraction of a pixel that does not. The point stays followed if
+# **(19.2) Do the flows agree?** Exact flows lead back to the start: $f(x)+g(x')=0$. The error of a flow has a part
+# that grows with the motion, and a part of some fraction of a pixel that does not. The point stays followed if
 # $\lVert f(x)+g(x')\rVert^2\le0.02\,\lVert f(x)\rVert^2+0.5$ px². At an occlusion the backward flow ends on another
 # piece of tissue, and the test fails.
 #
-# **(19.3) Is it the same surface?** $x'$ and its four neighbours must be tissue with a prior depth, and the depth may
-# change by at most 20 %<!--=tracks.depth-->. An instrument in front of the tissue fails the first test, and a fold the second.
+# **(19.3) Is it the same surface?** The pixel $x'$ and its four neighbours must be tissue with a prior depth, and the
+# depth may change by at most 20 %<!--=tracks.depth-->. An instrument in front of the tissue fails the first test, and
+# a fold the second.
 #
-# **(19.4) A lost point** moves with the tissue around it: by the mean displacement of the 8 nearest followed points,
-# weighted by their inverse distance. Its $a_{pi}$ is 0.1.
+# **(19.4) A lost point** is carried by the tissue around it: it moves by the mean displacement of the 8 nearest
+# followed points, weighted by their inverse distance. Its $a_{pi}$ is 0.1.
 #
 # **(19.5) Found again.** A lost point is followed again from the first frame in which its pixel is tissue with a depth
 # within 2.5 %<!--=tracks.again--> of its own. This limit is narrower than in (19.3), because the depth is the only evidence for the same
@@ -172,11 +175,12 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # %% [markdown]
 # ## Figure: tracks through an instrument
 #
-# A clip with breathing, a pull and a grasper. 300 points of frame 0 are followed through 32 frames. Left: the paths in
-# the picture, drawn at the last frame. Middle: the error of the positions, for points that are followed and for points
-# that are carried. Right: the path of one point that is lost and found again, the one with the median error. Step (19.5)
-# looks for a pixel of the same depth, not for the same piece of tissue, so it can be wrong: the cell below the figure
-# prints how far the found points are from the tissue where they began.
+# The clip has breathing, a pull and a grasper, and 300 points of frame 0 are followed through 32 frames. The left
+# panel shows the paths in the picture, drawn at the last frame. The middle panel shows the error of the positions, for
+# points that are followed and for points that are carried. The right panel shows the path of one point that is lost
+# and found again, the one with the median error. Step (19.5) looks for a pixel of the same depth, not for the same
+# piece of tissue, so it can be wrong. The cell below the figure prints how far the found points are from the tissue
+# where they began.
 
 # %% tags=["hide-input"]
 scene = replace(named_scene("pulling"), width=160, height=128, frames=32)
@@ -270,22 +274,25 @@ assert error[-1, one] > 1, "found again, on other tissue"
 # %% [markdown]
 # ## Step by step: the coefficients
 #
-# **(19.6) Two conditions.** The sum is quadratic in $\mu_p$ and $C_p$, and its minimum is where both gradients are 0.
-# With the residual $r_i=\mu_p+C_p\phi(t_i)-X_p(t_i)$ and the weight $w_k=30\rho_k+0.1$:
+# **(19.6) Two conditions.** The sum is quadratic in $\mu_p$ and $C_p$, so its minimum is where both gradients are 0.
+# With the residual $r_i=\mu_p+C_p\phi(t_i)-X_p(t_i)$ and the weight $w_k=30\rho_k+0.1$, the conditions are:
 #
 # - with respect to $\mu_p$: $\sum_i a_{pi}\,r_i=0$,
 # - with respect to $C_{pk}$: $\sum_i a_{pi}\,r_i\,\phi_k(t_i)+w_kC_{pk}=0$.
 #
-# **(19.7) One linear system.** Write $d_i=(1,\phi(t_i))$ and $u_p=(\mu_p,C_p)$, so that $r_i=u_pd_i-X_p(t_i)$. Both
-# conditions are rows of $\bigl(\sum_ia_{pi}\,d_id_i^{\mathsf T}+\operatorname{diag}(0,w)\bigr)u_p^{\mathsf T}
-# =\sum_ia_{pi}\,d_iX_p(t_i)^{\mathsf T}$. The matrix has $1+2F=17$ rows and is the same for the three directions.
+# **(19.7) One linear system.** Let $d_i=(1,\phi(t_i))$ and $u_p=(\mu_p,C_p)$, so that $r_i=u_pd_i-X_p(t_i)$. Both
+# conditions are then rows of
+# $\bigl(\sum_ia_{pi}\,d_id_i^{\mathsf T}+\operatorname{diag}(0,w)\bigr)u_p^{\mathsf T}=\sum_ia_{pi}\,d_iX_p(t_i)^{\mathsf T}$.
+# The matrix has $1+2F=17$ rows and is the same for the three directions.
 #
 # **(19.8) The position has no weight**, so a static point has $C_p=0$ and $\mu_p=X_p$: both conditions hold with
-# $r_i=0$. With 21 times for 17 unknowns the atoms alone would fit almost any track, with its noise.
+# $r_i=0$. Without the weights of $C$, 21 times and 17 unknowns would let the atoms fit almost any track, with its
+# noise.
 #
-# **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
-# is one atom of amplitude $A$ is fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. The weight $0.1$ costs $0.1/10.1$ of it at 20
-# times; $30\rho$ removes the fastest atoms. In this way the penalty {eq}`eq-4` acts before training begins.
+# **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion
+# that consists of one atom of amplitude $A$ is therefore fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. With
+# $n=20$ the weight $0.1$ costs $0.1/10.1$ of the amplitude; $30\rho$ removes the fastest atoms. In this way the
+# penalty {eq}`eq-4` acts before training begins.
 #
 # <!-- definition: endotsr.training.scene.tracked_motion.with_tracked_motion -->
 # ```python
@@ -362,15 +369,16 @@ np.testing.assert_allclose(kept[[0, -1]], expected[[0, -1]], atol=0.02)
 assert expected[0] > 0.99 and expected[-1] < 0.2
 
 # %% [markdown]
-# Between the ends of the list the remaining fraction is smaller than expected: neighbouring atoms are not orthogonal
-# over one clip, and slower atoms, which cost less, represent a part of the motion.
+# Between the ends of the list the remaining fraction is smaller than (19.9) predicts. Neighbouring atoms are not
+# orthogonal over one clip, and slower atoms, which cost less, represent a part of the motion.
 #
 # ## Why not the deformation
 #
-# The deformation {eq}`eq-b1` could also represent the motion. Its centres and widths are learned, and the effect of one
-# step of a centre is proportional to the weight of its basis, by (4.5), so it has no bound. The atoms are fixed functions
-# of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes by at most
-# $\eta\sum_k|\phi_k(t)|\le\sqrt2\,F\eta=11.3\,\eta$, because $|\sin|+|\cos|\le\sqrt2$ for each of the $F$ pairs.
+# The deformation {eq}`eq-b1` could also represent the motion. Its centres and widths are learned, and by (4.5) the
+# effect of one step of a centre is proportional to the weight of its basis, so it has no bound. The atoms, in
+# contrast, are fixed functions of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes by
+# at most $\eta\sum_k|\phi_k(t)|\le\sqrt2\,F\eta=11.3\,\eta$, because $|\sin|+|\cos|\le\sqrt2$ for each of the $F$
+# pairs.
 
 # %%
 steps = np.array(
@@ -382,8 +390,8 @@ assert steps.max() <= np.sqrt(2) * F
 # %% [markdown]
 # ## Figure: the motion that the model has learned
 #
-# The figure shows the clip above from rest to the time of the largest displacement; brightness is the length of the
-# displacement, up to the largest true one. It also shows a held-out frame with its error.
+# The figure shows the displacement of the clip above from rest to the time at which it is largest. Brightness is the
+# length of the displacement, up to the largest true one. The figure also shows a held-out frame with its error.
 
 # %% tags=["hide-input"]
 films = clip.sequence
@@ -423,8 +431,9 @@ plt.show()
 # ## The reverse pass
 #
 # There is none: tracks and coefficients are computed before training and are not differentiated. From the first
-# iteration on, training changes $\mu$ and $C$ through the reverse pass of {eq}`eq-3`, which is the pair to check.
-# (19.6) is the same reverse pass with a quadratic loss at every training time, set to 0.
+# iteration on, training changes $\mu$ and $C$ through the reverse pass of {eq}`eq-3`, which is the pair to check. The
+# conditions (19.6) come from the same reverse pass, with a quadratic loss at every training time and the gradient set
+# to 0.
 
 # %%
 with one_thread():

@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 20. A first look: fewer pixels and a known number of Gaussians
 #
-# The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in training the render
-# is still far from the frame, so its finest detail says little about what to change. The number of Gaussians follows from
-# a threshold that was not chosen for the clip. The preset `quick` therefore starts on frames of half size and grows to a
-# given number of Gaussians.
+# The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in training the
+# render is still far from the frame, so its finest detail says little about what to change. The number of Gaussians,
+# in turn, follows from a threshold that was not chosen for the clip. The preset `quick` therefore starts on frames of
+# half size and grows to a given number of Gaussians.
 #
 # The equation of the coarse start is {eq}`eq-b17` of {doc}`/specification/b17_coarse_start`; the growth to a budget is
 # a rule of {doc}`/specification/b11_density`. Both are optional and not in the paper.
@@ -52,16 +52,17 @@ rng = np.random.default_rng(20)
 # gradient: the weights of the losses, the size of the frames, the exposure. With a budget you choose how many; the
 # gradients choose which.
 #
-# **(20.1) Equal steps.** $N$ Gaussians are left after pruning, $M$ is the budget, and $r$ densifications remain. The
-# current one adds $\lceil\max(0,M-N)/r\rceil$, at the largest gradients.
+# **(20.1) Equal steps.** Let $N$ be the number of Gaussians left after pruning, $M$ the budget, and $r$ the number of
+# densifications from the current one to the last. The current one adds $\lceil\max(0,M-N)/r\rceil$ Gaussians, at the
+# largest gradients.
 #
-# **(20.2) The budget is reached.** After a step without rounding, $M-N-(M-N)/r=(M-N)\frac{r-1}r$ are missing, and
-# $r-1$ densifications remain. If nothing is pruned in between, the next step is $(M-N)/r$ again, so the steps are equal.
-# The last one has $r=1$ and adds all that is missing.
+# **(20.2) The budget is reached.** Without rounding, $M-N-(M-N)/r=(M-N)\frac{r-1}r$ Gaussians are missing after this
+# step, and $r-1$ densifications remain. If nothing is pruned in between, the next step is $(M-N)/r$ again, so the
+# steps are equal. The last one has $r=1$ and adds all that is missing.
 #
-# **(20.3) A pruned Gaussian is replaced**, because $N$ is counted after pruning. With $p$ pruned before every
-# densification, the one with $r$ left adds $p/r$ more than the one before: the steps are no longer equal and grow
-# towards the end.
+# **(20.3) A pruned Gaussian is replaced**, because $N$ is counted after pruning. If $p$ Gaussians are pruned before
+# every densification, the one with $r$ left adds $p/r$ more than the one before. The steps are then no longer equal,
+# and they grow towards the end.
 #
 # <!-- definition: endotsr.definition.density_control.densify -->
 # ```python
@@ -152,19 +153,20 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 #
 # ## Step by step: when half size is enough
 #
-# **(20.4) Detail missing at half size.** A frame is its finest band $P_1$ plus a frame of half size, enlarged
-# ({eq}`eq-5`). A perfect fit to the frames of half size still misses the full frame by $P_1$, in the mean by $d$.
+# **(20.4) Detail missing at half size.** A frame is the sum of its finest band $P_1$ and an enlarged frame of half
+# size ({eq}`eq-5`). A perfect fit to the frames of half size still differs from the full frame by $P_1$, on average by
+# $d$.
 #
 # **(20.5) The test.** While the fit error at half size is above the missing detail, $e>d$, the missing band is the
-# smaller of the two errors, and half size has only a quarter of the pixels. Once $e<d$, the finest band is the larger error,
-# and the full frames are needed.
+# smaller of the two errors, and half size has only a quarter of the pixels. Once $e<d$, the missing band is the larger
+# error, and the full frames are needed.
 #
 # **(20.6) The camera.** The edges of the picture stay aligned, so $u'=u/2$ for every point. With the centre of the first
 # pixel at $(0.5,0.5)$ this needs no shift.
 #
 # **(20.7) The smoothness.** Its loss sums squared steps of depth on tissue and absolute steps, the total variation,
 # under the instrument ({eq}`eq-b9`), each as a mean over pixels. At half size neighbouring pixels are twice as far
-# apart. On a slope an absolute step is twice as large and a squared one four times. The weight is halved, which
+# apart. On a slope an absolute step is then twice as large, and a squared step four times. The weight is halved, which
 # preserves only the total variation of a slope.
 #
 # <!-- definition: endotsr.training.fitting.coarse_start.coarse_ends -->
@@ -209,9 +211,10 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # ```
 
 # %% [markdown]
-# Step (20.6): a point in the image of the camera and of the half-size camera. Step (20.7): half the weight preserves the
-# loss of the total variation of a slope and doubles the loss of its squared steps. For noise that is independent between
-# pixels, whose steps do not grow, the loss is halved. The factor is between these cases and was not tuned.
+# The next cell checks two steps. For (20.6) it projects a point with the camera and with the half-size camera. For
+# (20.7) it halves the weight, which preserves the loss of the total variation of a slope and doubles the loss of its
+# squared steps. For noise that is independent between pixels, whose steps do not grow, half the weight halves the
+# loss. The factor is between these cases and was not tuned.
 
 # %%
 clip = simulate(SimulatorSettings(width=128, height=96, frames=24))
@@ -324,8 +327,8 @@ assert 0 < work["coarse start"] < 1 and held_out["coarse start"] > held_out["ful
 #
 # ## The reverse pass
 #
-# There is none: the size of the frames and the number of new Gaussians are held fixed. The losses and their reverse
-# passes are the same at both sizes. The pair to check is the loss that $e$ uses.
+# There is no reverse pass: the size of the frames and the number of new Gaussians are held fixed. The losses and their
+# reverse passes are the same at both sizes. The pair to check is the loss that $e$ uses.
 
 # %%
 with one_thread():
@@ -336,8 +339,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. There are 39 000 Gaussians, a budget of 22 000 and 34 densifications. How many does the first one add by (20.1)?
-#    How does the number ever reach the budget?
+# 1. A run has 39 000 Gaussians, a budget of 22 000 and 34 densifications. How many Gaussians does the first one add by
+#    (20.1)? How can the number ever reach the budget?
 # 2. Write `densify` with both kinds of growth and let the golden cases judge it: `--only density` ({doc}`index`).
 # 3. The cell below answers this one. Blur the frames of the clip with a Gaussian of $2$ px. What happens to $d$, and to
 #    the end of the coarse start?

@@ -44,8 +44,9 @@ from endotsr.training.runs.folder import open_run
 # %% [markdown]
 # ## Two windows
 #
-# The recording has 56 frames with breathing, a beat and highlights. Two windows of 32 frames share frames 24 to 31. They
-# are trained twice: both cold, and the second one warm, in 40 %<!--=window.warm--> of the iterations.
+# The recording has 56 frames with breathing, a beat and highlights. Two windows of 32 frames share frames 24 to 31.
+# The pair is trained twice. In the first case both windows start cold. In the second case the later window starts
+# warm, with 40 %<!--=window.warm--> of the iterations.
 
 # %%
 folder = Path(tempfile.mkdtemp())
@@ -78,22 +79,24 @@ print([(window.first, window.end) for window in plan.windows])
 # %% [markdown]
 # ## The blend
 #
-# Window $k+1$ begins with frame $b$, and window $k$ ends before frame $e$. $g$ is the number of a frame of the recording,
-# $\hat I_k(g)$ the render of window $k$ at its time, and $w$ the weight of the later window. At frame $g$ the scene shows
+# Let $g$ be the number of a frame of the recording. Window $k+1$ begins with frame $b$, and window $k$ ends before
+# frame $e$. The render of window $k$ at the time of frame $g$ is $\hat I_k(g)$, and $w$ is the weight of the later
+# window. At frame $g$ the scene shows
 #
 # $$
 # \hat I_{\mathrm{scene}}(g)=\bigl(1-w(g)\bigr)\,\hat I_k(g)+w(g)\,\hat I_{k+1}(g),\qquad w(g)=\frac{g-b}{e-b},\quad b\le g\le e
 # $$
 #
-# **(21.1) The ends.** $w(b)=0$ and $w(e)=1$: at the beginning of the overlap the scene is window $k$ alone, and at its
-# end window $k+1$ alone. Both windows are continuous in time, and so is $w$, so the scene has no jump.
+# **(21.1) The ends.** Since $w(b)=0$ and $w(e)=1$, the scene is window $k$ alone at the beginning of the overlap, and
+# window $k+1$ alone at its end. Both windows are continuous in time, and so is $w$, so the scene has no jump.
 #
-# **(21.2) The largest step.** Let the windows differ by $\delta$ at a pixel, nearly constant over the overlap. A switch
-# of windows between two frames is one step of $\delta$. The blend adds $\delta/(e-b)$ to each frame of the overlap.
+# **(21.2) The largest step.** Let the windows differ by $\delta$ at a pixel, nearly constant over the overlap. A
+# switch from one window to the other between two frames is one step of $\delta$. The blend distributes this step: it
+# adds $\delta/(e-b)$ at each frame of the overlap.
 #
-# **(21.3) The error.** Let the windows have errors $\epsilon,\epsilon'$ of equal variance $\sigma^2$ with the
-# correlation $c$. The blend has $\bigl[(1-w)^2+w^2+2w(1-w)c\bigr]\sigma^2$, which is never above $\sigma^2$, and
-# $\frac{1+c}{2}\sigma^2$ in the middle.
+# **(21.3) The error.** Let the windows have errors of equal variance $\sigma^2$ with the correlation $c$. The error of
+# the blend has the variance $\bigl[(1-w)^2+w^2+2w(1-w)c\bigr]\sigma^2$. This is never above $\sigma^2$, and in the
+# middle of the overlap it is $\frac{1+c}{2}\sigma^2$.
 #
 # <!-- definition: endotsr.studies.windows.scene.blended -->
 # ```python
@@ -154,9 +157,9 @@ assert values[2] > max(values[:2])
 # %% [markdown]
 # ## Interactive figure: the length of the overlap
 #
-# Two windows differ by 6 levels, and their errors are of equal size. Before you move a slider: what is the largest step
-# with an overlap of 12 frames, by (21.2)? How many more windows does the recording need? And what is left of the gain in
-# the middle, (21.3), if the errors of the two windows are equal?
+# Two windows differ by 6 levels, and their errors are of equal size. Before you move a slider: by (21.2), what is the
+# largest step with an overlap of 12 frames? How many more windows does the recording need? And what is left of the
+# gain in the middle, (21.3), if the errors of the two windows are equal?
 #
 # <div class="widget" data-widget="seam">The figure is live in the built book.</div>
 
@@ -172,13 +175,13 @@ assert values[2] > max(values[:2])
 # h_0=h_{0,n}+\tfrac{\beta}{Y_{00}}\tanh\bigl(A_n\bar\phi_n(t^*)\bigr)
 # $$
 #
-# **(21.4) Time is not inherited.** The bases of the FDM and the atoms of $A$ belong to the time of the neighbour. Their
-# values at $t^*$ become part of the canonical Gaussian, and they start from 0.
+# **(21.4) Time is not inherited.** The bases of the FDM and the atoms of $A$ belong to the time of the neighbour.
+# Their values at $t^*$ become part of the canonical Gaussian, and in the new window both start from 0.
 #
-# **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. The subtraction of
-# $C\,\phi(u^*)$ leaves the Gaussian in its place at the join, whatever $C$ is: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
+# **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. For any $C$, the
+# subtraction of $C\,\phi(u^*)$ leaves the Gaussian in its place at the join: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
 #
-# **(21.6) The picture at the join** is therefore the neighbour's.
+# **(21.6) The picture at the join** is therefore that of the neighbour.
 
 # %%
 shift, shared = second.first - first.first, first.end - second.first
@@ -195,9 +198,9 @@ assert not state.gaussians.fdm_weight.any() and state.gaussians.motion_coefficie
 # %% [markdown]
 # ## Figure: the seam, and the saving of the warm start
 #
-# The left panel has the step from one frame to the next across the overlap (grey). The right panel has the loss of the
-# second window from a cold and from a warm start, each smoothed over 20 iterations. Which of the two starts with the lower
-# loss, and does the other one catch up?
+# The left panel shows the step from one frame to the next across the overlap (grey). The right panel shows the loss of
+# the second window from a cold and from a warm start, each smoothed over 20 iterations. Which of the two starts with
+# the lower loss, and does the other one catch up?
 
 # %% tags=["hide-input"]
 losses = {
@@ -236,8 +239,8 @@ print(
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: the blend is not part of any loss, and the inherited state is only the start of a training run.
-# The pair to check is the motion {eq}`eq-3` whose coefficients (21.5) fits.
+# There is no reverse pass: the blend is not part of any loss, and the inherited state is only the start of a training
+# run. The pair to check is that of the motion {eq}`eq-3`, whose coefficients (21.5) fits.
 
 # %%
 with one_thread():
