@@ -89,8 +89,8 @@ def allowed_values(kind: Any) -> str:
         return ", ".join(map(str, arguments))
     if origin in (Union, UnionType):
         return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
-    if origin is tuple:
-        many = "a list" if arguments[-1] is Ellipsis else f"{len(arguments)} values"
+    if origin in (tuple, list):
+        many = "a list" if origin is list or arguments[-1] is Ellipsis else f"{len(arguments)} values"
         return f"{many}, each {allowed_values(arguments[0])}"
     if origin is Annotated:
         limits = [(">", arguments[1].gt), (">=", arguments[1].ge), ("<", arguments[1].lt), ("<=", arguments[1].le)]
