@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+import endotsr
 from endotsr.clips.opencv import write_png
 from endotsr.clips.poses.views import Views, compose, inverse
 from endotsr.clips.sequences.sequence_file import (
@@ -83,6 +84,12 @@ def written(folder, views, depth=True, unit="mm", assumed=""):
         folder,
     )
     return folder
+
+
+def poses_of(folder):
+    """The poses of the sequence in a folder."""
+    found = endotsr.load_sequence(folder, allow_tissue_fraction=True)
+    return [CameraPose(camera.rotation, camera.translation) for camera in found.cameras]
 
 
 def path_error_up_to_scale(poses, true):

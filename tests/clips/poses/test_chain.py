@@ -50,17 +50,10 @@ def test_a_gap_that_is_too_long_is_refused_with_its_frames():
         chained(matcher_of(with_mask(range(2, 11))))
 
 
-@pytest.mark.parametrize("cut", [7, 4])
-def test_what_follows_a_cut_has_no_pose(cut):
-    """Noise after the cut; many frames are refused."""
+def test_noise_after_a_cut_has_no_pose():
     images = VIEWS.images.copy()
-    images[cut:] = np.random.default_rng(0).integers(0, 255, images[cut:].shape, dtype=np.uint8)
-    matcher = matcher_of(VIEWS._replace(images=images))
-    if VIEWS.count - cut > LONGEST_GAP:
-        with pytest.raises(InputError, match="frames 4 to 13 cannot be registered: 10 in a row"):
-            chained(matcher)
-    else:
-        assert chained(matcher).without == list(range(cut, VIEWS.count))
+    images[7:] = np.random.default_rng(0).integers(0, 255, images[7:].shape, dtype=np.uint8)
+    assert chained(matcher_of(VIEWS._replace(images=images))).without == list(range(7, VIEWS.count))
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])
@@ -79,12 +72,6 @@ def test_identical_frames_have_one_pose():
     order = [0, 1, 1, 2]
     found = chained(matcher_of(Views(*(plane[order] for plane in VIEWS[:3]), VIEWS.camera)))
     np.testing.assert_allclose(found.poses[1].translation, found.poses[2].translation, atol=1e-3)
-
-
-def test_two_frames_are_enough_and_one_is_refused():
-    assert len(estimated(Views(*(plane[:2] for plane in VIEWS[:3]), VIEWS.camera)).poses) == 2
-    with pytest.raises(InputError, match="one frame: there is no motion"):
-        estimated(Views(*(plane[:1] for plane in VIEWS[:3]), VIEWS.camera))
 
 
 def test_depth_that_is_not_finite_is_no_depth():

@@ -10,7 +10,15 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from moving_clip import hand_held, moving_views, path_error, path_error_up_to_scale, still_views, written
+from moving_clip import (
+    hand_held,
+    moving_views,
+    path_error,
+    path_error_up_to_scale,
+    poses_of,
+    still_views,
+    written,
+)
 
 import endotsr
 from endotsr.cli.main import main
@@ -46,11 +54,6 @@ def made_up(views, true, without=()):
         pixels.append(at)
         poses.append(None if k in without else CameraPose(relative.rotation, relative.translation / SCALE))
     return Structure(poses, np.concatenate(points), seen, pixels, 0.3, [4])
-
-
-def poses_of(folder):
-    found = endotsr.load_sequence(folder, allow_tissue_fraction=True)
-    return [CameraPose(camera.rotation, camera.translation) for camera in found.cameras]
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.field_of_view import check_field_of_view
 from endotsr.clips.simulator.folder import check_scene, write_sequence
 from endotsr.clips.simulator.scenes import IN_FILES, SCENES, effects_on, named_scene, scene_of
-from endotsr.config import SequenceConfig
+from endotsr.config import SequenceConfig, with_settings
 from endotsr.errors import InputError
 
 SMALL = {"width": 48, "height": 40, "frames": 6, "focal": 1.2}
@@ -23,11 +23,6 @@ EXACT = SequenceConfig(depth_percentiles=(0.0, 100.0))
 
 def small(name):
     return msgspec.structs.replace(named_scene(name), **SMALL)
-
-
-def changed(settings, section, **values):
-    part = msgspec.structs.replace(getattr(settings, section), **values)
-    return msgspec.structs.replace(settings, **{section: part})
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -127,27 +122,27 @@ def test_the_named_scenes_stay_in_the_picture(name):
 def test_what_leaves_the_field_of_view_is_refused_with_the_largest_allowed_value(name, section, key, value):
     settings = small(name)
     with pytest.raises(InputError, match=rf"{section}.{key} = {value:g} leaves .* allowed: at most") as caught:
-        check_field_of_view(changed(settings, section, **{key: value}))
+        check_field_of_view(with_settings(settings, **{section: {key: value}}))
     largest = float(str(caught.value).rsplit(" ", 1)[1])
-    check_field_of_view(changed(settings, section, **{key: largest}))
+    check_field_of_view(with_settings(settings, **{section: {key: largest}}))
     with pytest.raises(InputError):
-        check_field_of_view(changed(settings, section, **{key: largest + 0.02}))
+        check_field_of_view(with_settings(settings, **{section: {key: largest + 0.02}}))
 
 
 def test_what_a_folder_cannot_hold_is_refused():
     still = small("still")
     with pytest.raises(InputError, match=r"depth_rounding.step = 0.5 does not fit .* allowed: 1, 2, 3"):
-        check_scene(changed(still, "depth_rounding", step=0.5))
+        check_scene(with_settings(still, depth_rounding={"step": 0.5}))
     with pytest.raises(InputError, match=r"depth_rounding.on = False"):
         check_scene(with_effects(SimulatorSettings(**SMALL), "stereo"))
     with pytest.raises(InputError, match="without an excluded pixel"):
-        check_scene(changed(still, "stereo", on=False))
+        check_scene(with_settings(still, stereo={"on": False}))
     with pytest.raises(InputError, match=r"allowed: a smaller focal, or smaller pulsation.amplitude"):
-        check_scene(changed(msgspec.structs.replace(small("breathing"), focal=4.0), "pulsation", amplitude=0.1))
+        check_scene(with_settings(small("breathing"), focal=4.0, pulsation={"amplitude": 0.1}))
 
 
 def test_without_stereo_there_is_no_right_picture(tmp_path):
-    settings = changed(small("pulling"), "stereo", on=False)
+    settings = with_settings(small("pulling"), stereo={"on": False})
     write_sequence(tmp_path, settings)
     assert not (tmp_path / "images_right").exists()
     np.testing.assert_array_equal(read_sequence(tmp_path, EXACT).masks, simulate(settings).sequence.masks)

@@ -27,15 +27,6 @@ def test_the_point_at_a_pixel_centre_is_the_stored_one(scene, centres, frame):
     np.testing.assert_allclose(found, scene.truth.material_coordinates[frame][:, rows, columns], atol=1e-9)
 
 
-def test_tracks_begin_at_their_pixels_with_the_true_depth(scene, centres):
-    rows, columns = centres
-    pixel = np.stack([columns + 0.25, rows + 0.75])
-    tracks = material_tracks(scene, material_at(scene, pixel, 2))
-    np.testing.assert_allclose(tracks.pixel[2], pixel, atol=1e-8)
-    centred = material_tracks(scene, material_at(scene, np.stack([columns + 0.5, rows + 0.5]), 2))
-    np.testing.assert_allclose(centred.depth[2], scene.truth.depth[2][rows, columns], atol=1e-8)
-
-
 def test_tracks_follow_the_true_flow(scene, centres):
     rows, columns = centres
     tracks = material_tracks(scene, material_at(scene, np.stack([columns + 0.5, rows + 0.5]), 1))
@@ -62,12 +53,6 @@ def test_a_point_is_visible_where_the_picture_shows_it(scene, centres):
     wound = np.isnan(scene.truth.material_coordinates[3]).any(axis=0)[rows, columns]
     np.testing.assert_array_equal(visible[:-4], ~scene.truth.instrument[3][rows, columns] & ~wound)
     assert not visible[-4:].any() and wound.any() and 0 < visible[:-4].sum() < len(rows)
-
-
-def test_without_motion_nothing_moves():
-    still = simulate(with_effects(SETTINGS))
-    tracks = material_tracks(still, material_at(still, np.array([[5.0, 20.0], [7.0, 30.0]])))
-    assert (tracks.position == tracks.position[:1]).all() and tracks.visible.all()
 
 
 def test_no_points_and_frames_that_do_not_exist(scene):

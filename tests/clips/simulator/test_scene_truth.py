@@ -3,7 +3,6 @@
 import json
 import shutil
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -154,7 +153,3 @@ def test_a_folder_without_truth_is_refused(tmp_path):
     (tmp_path / "truth" / "truth.json").write_text("{")
     with pytest.raises(InputError, match=r"truth.json: cannot be read"):
         read_truth(tmp_path)
-
-
-def test_settings_with_all_effects_return_from_their_record():
-    assert msgspec.convert(msgspec.to_builtins(SETTINGS), SimulatorSettings) == SETTINGS

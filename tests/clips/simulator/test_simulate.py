@@ -4,13 +4,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from endonerf_writer import write_endonerf
-from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.sections import Breathing, Pull
 from endotsr.clips.simulator.slit import parting
 from endotsr.clips.simulator.surface import evaluate, make_surface
-from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
 SMALL = SimulatorSettings(width=48, height=40, frames=6, seed=3)
@@ -173,11 +170,7 @@ def test_motions_start_from_rest():
         assert all(motion.course(0.0) == 0.0 for motion in make_surface(with_effects(SMALL, effect)).motions)
 
 
-def test_equal_seeds_are_bitwise_equal_and_other_seeds_differ(everything):
-    again = simulate(with_effects(SMALL, *EFFECTS))
-    for name in ("images", "masks", "depth"):
-        np.testing.assert_array_equal(getattr(again.sequence, name), getattr(everything.sequence, name))
-    np.testing.assert_array_equal(again.truth.material_coordinates, everything.truth.material_coordinates)
+def test_another_seed_has_another_surface(everything):
     other = simulate(msgspec.structs.replace(with_effects(SMALL, *EFFECTS), seed=4))
     assert (other.truth.depth != everything.truth.depth).mean() > 0.99
 
@@ -214,23 +207,3 @@ def test_blocks_can_be_held_out():
     np.testing.assert_array_equal(sequence.test_index, [10, 11, 12, 13])
     with pytest.raises(InputError, match="no held-out block"):
         simulate(msgspec.structs.replace(STILL, block_length=4))
-
-
-def test_unknown_effects_are_refused():
-    with pytest.raises(InputError, match="effects: unknown: fog; allowed: breathing, "):
-        with_effects(SMALL, "fog")
-
-
-def test_a_simulated_folder_can_be_read_back(tmp_path, everything):
-    write_endonerf(everything.sequence, tmp_path)
-    back = read_sequence(tmp_path, SequenceConfig(depth_percentiles=(0.0, 100.0)))
-    np.testing.assert_array_equal(back.images, everything.sequence.images)
-    np.testing.assert_array_equal(back.masks, everything.sequence.masks)
-    assert np.abs(back.depth - everything.sequence.depth).max() <= 0.5
-    for a, b in zip(back.cameras, everything.sequence.cameras):
-        np.testing.assert_allclose(a.rotation, b.rotation, atol=1e-14)
-        np.testing.assert_allclose(a.translation, b.translation, atol=1e-12)
-
-
-def test_the_demonstration_is_small():
-    assert simulate().sequence.images.shape == (24, 3, 128, 160)
