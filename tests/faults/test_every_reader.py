@@ -29,8 +29,6 @@ FAULTS = {
 TRAIN = ["train", "{sequence}", "--out", "{out}", *SETTINGS]
 READERS = {
     "images/000003.png": TRAIN,
-    "masks/000000.png": TRAIN,
-    "depth/000008.png": TRAIN,
     "poses_bounds.npy": TRAIN,
     "settings.toml": [*TRAIN, "--config", "{sequence}/settings.toml"],
     "SPEC.toml": ["sweep", "{sequence}/SPEC.toml", "--out", "{out}"],
@@ -40,9 +38,6 @@ READERS = {
     "run/sequence.json": ["render", "{run}", "--out", "{out}"],
     "run/checkpoint.npz": ["train", "--calibrate-only", "--out", "{run}"],
 }
-
-SAME_READER = ("masks/000000.png", "depth/000008.png")  # as that of images/
-AS_IMAGES = pytest.mark.faults  # not by default
 
 
 @pytest.fixture
@@ -61,7 +56,7 @@ def place(folder, run):
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("name", [pytest.param(n, marks=AS_IMAGES) if n in SAME_READER else n for n in READERS])
+@pytest.mark.parametrize("name", READERS)
 def test_every_fault_of_every_file_is_one_line(name, fault, place, tmp_path, capfd):
     if (name, fault) == ("settings.toml", "empty"):
         pytest.skip("an empty settings file asks for the preset")

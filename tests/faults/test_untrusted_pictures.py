@@ -94,7 +94,8 @@ def test_written_pictures_pass_unchanged(shape, dtype, tmp_path):
     write_png(tmp_path / "a.png", values)
     data = (tmp_path / "a.png").read_bytes()
     assert pixels_only(data, "a.png") is data or len(pixels_only(data, "a.png")) < len(data)
-    assert np.array_equal(read_png(tmp_path / "a.png"), values)
+    back = read_png(tmp_path / "a.png")
+    assert back.dtype == dtype and back.flags.c_contiguous and np.array_equal(back, values)
 
 
 @pytest.mark.parametrize("parts", [1, 3])

@@ -7,20 +7,45 @@ into `InputError`). Anything else is a finding.
 import io
 import json
 import random
-import sys
+import tempfile
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
-sys.path[:0] = [str(Path(__file__).parent)]
+import cv2
+import msgspec
+import mutate
+import numpy as np
+import recordings
+from PIL import Image
 
-import msgspec  # noqa: E402
-import mutate  # noqa: E402
-import numpy as np  # noqa: E402
-import recordings  # noqa: E402
-
-from endotsr.errors import InputError  # noqa: E402
+from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.poses import cameras_of_rows, read_pose_rows
+from endotsr.clips.sequences.record import record_of
+from endotsr.clips.simulator.settings import SimulatorSettings
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import DEMO, PAPER, SHARP, config_from_dict, config_to_toml, load_config
+from endotsr.errors import InputError
+from endotsr.port.judge.format import read_struct
+from endotsr.port.judge.npy import Refused, read_plain
+from endotsr.port.judge.schemas import SCHEMAS
+from endotsr.results.evaluation.run import about_run
+from endotsr.results.export.times import Times, chosen_times
+from endotsr.results.report.curves import series
+from endotsr.results.report.run_text import facts
+from endotsr.results.views.plan import ViewRequest, check_request, views_of
+from endotsr.studies.sweeps.spec import read_spec
+from endotsr.studies.tradeoff.scenes import read_splats
+from endotsr.training.fitting.checkpoint import load_latest
+from endotsr.training.fitting.state import new_training, save_state, state_from_checkpoint
+from endotsr.training.runs.files import finite
+from endotsr.training.runs.folder import RunFolder
+from endotsr.training.runs.log import RunLog, log_until
+from endotsr.training.runs.model import Model, sequence_fingerprint
+from endotsr.training.runs.records import REPORTED
+from endotsr.training.runs.sources import run_source, start_record
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "golden"
@@ -38,16 +63,12 @@ class Reader(NamedTuple):
 
 
 def _png(pixels: np.ndarray) -> bytes:
-    import cv2
-
     return cv2.imencode(".png", pixels)[1].tobytes()
 
 
 @cache
 def png_seeds() -> list[bytes]:
     """Grey, colour and transparent pictures of 8 and 16 bits, one with a palette and one that is interlaced."""
-    from PIL import Image
-
     rng = np.random.default_rng(0)
     found = [_png(rng.integers(0, 255, shape, np.uint8)) for shape in ((5, 7), (6, 4, 3), (4, 4, 4))]
     found.append(_png(rng.integers(0, 65535, (5, 6), np.uint16)))
@@ -74,8 +95,6 @@ def pose_seeds() -> list[bytes]:
 
 def read_poses(path: Path) -> object:
     """As the layout of EndoNeRF does."""
-    from endotsr.clips.sequences.poses import cameras_of_rows, read_pose_rows
-
     return cameras_of_rows(read_pose_rows(path, 9), 48, 32, path)
 
 
@@ -100,24 +119,10 @@ def ply_seeds() -> list[bytes]:
     return ["\n".join([*head, "end_header\n"]).encode() + body]
 
 
-def read_splats(path: Path) -> object:
-    from endotsr.studies.tradeoff.scenes import read_splats as read
-
-    return read(path)
-
-
 @cache
 def toml_seeds() -> list[bytes]:
     """The settings of two presets."""
-    from endotsr.config import DEMO, SHARP, config_to_toml
-
     return [config_to_toml(config).encode() for config in (DEMO, SHARP)]
-
-
-def read_settings(path: Path) -> object:
-    from endotsr.config import load_config
-
-    return load_config(path)
 
 
 def sweep_seeds() -> list[bytes]:
@@ -138,18 +143,8 @@ configurations."A from base".density.until = 0
     return [text.encode()]
 
 
-def read_sweep(path: Path) -> object:
-    from endotsr.studies.sweeps.spec import read_spec
-
-    return read_spec(path)
-
-
 @cache
 def _tiny():
-    from endotsr.clips.simulator.settings import SimulatorSettings
-    from endotsr.clips.simulator.simulate import simulate
-    from endotsr.config import config_from_dict
-
     settings = SimulatorSettings(width=32, height=24, frames=9)
     points = {"first_frame_points": 6, "other_frame_points": 2}
     config = config_from_dict({"initialisation": points, "training": {"iterations": 2}})
@@ -159,10 +154,6 @@ def _tiny():
 @cache
 def checkpoint_seeds() -> list[bytes]:
     """The checkpoint of an untrained scene of eight Gaussians."""
-    import tempfile
-
-    from endotsr.training.fitting.state import new_training, save_state
-
     _, sequence, config = _tiny()
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "checkpoint.npz"
@@ -172,18 +163,12 @@ def checkpoint_seeds() -> list[bytes]:
 
 def read_checkpoint(path: Path) -> object:
     """As a resumed training does."""
-    from endotsr.config import PAPER
-    from endotsr.training.fitting.checkpoint import load_latest
-    from endotsr.training.fitting.state import state_from_checkpoint
-
     return state_from_checkpoint(load_latest(path)[0], PAPER)
 
 
 @cache
 def sequence_seeds() -> list[bytes]:
     """sequence.json of a static camera, and of one that moves."""
-    from endotsr.clips.sequences.record import record_of
-
     _, sequence, _ = _tiny()
     record = msgspec.to_builtins(record_of(sequence))
     moving = record | {"static_camera": False, "cameras": record["cameras"] * 9}
@@ -192,10 +177,6 @@ def sequence_seeds() -> list[bytes]:
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
-    from endotsr.results.export.times import Times, chosen_times
-    from endotsr.results.views.plan import ViewRequest, check_request, views_of
-    from endotsr.training.runs.folder import RunFolder
-
     folder = RunFolder(path.parent)
     record = folder.sequence_record()
     requests = ViewRequest(Times(frames="all")), ViewRequest(Times(count=3), camera="sway", size="20x20")
@@ -212,24 +193,12 @@ def read_sequence(path: Path) -> object:
 @cache
 def record_seeds() -> list[bytes]:
     """run.json."""
-    from endotsr.config import DEMO
-    from endotsr.training.runs.files import finite
-    from endotsr.training.runs.sources import start_record
-
     settings, sequence, _ = _tiny()
     return [json.dumps(finite(start_record(["endotsr"], "simulated", sequence, DEMO, settings, 2))).encode()]
 
 
 def read_record(path: Path) -> object:
     """As `endotsr evaluate` does."""
-    from endotsr.config import DEMO
-    from endotsr.results.evaluation.run import about_run
-    from endotsr.results.report.run_text import facts
-    from endotsr.training.runs.folder import RunFolder
-    from endotsr.training.runs.model import Model, sequence_fingerprint
-    from endotsr.training.runs.records import REPORTED
-    from endotsr.training.runs.sources import run_source
-
     folder = RunFolder(path.parent)
     record = folder.record(*REPORTED)
     run_source(folder)
@@ -246,9 +215,6 @@ def log_seeds() -> list[bytes]:
 
 def read_log(path: Path) -> object:
     """As the report and a resumed training do."""
-    from endotsr.results.report.curves import series
-    from endotsr.training.runs.log import RunLog, log_until
-
     log = log_until(path, 5)
     found = [series(log, key) for key in ("loss", "l1", "psnr", "seconds")]
     RunLog(path, 5).close()
@@ -256,13 +222,7 @@ def read_log(path: Path) -> object:
 
 
 def golden_json(kind: str) -> Callable[[Path], object]:
-    def read(path: Path) -> object:
-        from endotsr.port.judge.format import read_struct
-        from endotsr.port.judge.schemas import SCHEMAS
-
-        return read_struct(path, SCHEMAS[kind])
-
-    return read
+    return lambda path: read_struct(path, SCHEMAS[kind])
 
 
 @cache
@@ -289,30 +249,16 @@ def request_seeds() -> list[bytes]:
 
 def read_port_output(path: Path) -> object:
     """As the judge reads the outputs of a port."""
-    from endotsr.port.judge.npy import read_plain
-
     return read_plain(path, path.parent)
-
-
-def read_png(path: Path) -> object:
-    from endotsr.clips.opencv import read_png as read
-
-    return read(path)
-
-
-def _refused() -> type[Exception]:
-    from endotsr.port.judge.npy import Refused
-
-    return Refused
 
 
 READERS = {
     "png": Reader("a.png", png_seeds, mutate.png, read_png),
-    "jpg": Reader("a.jpg", recordings.jpeg_seeds, mutate.plain, recordings.read_picture),
+    "jpg": Reader("a.jpg", recordings.jpeg_seeds, mutate.plain, read_picture),
     "tiff": Reader("a.tiff", recordings.tiff_seeds, mutate.plain, recordings.read_depth),
-    "tiff (colour)": Reader("a.tiff", recordings.colour_tiff_seeds, mutate.plain, recordings.read_picture),
-    "webp": Reader("a.webp", recordings.webp_seeds, mutate.plain, recordings.read_picture),
-    "bmp": Reader("a.bmp", recordings.bmp_seeds, mutate.plain, recordings.read_picture),
+    "tiff (colour)": Reader("a.tiff", recordings.colour_tiff_seeds, mutate.plain, read_picture),
+    "webp": Reader("a.webp", recordings.webp_seeds, mutate.plain, read_picture),
+    "bmp": Reader("a.bmp", recordings.bmp_seeds, mutate.plain, read_picture),
     "pfm": Reader("a.pfm", recordings.pfm_seeds, mutate.plain, recordings.read_depth),
     "depth (npy)": Reader("a.npy", pose_seeds, mutate.npy, recordings.read_depth),
     "video (mp4)": Reader("a.mp4", recordings.video_seeds, mutate.plain, recordings.read_video),
@@ -336,8 +282,8 @@ READERS = {
     "poses (npy)": Reader("poses_bounds.npy", pose_seeds, mutate.npy, read_poses),
     "splats (npz)": Reader("a.npz", scene_seeds, mutate.npz, read_splats),
     "splats (ply)": Reader("a.ply", ply_seeds, mutate.ply, read_splats),
-    "settings (toml)": Reader("config.toml", toml_seeds, mutate.lines, read_settings),
-    "sweep (toml)": Reader("SPEC.toml", sweep_seeds, mutate.lines, read_sweep),
+    "settings (toml)": Reader("config.toml", toml_seeds, mutate.lines, load_config),
+    "sweep (toml)": Reader("SPEC.toml", sweep_seeds, mutate.lines, read_spec),
     "checkpoint": Reader("checkpoint.npz", checkpoint_seeds, mutate.checkpoint, read_checkpoint),
     "run.json": Reader("run.json", record_seeds, mutate.tree, read_record),
     "sequence.json": Reader("sequence.json", sequence_seeds, mutate.tree, read_sequence),
@@ -349,5 +295,5 @@ READERS = {
     "request to a port": Reader(
         "request.json", request_seeds, mutate.tree, golden_json("request"), (InputError, msgspec.DecodeError)
     ),
-    "output of a port (npy)": Reader("a.npy", pose_seeds, mutate.npy, read_port_output, (_refused(),)),
+    "output of a port (npy)": Reader("a.npy", pose_seeds, mutate.npy, read_port_output, (Refused,)),
 }

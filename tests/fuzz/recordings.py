@@ -2,17 +2,35 @@
 
 import io
 import struct
+import tempfile
 from functools import cache
 from pathlib import Path
 
+import common_folder
+import cv2
+import field_inputs
+import made_videos
 import numpy as np
+import raw_sources
+from PIL import Image
+from scipy.io import savemat
+
+from endotsr.clips.sequences.calibrations import calibrated
+from endotsr.clips.sequences.colmap_model import read_model
+from endotsr.clips.sequences.depth_files import depth_plane, read_plane
+from endotsr.clips.sequences.film_file import write_video
+from endotsr.clips.sequences.layouts import points, tum
+from endotsr.clips.sequences.sequence_file import read_poses
+from endotsr.clips.sequences.sequence_file import read_sequence_file as read_file
+from endotsr.clips.sequences.time_lists import nanosecond_list, picture_times
+from endotsr.clips.sequences.trajectory import filled, poses_of_frames
+from endotsr.clips.sequences.trajectory import read_trajectory as read_poses_of
+from endotsr.clips.sequences.video_file import video_facts, video_pictures
 
 
 @cache
 def jpeg_seeds() -> list[bytes]:
     """Colour and grey pictures of two qualities, one of them progressive."""
-    import cv2
-
     rng = np.random.default_rng(0)
     colour, grey = rng.integers(0, 255, (17, 23, 3), np.uint8), rng.integers(0, 255, (16, 9), np.uint8)
     ways = ((colour, [cv2.IMWRITE_JPEG_QUALITY, 90]), (grey, []), (colour, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]))
@@ -22,8 +40,6 @@ def jpeg_seeds() -> list[bytes]:
 @cache
 def tiff_seeds() -> list[bytes]:
     """Planes of 8 and 16 bits and of real numbers."""
-    import cv2
-
     planes = [np.arange(63, dtype=kind).reshape(7, 9) for kind in (np.uint8, np.uint16, np.float32)]
     return [cv2.imencode(".tiff", plane)[1].tobytes() for plane in planes]
 
@@ -48,8 +64,6 @@ def colour_tiff_seeds() -> list[bytes]:
 
 
 def _by_pillow(kind: str, **how: object) -> list[bytes]:
-    from PIL import Image
-
     picture, found = Image.fromarray(np.random.default_rng(0).integers(0, 255, (9, 13, 3), np.uint8)), []
     for mode in ("RGB", "L", "P"):
         out = io.BytesIO()
@@ -65,10 +79,6 @@ def pfm_seeds() -> list[bytes]:
 @cache
 def video_seeds() -> list[bytes]:
     """Three pictures as .mp4, without loss and with."""
-    import tempfile
-
-    from endotsr.clips.sequences.film_file import write_video
-
     pictures = list(np.random.default_rng(0).integers(0, 255, (3, 16, 24, 3), np.uint8))
     with tempfile.TemporaryDirectory() as scratch:
         files = [Path(scratch) / name for name in ("a.mp4", "b.mp4")]
@@ -80,102 +90,45 @@ def video_seeds() -> list[bytes]:
 @cache
 def stream_seeds(ending: str) -> list[bytes]:
     """Three pictures as .avi, .ts, .mpg or .mkv, in two codecs."""
-    import tempfile
-
-    import av
-
     pictures = np.random.default_rng(0).integers(0, 255, (3, 32, 48, 3), np.uint8)
     codecs = {"avi": ("mjpeg", "mpeg4"), "mkv": ("ffv1", "libx264")}.get(ending, ("mpeg2video", "mpeg1video"))
     found = []
     with tempfile.TemporaryDirectory() as scratch:
         for codec in codecs:
-            file = Path(scratch) / f"{codec}.{ending}"
-            with av.open(str(file), "w") as container:
-                stream = container.add_stream(codec, rate=25)
-                stream.width, stream.height = 48, 32
-                stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
-                for pixels in pictures:
-                    container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
-                container.mux(stream.encode())
+            layout = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+            file = made_videos.write(Path(scratch) / f"{codec}.{ending}", list(pictures), codec, layout=layout)
             found.append(file.read_bytes())
     return found
 
 
 def read_video(path: Path) -> object:
     """As `prepare` does, of at most three pictures."""
-    from endotsr.clips.sequences.video_file import video_facts, video_pictures
-
     return list(video_pictures(path, list(range(min(video_facts(path).count, 3)))))
 
 
 def read_depth(path: Path) -> object:
-    from endotsr.clips.sequences.depth_files import depth_plane, read_plane
-
     return depth_plane(read_plane(path), 0.1, path)
 
 
-def read_picture(path: Path) -> object:
-    from endotsr.clips.opencv.pictures import read_picture as read
-
-    return read(path)
-
-
+@cache
 def sequence_file_seeds() -> list[bytes]:
     """sequence.toml with everything that it can hold."""
-    row = "[1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0]"
-    text = f"""format = "endotsr-sequence-1"
-source = "a clip"
-frames = 2
-unit = "mm"
-frame_rate = 25.0
-
-[camera]
-width = 48
-height = 32
-fx = 40.0
-fy = 41.0
-cx = 24.0
-cy = 16.0
-distortion = []
-baseline = 4.2
-
-[masks]
-folder = "masks"
-excluded_value = "white"
-proposed = false
-
-[depth]
-folder = "depth"
-unit = "mm"
-scale = 0.1
-method = "given"
-
-[poses]
-direction = "camera_to_world"
-axes = "opengl"
-matrices = [{row}, {row}]
-"""
-    return [text.encode()]
+    with tempfile.TemporaryDirectory() as scratch:
+        common_folder.written(Path(scratch), poses=common_folder.moving(), frame_rate=25.0, source="a clip")
+        return [(Path(scratch) / "sequence.toml").read_bytes()]
 
 
 def read_sequence_file(path: Path) -> object:
-    from endotsr.clips.sequences.sequence_file import read_poses
-    from endotsr.clips.sequences.sequence_file import read_sequence_file as read
-
-    found = read(path.parent)
+    found = read_file(path.parent)
     return found.camera.intrinsics(path), read_poses(found, path)
 
 
 def rig_seeds() -> list[bytes]:
     """A stereo calibration."""
-    lens = ["res_x=64", "res_y=48", "fc_x=60.5", "fc_y=61", "cc_x=32", "cc_y=24", *(f"kc_{k}=0.01" for k in range(8))]
-    turn = [f"R_{k}={int(k % 4 == 0)}" for k in range(9)] + ["T_0=-4.2", "T_1=0", "T_2=0.1"]
-    return ["\n".join(["[StereoLeft]", *lens, "", "[StereoRight]", *lens, *turn, ""]).replace("=", " = ").encode()]
+    return [raw_sources.ini((0.01,) * 8, (0.01,) * 8, translation=(-4.2, 0.0, 0.1)).encode()]
 
 
 def read_rig(path: Path) -> object:
-    from endotsr.clips.sequences.calibrations import calibrated
-
     return calibrated(path, 64, 48)
 
 
@@ -186,25 +139,16 @@ def trajectory_seeds() -> list[bytes]:
 
 
 def read_trajectory(path: Path) -> object:
-    from endotsr.clips.sequences.trajectory import filled, poses_of_frames
-    from endotsr.clips.sequences.trajectory import read_trajectory as read
-
-    poses = poses_of_frames(read(path, "m", axes="opengl"), 4, 25.0)[0]
+    poses = poses_of_frames(read_poses_of(path, "m", axes="opengl"), 4, 25.0)[0]
     return filled(poses) if any(pose is not None for pose in poses) else poses
 
 
 @cache
 def matlab_seeds() -> list[bytes]:
     """One camera and two of MATLAB, and the variables of Bouguet's toolbox; packed and not."""
-    from scipy.io import savemat
-
-    matrix = np.array([[60.0, 0, 0], [0, 61, 0], [32, 24, 1]])
-    camera = {"IntrinsicMatrix": matrix, "RadialDistortion": [[0.1, 0.01]], "ImageSize": [[48, 64]]}
-    pair = {"CameraParameters1": camera, "CameraParameters2": camera, "RotationOfCamera2": np.eye(3),
-            "TranslationOfCamera2": [[-4.2, 0, 0.1]], "WorldUnits": "mm"}  # fmt: skip
-    bouguet = {"fc": [[60.0], [61.0]], "cc": [[32.0], [24.0]], "kc": np.zeros((5, 1)), "nx": 64.0, "ny": 48.0}
+    camera, pair = {"cameraParams": field_inputs.MAT_CAMERA}, {"stereoParams": field_inputs.MAT_PAIR}
     found = []
-    for variables in ({"cameraParams": camera}, {"stereoParams": pair}, bouguet):
+    for variables in (camera, pair, field_inputs.TOOLBOX):
         for packed in (False, True):
             out = io.BytesIO()
             savemat(out, variables, do_compression=packed)
@@ -215,8 +159,6 @@ def matlab_seeds() -> list[bytes]:
 @cache
 def matlab_depth_seeds() -> list[bytes]:
     """A frame in real and in whole numbers."""
-    from scipy.io import savemat
-
     found = []
     for kind in (np.float32, np.uint16):
         out = io.BytesIO()
@@ -240,8 +182,6 @@ def times_seeds() -> list[bytes]:
 
 def read_times(path: Path) -> object:
     """As a folder of four pictures does; times that are used ascend and are finite."""
-    from endotsr.clips.sequences.time_lists import picture_times
-
     found = picture_times([path.parent], [path.parent / f"{k:04d}.png" for k in range(4)], None)
     assert found.notes and not any(set(note) & set("\n\r\x1b") for note in found.notes), found.notes
     seconds = found.seconds
@@ -254,9 +194,7 @@ def list_seeds() -> list[bytes]:
 
 
 def read_list(path: Path) -> object:
-    from endotsr.clips.sequences.layouts.tum import read_list as read
-
-    found = read(path)
+    found = tum.read_list(path)
     assert all(file.resolve().is_relative_to(path.parent.resolve()) for file in found[1])
     return found
 
@@ -268,8 +206,6 @@ def rows_seeds() -> list[bytes]:
 
 
 def read_rows(path: Path) -> object:
-    from endotsr.clips.sequences.time_lists import nanosecond_list
-
     found = nanosecond_list(path, path.parent, [])
     assert all(row.file.resolve().is_relative_to(path.parent.resolve()) for row in found)
     return found
@@ -289,8 +225,6 @@ def colmap_seeds() -> list[bytes]:
 
 def read_colmap(path: Path) -> object:
     """The three files apart; what is missing is empty."""
-    from endotsr.clips.sequences.colmap_model import read_model
-
     parts = path.read_bytes().split(b"----\n")[:3]
     for name, part in zip(("cameras", "images", "points3D"), [*parts, b"", b""]):
         (path.parent / f"{name}.txt").write_bytes(part)
@@ -308,8 +242,6 @@ def colmap_binary_seeds() -> list[bytes]:
 
 
 def read_colmap_binary(path: Path) -> object:
-    from endotsr.clips.sequences.colmap_model import read_model
-
     data = path.read_bytes()
     for name in ("cameras", "images", "points3D"):
         length = int.from_bytes(data[:4], "little")
@@ -328,6 +260,4 @@ def points_seeds() -> list[bytes]:
 
 
 def read_points(path: Path) -> object:
-    from endotsr.clips.sequences.layouts.points import read_cameras
-
-    return read_cameras(path, [path.parent / "0.png", path.parent / "1.png"])
+    return points.read_cameras(path, [path.parent / "0.png", path.parent / "1.png"])
