@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import public_layouts
 import raw_sources
-from input_kinds import Row, common, each, files, half_excluded, mask, masked, prepare, public
-from left_inputs import colmap
-from made_videos import HEIGHT, WIDTH, pictures
+from input_kinds import Row, calibrated, colmap, common, each, half_excluded, mask, masked, public, raw, trajectory
+from made_videos import HEIGHT, WIDTH
 
 from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
@@ -48,31 +47,8 @@ def in_both_forms(raw: Path) -> None:
     (raw / "sparse/0/images.txt").unlink()
 
 
-def tum_with_associations(folder: Path) -> list[str]:
-    raw_sources.tum(folder / "raw")
-    (folder / "raw/associations.txt").write_text("100.0 rgb/0.png 100.043 depth/1.png\n")
-    return prepare("raw", camera=("--camera", "60", "61", "30", "25"))(folder)
-
-
-def kitti_odometry(folder: Path) -> list[str]:
-    (folder / "raw").mkdir()
-    for name in ("image_2", "image_3"):
-        files(folder / "raw", name, pictures())
-    (folder / "raw/calib.txt").write_text(KITTI)
-    return prepare("raw", "--calibration", str(folder / "raw/calib.txt"), camera=())(folder)
-
-
-def few_poses(*words: str):
-    """Poses of four of twelve frames, as the key frames of ORB-SLAM."""
-
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", pictures())
-        lines = [f"{k / 25:.6f} {k / 1000} 0 0 0 0 0 1" for k in (0, 3, 7, 11)]
-        (folder / "KeyFrameTrajectory.txt").write_text("\n".join(lines))
-        given = ["--trajectory", str(folder / "KeyFrameTrajectory.txt"), "--source-rate", "25"]
-        return prepare("clip", *given, *words)(folder)
-
-    return make
+def with_associations(folder: Path) -> None:
+    (folder / "associations.txt").write_text("100.0 rgb/0.png 100.043 depth/1.png\n")
 
 
 def three_labels() -> np.ndarray:
@@ -82,6 +58,8 @@ def three_labels() -> np.ndarray:
     return plane
 
 
+# Poses of four of twelve frames, as the key frames of ORB-SLAM.
+KEY_FRAMES = [f"{k / 25:.6f} {k / 1000} 0 0 0 0 0 1" for k in (0, 3, 7, 11)]
 CARELESS_ROWS = [
     Row("masks, numbers of objects, one of them small", masked([labels(4)] * 12), "refused",
         "nonzero the numbers of several objects"),
@@ -97,9 +75,13 @@ CARELESS_ROWS = [
         scaled_depth(1.0)),
     Row("COLMAP, images in the binary form alone", colmap(change=in_both_forms), "refused",
         "images.txt: file not found"),
-    Row("TUM, associations", tum_with_associations, "told",
+    Row("TUM, associations", raw(raw_sources.tum, change=with_associations,
+        camera=("--camera", "60", "61", "30", "25")), "told",
         "associations.txt: not read; pictures, depth and poses are paired by their times"),
-    Row("KITTI, image_2 and image_3", kitti_odometry, "told", "P0 and P1 are read"),
-    Row("trajectory of key frames", few_poses(), "refused", "8 of 12 frames have no pose"),
-    Row("trajectory of key frames, --gaps fill", few_poses("--gaps", "fill"), "told", "poses are interpolated"),
+    Row("KITTI, image_2 and image_3", calibrated("calib.txt", KITTI, folders=("image_2", "image_3")), "told",
+        "P0 and P1 are read"),
+    Row("trajectory of key frames", trajectory(KEY_FRAMES, "--source-rate", "25"), "refused",
+        "8 of 12 frames have no pose"),
+    Row("trajectory of key frames, --gaps fill", trajectory(KEY_FRAMES, "--source-rate", "25", "--gaps", "fill"),
+        "told", "poses are interpolated"),
 ]  # fmt: skip

@@ -6,17 +6,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+import public_layouts
+import raw_sources
 from common_folder import written
-from made_videos import CAMERA, HEIGHT, WIDTH, picture, pictures, write
-from raw_sources import colmap, stereomis
+from made_videos import CAMERA, HEIGHT, WIDTH, pictures, write
+from test_calibrations import K, kalibr, ros
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.pictures import write_jpeg
-from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
+from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 
 class Row(NamedTuple):
@@ -49,6 +53,14 @@ def close(frames, tolerance=10.0):
     return check
 
 
+def both(*checks):
+    return lambda folder: all(check(folder) for check in checks)
+
+
+def rated(rate: float):
+    return lambda folder: np.isclose(read_sequence_file(folder / "o").frame_rate, rate, rtol=1e-2)
+
+
 def timed(milliseconds):
     """The written times are these."""
     return lambda folder: np.allclose(
@@ -62,6 +74,24 @@ def size(width, height):
     def check(folder: Path) -> bool:
         camera, seen = read_sequence_file(folder / "o").camera, read_png(folder / "o/images/000000.png")
         return (camera.width, camera.height) == (width, height) == (seen.shape[1], seen.shape[0])
+
+    return check
+
+
+def baseline(millimetres: float):
+    return lambda folder: np.isclose(read_sequence_file(folder / "o").camera.baseline, millimetres, atol=1e-4)
+
+
+def sides(left, right, tolerance=12.0):
+    """The written pairs are these."""
+
+    def check(folder: Path) -> bool:
+        clip = describe(folder / "o")
+        return clip.count == len(left) == len(right) and all(
+            np.abs(pair.left.astype(int) - one).mean() <= tolerance
+            and np.abs(pair.right.astype(int) - other).mean() <= tolerance
+            for pair, one, other in zip(clip.pictures(list(range(clip.count))), left, right)
+        )
 
     return check
 
@@ -93,18 +123,10 @@ def cut(part: float, whole=None):
     return change
 
 
-def scratched(path: Path) -> None:
-    """Bytes in the middle of the pictures are overwritten."""
-    data = bytearray(path.read_bytes())
-    middle = len(data) // 2
-    data[middle : middle + 4000] = np.random.default_rng(0).integers(0, 256, 4000).astype(np.uint8).tobytes()
-    path.write_bytes(data)
-
-
-def files(folder: Path, name: str, frames, ending="png", start=0) -> None:
-    (folder / name).mkdir()
+def files(folder: Path, name: str, frames, ending="png") -> None:
+    (folder / name).mkdir(parents=True)
     for i, frame in enumerate(frames):
-        path = folder / name / f"{i + start:04d}.{ending}"
+        path = folder / name / f"{i:04d}.{ending}"
         write_png(path, frame) if ending == "png" else write_jpeg(path, frame)
 
 
@@ -113,6 +135,38 @@ def folder_of(frames, *words: str, ending="png", change=lambda folder: None):
         files(folder, "clip", frames, ending)
         change(folder)
         return prepare("clip", *words)(folder)
+
+    return make
+
+
+def pair(*words: str, names=("left", "right"), frames=None, change=lambda clip: None):
+    """The pictures of two cameras in two folders."""
+
+    def make(folder: Path) -> list[str]:
+        for name, shown in zip(names, frames or (pictures(), pictures())):
+            files(folder / "clip", name, shown)
+        change(folder / "clip")
+        return prepare("clip", "--baseline", "4", *words)(folder)
+
+    return make
+
+
+def named(name, frames=None):
+    """The pictures under other names, by their number."""
+
+    def change(folder: Path) -> None:
+        for k, file in enumerate(sorted((folder / "clip").iterdir())):
+            file.rename(file.with_name(name(k)))
+
+    return folder_of(frames or pictures(), change=change)
+
+
+def trajectory(lines: list[str] | bytes, *words: str):
+    """Pictures with a trajectory in a text file."""
+
+    def make(folder: Path) -> list[str]:
+        (folder / "t.txt").write_bytes(lines if isinstance(lines, bytes) else "\n".join(lines).encode())
+        return folder_of(pictures(), "--trajectory", str(folder / "t.txt"), *words)(folder)
 
     return make
 
@@ -136,50 +190,46 @@ def mask(value=255):
     return plane
 
 
-def united_masks(folder: Path) -> list[str]:
-    """Two sets of masks, each of which excludes a part of what both do."""
-    parts = [mask(), mask()]
-    parts[0][:, 20:], parts[1][:, :20] = 0, 0
-    for name, part in zip("ab", parts):
-        files(folder, name, [part] * 12)
-    words = folder_of(pictures())(folder)
-    return [*words, "--masks", str(folder / "a"), "--unite-masks", str(folder / "b")]
-
-
 def half_excluded(folder: Path) -> bool:
     return abs((read_png(folder / "o/masks/000003.png") > 0).mean() - 40 / WIDTH) < 0.01
 
 
-def rewritten(folder: Path, change, ending="png", **how) -> None:
+def rewritten(folder: Path, change=lambda opened: opened, ending="png", **how) -> None:
     """Every picture of a folder again, changed by Pillow."""
-    from PIL import Image
-
-    for k, file in enumerate(sorted(folder.iterdir())):
+    for file in sorted(folder.iterdir()):
         with Image.open(file) as opened:
-            made = change(opened.copy(), k)
+            made = change(opened.copy())
         file.unlink()
         made.save(file.with_suffix(f".{ending}"), **how)
+
+
+def converted(ending: str, change=lambda opened: opened, **how):
+    return lambda folder: rewritten(folder / "clip", change, ending, **how)
+
+
+def exif(orientation: int = 1, space: int = 1) -> bytes:
+    made = Image.Exif()
+    made[0x0112] = orientation
+    made.get_ifd(0x8769)[0xA001] = space
+    return made.tobytes()
 
 
 def transparent(columns: int):
     """The first columns of the pictures are transparent."""
 
-    def changed(opened, _):
-        from PIL import Image
-
+    def changed(opened):
         alpha = np.full(opened.size[::-1], 255, np.uint8)
         alpha[:, :columns] = 0
         opened.putalpha(Image.fromarray(alpha))
         return opened
 
-    return lambda folder: rewritten(folder / "clip", changed)
+    return converted("png", changed)
 
 
 def as_transparency(folder: Path) -> None:
     """Masks as drawing programs write them: black, and transparent where nothing is marked."""
-    from PIL import Image
 
-    def changed(opened, _):
+    def changed(opened):
         black = Image.new("RGB", opened.size)
         black.putalpha(opened)
         return black
@@ -187,21 +237,18 @@ def as_transparency(folder: Path) -> None:
     rewritten(folder, changed)
 
 
-def palette(folder: Path) -> None:
-    rewritten(folder / "clip", lambda opened, _: opened.quantize(256))
+def labels(*colour: int):
+    """Masks with a palette in which 1 has this colour, as tools that annotate instruments store them."""
 
+    def changed(opened):
+        made = opened.point(lambda value: value // 255).convert("P")
+        made.putpalette([0, 0, 0, *colour])
+        return made
 
-def cmyk(folder: Path) -> None:
-    rewritten(folder / "clip", lambda opened, _: opened.convert("CMYK"), "jpg", quality=95)
-
-
-def converted(ending: str, **how):
-    return lambda folder: rewritten(folder / "clip", lambda opened, _: opened, ending, **how)
+    return lambda folder: rewritten(folder, changed)
 
 
 def blank():
-    from PIL import Image
-
     return Image.new("RGB", (WIDTH, HEIGHT))
 
 
@@ -210,8 +257,7 @@ def shortened(ending: str):
 
     def change(folder: Path) -> None:
         converted(ending)(folder)
-        file = folder / f"clip/0003.{ending}"
-        file.write_bytes(file.read_bytes()[: int(0.95 * file.stat().st_size)])
+        cut(0.95)(folder / f"clip/0003.{ending}")
 
     return change
 
@@ -223,67 +269,22 @@ def every_second_jpg(folder: Path) -> None:
         write_jpeg(file.with_suffix(".jpg"), pixels)
 
 
-def without_zeros(folder: Path) -> None:
-    for file in sorted((folder / "clip").iterdir()):
-        file.rename(file.with_name(f"{int(file.stem)}.png"))
-
-
-def two_streams(folder: Path) -> list[str]:
-    """Two views as two streams of one file."""
-    import av
-
-    with av.open(str(folder / "a.mkv"), "w") as container:
-        streams = [container.add_stream("libx264", rate=25) for _ in range(2)]
-        for stream in streams:
-            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-        for shown in pictures():
-            for k, stream in enumerate(streams):
-                moved = np.roll(shown, -20 * k, axis=1)
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(moved, format="rgb24")))
-        for stream in streams:
-            container.mux(stream.encode())
-    return prepare("a.mkv")(folder)
-
-
-def high_definition(tagged: bool):
-    """Pictures of 1280x720 with the matrix of BT.709, which the file states or not."""
-
+def depth(values, *words, name="depth", kind="npy"):
     def make(folder: Path) -> list[str]:
-        import av
-
-        with av.open(str(folder / "a.mp4"), "w") as container:
-            stream = container.add_stream("libx264", rate=25, options={"qp": "4"})
-            stream.width, stream.height, stream.pix_fmt = 1280, 720, "yuv420p"
-            if tagged:
-                stream.codec_context.colorspace = 1
-            for i in range(3):
-                frame = av.VideoFrame.from_ndarray(picture(i, 1280, 720), format="rgb24")
-                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
-                frame.pts = i
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode())
-        return prepare("a.mp4")(folder)
+        return [*with_depth(folder, values, name, kind), *words]
 
     return make
 
 
-def exif(folder: Path) -> None:
-    from PIL import Image
+def depth_files(save, ending: str, *words: str):
+    """True depth in files of another kind; `save` gets the path and the plane of a frame."""
 
-    for file in (folder / "clip").iterdir():
-        with Image.open(file) as opened:
-            data = opened.getexif()
-            data[0x0112] = 6
-            opened.save(file, exif=data, quality=95)
-
-
-def renamed(folder: Path) -> None:
-    (folder / "clip/0005.png").rename(folder / "clip/0105.png")
-
-
-def depth(values, *words, name="depth", kind="npy"):
     def make(folder: Path) -> list[str]:
-        return [*with_depth(folder, values, name, kind), *words]
+        found = with_depth(folder, true_depth)
+        for i, file in enumerate(sorted((folder / "depth").iterdir())):
+            file.unlink()
+            save(file.with_suffix(ending), true_depth(i))
+        return [*found, *words]
 
     return make
 
@@ -295,31 +296,25 @@ def depth_is_true(folder: Path) -> bool:
     )
 
 
-def one_camera(values, *words, points=0):
-    """A clip from one camera with the files of a network, and true depth at some points beside it."""
+def raw(write_raw, *words: str, change=lambda folder: None, camera=()):
+    """A folder of another program in raw/, changed."""
 
     def make(folder: Path) -> list[str]:
-        import test_relative_depth as one
-
-        where, given = one.clip(folder, values)
-        if points:
-            one.sparse(where, points)
-        return ["depth", str(where), "--given", str(given), "--kind", "relative", *words]
-
-    return make
-
-
-def public(layout: str, *words: str, change=lambda raw: None, **how):
-    """A public layout; see `public_layouts`."""
-
-    def make(folder: Path) -> list[str]:
-        import public_layouts
-
-        getattr(public_layouts, layout)(folder / "raw", **how)
+        write_raw(folder / "raw")
         change(folder / "raw")
-        return prepare("raw", *words, camera=())(folder)
+        return prepare("raw", *words, camera=camera)(folder)
 
     return make
+
+
+def public(layout: str, *words: str, change=lambda folder: None, **how):
+    """A public layout; see `public_layouts`."""
+    return raw(lambda folder: getattr(public_layouts, layout)(folder, **how), *words, change=change)
+
+
+def colmap(*words: str, binary: bool = False, frames: int = 6, change=lambda folder: None):
+    """A COLMAP model."""
+    return raw(lambda folder: raw_sources.colmap(folder, binary, frames), *words, change=change)
 
 
 def centred(folder: Path) -> bool:
@@ -328,26 +323,23 @@ def centred(folder: Path) -> bool:
     return abs(camera.cx - WIDTH / 2) < 1e-3 and abs(camera.cy - HEIGHT / 2) < 1e-3
 
 
-def calibrated(name: str, text: Callable[[], str], *words: str):
-    """Pictures with a calibration of another program."""
+def calibrated(name: str, text: str, *words: str, folders=()):
+    """Pictures in clip/, or in these folders of it, with a calibration of another program."""
 
     def make(folder: Path) -> list[str]:
-        files(folder, "clip", pictures())
-        (folder / name).write_text(text())
+        for place in folders or (".",):
+            files(folder / "clip", place, pictures())
+        (folder / name).write_text(text)
         return prepare("clip", "--calibration", str(folder / name), *words, camera=())(folder)
 
     return make
 
 
 def ros_text(**changes) -> str:
-    from test_calibrations import K, ros
-
     return ros(K, [0.0] * 5, **changes)
 
 
 def kalibr_text(**changes) -> str:
-    from test_calibrations import kalibr
-
     return kalibr(pair=False, distortion_coeffs=[0.0] * 4, **changes)
 
 
@@ -362,17 +354,26 @@ camera_matrix: !!opencv-matrix
 """
 
 
-def common(*words: str, command="check", **changes):
+def common(*words: str, command="check", change=lambda clip: None, **changes):
     """A folder in the common format."""
 
     def make(folder: Path) -> list[str]:
-        change = changes.pop("change", None)
         written(folder / "clip", **changes)
-        if change:
-            change(folder / "clip")
+        change(folder / "clip")
         return [command, str(folder / "clip"), *words]
 
     return make
+
+
+def with_files(*names: str):
+    """Further files in a folder."""
+
+    def change(folder: Path) -> None:
+        for name in names:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text("1")
+
+    return change
 
 
 def each(name, change):
@@ -381,74 +382,3 @@ def each(name, change):
             write_png(file, change(read_png(file)))
 
     return done
-
-
-def text(old, new):
-    return lambda clip: (clip / FILE_NAME).write_text((clip / FILE_NAME).read_text().replace(old, new))
-
-
-def frozen(clip: Path) -> None:
-    first = read_png(clip / "images/000000.png")
-    each("images", lambda x: first)(clip)
-
-
-def stereomis_folder(*words, change=lambda raw: None):
-    def make(folder: Path) -> list[str]:
-        stereomis(folder / "raw")
-        change(folder / "raw")
-        return prepare("raw", *words, camera=())(folder)
-
-    return make
-
-
-def colmap_folder(*words):
-    def make(folder: Path) -> list[str]:
-        colmap(folder / "raw", False)
-        return prepare("raw", *words, camera=())(folder)
-
-    return make
-
-
-def scope(folder: Path) -> list[str]:
-    """A round field of view with an instrument, as a video."""
-    from test_propose_masks import scene, through_a_scope
-
-    write(folder / "a.mp4", through_a_scope(scene("pulling")[0])[0], options={"crf": "20"})
-    return ["masks", str(folder / "a.mp4"), "--out", str(folder / "o")]
-
-
-def view_is_kept(folder: Path) -> bool:
-    return all(0.3 < (read_png(file) > 0).mean() < 0.8 for file in (folder / "o/masks").iterdir())
-
-
-def exported(name: str, *words: str):
-    def make(folder: Path) -> list[str]:
-        sys.path.insert(0, str(Path(__file__).parents[2] / "results" / "export"))
-        from made_up_model import moving_scene
-
-        from endotsr.results.export.files import export
-
-        export(moving_scene(), folder / "a.npz")
-        return ["export", str(folder / "a.npz"), "--out", str(folder / name), *words]
-
-    return make
-
-
-def text_file(name: str, content: bytes):
-    def make(folder: Path) -> list[str]:
-        (folder / name).write_bytes(content)
-        return prepare(name)(folder)
-
-    return make
-
-
-def joined(folder: Path) -> list[str]:
-    """A transport stream whose pictures change their size in the middle."""
-    small = [picture(i, 96, 64) for i in range(6)]
-    parts = [write(folder / f"{k}.ts", frames, "mpeg2video") for k, frames in enumerate((pictures(6), small))]
-    (folder / "a.ts").write_bytes(b"".join(part.read_bytes() for part in parts))
-    return prepare("a.ts")(folder)
-
-
-def trailing(count):
-    return lambda folder: read_sequence_file(folder / "o").frames == count

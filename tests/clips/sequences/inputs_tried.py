@@ -15,9 +15,11 @@ import tempfile
 from fractions import Fraction
 from pathlib import Path
 
+import av
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+import test_relative_depth as one_view
 from careless_inputs import CARELESS_ROWS
 from input_kinds import (
     MATRIX,
@@ -25,13 +27,14 @@ from input_kinds import (
     Outcome,
     Row,
     as_transparency,
+    baseline,
     blank,
+    both,
     calibrated,
     centred,
     close,
-    cmyk,
     codec,
-    colmap_folder,
+    colmap,
     common,
     converted,
     cut,
@@ -40,50 +43,43 @@ from input_kinds import (
     each,
     every_second_jpg,
     exif,
-    exported,
+    files,
     folder_of,
-    frozen,
     half_excluded,
-    high_definition,
-    joined,
     kalibr_text,
     mask,
     masked,
-    one_camera,
-    palette,
+    named,
+    prepare,
     public,
+    rated,
+    raw,
     ros_text,
-    scope,
-    scratched,
     shortened,
+    sides,
     size,
-    stereomis_folder,
-    text_file,
     timed,
-    trailing,
     transparent,
-    two_streams,
-    united_masks,
     video,
-    view_is_kept,
-    without_zeros,
 )
 from left_inputs import LEFT_ROWS
-from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
+from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven, write
 from mask_inputs import MASK_ROWS
 from matlab_inputs import MATLAB_ROWS
 from odd_inputs import ODD_ROWS
+from raw_sources import stereomis
 from rig_inputs import RIG_ROWS
 from silent_inputs import SILENT_ROWS
 from squeezed_inputs import SQUEEZED_ROWS
 from stranger_inputs import STRANGER_ROWS
 from stream_inputs import STREAM_ROWS
+from test_propose_masks import scene, through_a_scope
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
 from time_inputs import BESIDE_ROWS, TIME_ROWS
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 WRONG = "WRONG IN SILENCE"
@@ -96,6 +92,132 @@ NOT_HERE = {  # codecs that no package here encodes, so that no recording of the
 WIDE = [picture(i, 1280, 720) for i in range(3)]
 DEINTERLACED = [picture(2 * i) for i in range(12)]
 STEREO = [np.hstack([p, p]) for p in pictures()]
+
+
+def deinterlaced(frames):
+    """The written pictures are these, and no row of another moment stands between two others."""
+
+    def check(folder: Path) -> bool:
+        seen = [read_png(file).astype(int) for file in sorted((folder / "o/images").iterdir())]
+        combs = [np.abs(shown[2:-1:2] - (shown[1:-2:2] + shown[3::2]) / 2).mean() for shown in seen]
+        return close(frames, 8.0)(folder) and max(combs) < 6
+
+    return check
+
+
+def scratched(path: Path) -> None:
+    """Bytes in the middle of the pictures are overwritten."""
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 4000] = np.random.default_rng(0).integers(0, 256, 4000).astype(np.uint8).tobytes()
+    path.write_bytes(data)
+
+
+def united_masks(folder: Path) -> list[str]:
+    """Two sets of masks, each of which excludes a part of what both do."""
+    parts = [mask(), mask()]
+    parts[0][:, 20:], parts[1][:, :20] = 0, 0
+    for name, part in zip("ab", parts):
+        files(folder, name, [part] * 12)
+    words = folder_of(pictures())(folder)
+    return [*words, "--masks", str(folder / "a"), "--unite-masks", str(folder / "b")]
+
+
+def two_streams(folder: Path) -> list[str]:
+    """Two views as two streams of one file."""
+    with av.open(str(folder / "a.mkv"), "w") as container:
+        streams = [container.add_stream("libx264", rate=25) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        for shown in pictures():
+            for k, stream in enumerate(streams):
+                moved = np.roll(shown, -20 * k, axis=1)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(moved, format="rgb24")))
+        for stream in streams:
+            container.mux(stream.encode())
+    return prepare("a.mkv")(folder)
+
+
+def high_definition(tagged: bool):
+    """Pictures of 1280x720 with the matrix of BT.709, which the file states or not."""
+
+    def make(folder: Path) -> list[str]:
+        with av.open(str(folder / "a.mp4"), "w") as container:
+            stream = container.add_stream("libx264", rate=25, options={"qp": "4"})
+            stream.width, stream.height, stream.pix_fmt = 1280, 720, "yuv420p"
+            if tagged:
+                stream.codec_context.colorspace = 1
+            for i in range(3):
+                frame = av.VideoFrame.from_ndarray(picture(i, 1280, 720), format="rgb24")
+                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
+                frame.pts = i
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+        return prepare("a.mp4")(folder)
+
+    return make
+
+
+def one_camera(values, *words, points=0):
+    """A clip from one camera with the files of a network, and true depth at some points beside it."""
+
+    def make(folder: Path) -> list[str]:
+        where, given = one_view.clip(folder, values)
+        if points:
+            one_view.sparse(where, points)
+        return ["depth", str(where), "--given", str(given), "--kind", "relative", *words]
+
+    return make
+
+
+def frozen(clip: Path) -> None:
+    first = read_png(clip / "images/000000.png")
+    each("images", lambda x: first)(clip)
+
+
+def scope(folder: Path) -> list[str]:
+    """A round field of view with an instrument, as a video."""
+    write(folder / "a.mp4", through_a_scope(scene("pulling")[0])[0], options={"crf": "20"})
+    return ["masks", str(folder / "a.mp4"), "--out", str(folder / "o")]
+
+
+def view_is_kept(folder: Path) -> bool:
+    return all(0.3 < (read_png(file) > 0).mean() < 0.8 for file in (folder / "o/masks").iterdir())
+
+
+def exported(name: str, *words: str):
+    def make(folder: Path) -> list[str]:
+        sys.path.insert(0, str(Path(__file__).parents[2] / "results" / "export"))
+        from made_up_model import moving_scene
+
+        from endotsr.results.export.files import export
+
+        export(moving_scene(), folder / "a.npz")
+        return ["export", str(folder / "a.npz"), "--out", str(folder / name), *words]
+
+    return make
+
+
+def text_file(name: str, content: bytes):
+    def make(folder: Path) -> list[str]:
+        (folder / name).write_bytes(content)
+        return prepare(name)(folder)
+
+    return make
+
+
+def joined(folder: Path) -> list[str]:
+    """A transport stream whose pictures change their size in the middle."""
+    small = [picture(i, 96, 64) for i in range(6)]
+    parts = [write(folder / f"{k}.ts", frames, "mpeg2video") for k, frames in enumerate((pictures(6), small))]
+    (folder / "a.ts").write_bytes(b"".join(part.read_bytes() for part in parts))
+    return prepare("a.ts")(folder)
+
+
+def trailing(count):
+    return lambda folder: read_sequence_file(folder / "o").frames == count
+
+
 ROWS = [
     codec("H.264, mp4", "a.mp4", "libx264"),
     codec("H.264, mkv", "a.mkv", "libx264"),
@@ -128,12 +250,12 @@ ROWS = [
     codec("uncompressed, avi", "a.avi", "rawvideo", "bgr24"),
     *(
         Row(f"video, interlaced {kind}", video(name, woven(), codec=code, options=options), "told",
-            "is interlaced: deinterlaced", close(DEINTERLACED))
+            "is interlaced: deinterlaced", deinterlaced(DEINTERLACED))
         for kind, (name, code, options) in INTERLACED.items()
     ),
     *(
         Row(f"video, uneven times, {name[2:]}", video(name, None, codec=code, milliseconds=UNEVEN), "told",
-            "not evenly spaced", timed(UNEVEN))
+            "not evenly spaced (0.033 to 0.633 s apart)", both(timed(UNEVEN), rated(11 / 1.333)))
         for name, code in (("a.mkv", "libx264"), ("a.mp4", "libx264"), ("a.webm", "libvpx-vp9"))
     ),
     Row("video, uneven times, thinned by --rate", video("a.mkv", None, "--rate", "2", milliseconds=UNEVEN), "told",
@@ -141,7 +263,7 @@ ROWS = [
     Row("video, uneven times, --source-rate", video("a.mkv", None, "--source-rate", "10", milliseconds=UNEVEN), "told",
         "10 a second", lambda folder: read_sequence_file(folder / "o").times is None),
     Row("video, 60 a second thinned to 20", video("a.mp4", None, "--rate", "20", rate=60), "told", "4 of 12 frames",
-        close([picture(i) for i in (0, 3, 6, 9)])),
+        both(close([picture(i) for i in (0, 3, 6, 9)]), rated(20))),
     Row("video, --rate above its own", video("a.mp4", None, "--rate", "50"), "refused", "the source has 25 frames"),
     *(
         Row(f"video, rotation of {degrees} degrees", video("a.mp4", change=lambda p, d=degrees: turn(p, d)), "refused",
@@ -157,7 +279,8 @@ ROWS = [
         "refused", "high dynamic range (PQ)"),
     Row("video, high dynamic range (HLG)", video("a.mkv", codec="libx265", layout="yuv420p10le", transfer=18),
         "refused", "high dynamic range (HLG)"),
-    Row("video, black", video("a.mp4", [picture(0) * 0] * 8), "refused", "8 of 8 frames are black"),
+    Row("video, black", video("a.mp4", [picture(0) * 0] * 8), "refused",
+        "8 of 8 frames are black, white or of one colour: 000000, 000001"),
     Row("video, one colour", video("a.mp4", [picture(0) * 0 + np.uint8(90)] * 8), "refused", "of one colour"),
     Row("video, frozen", video("a.mp4", [picture(0)] * 8), "refused", "all 8 frames are one picture"),
     Row("video, a black second in it", video("a.mp4", [*pictures(9), *[picture(0) * 0] * 3]), "told", "black-frame"),
@@ -185,7 +308,7 @@ ROWS = [
         "picture"),
     Row("video, size changes", joined, "refused", "allowed: one size"),
     Row("video, stereo, side by side", video("a.mp4", STEREO, "--stereo", "side_by_side", "--baseline", "4"), "right",
-        "", close(pictures())),
+        "", both(sides(pictures(), pictures()), baseline(4))),
     Row("video, stereo, of odd width", video("a.mkv", [p[:, :127] for p in pictures()], "--stereo", "side_by_side",
         "--baseline", "4", codec="ffv1", layout="bgr0"), "refused", "even width"),
     Row("text named .mp4", text_file("a.mp4", b"hello " * 99), "refused", "not a video by its first bytes"),
@@ -193,18 +316,20 @@ ROWS = [
     Row("empty file named .mp4", text_file("a.mp4", b""), "refused", "not a video by its first bytes"),
     Row("pictures, png", folder_of(pictures()), "right", "", close(pictures(), 0.01)),
     Row("pictures, jpg", folder_of(pictures(), ending="jpg"), "right", "", close(pictures())),
-    Row("pictures, jpg turned by EXIF", folder_of(pictures(), ending="jpg", change=exif), "refused", "orientation 6"),
+    Row("pictures, jpg turned by EXIF", folder_of(pictures(), change=converted("jpg", exif=exif(6))), "refused",
+        "orientation 6"),
     Row("pictures, interlaced", folder_of(woven()), "told", "interlaced-pictures"),
     Row("pictures, 16 bit", folder_of([p.astype(np.uint16) * 257 for p in pictures()]), "refused", "16-bit picture"),
     Row("pictures, grey", folder_of([p[..., 0] for p in pictures()]), "refused", "grey picture"),
     Row("pictures, transparent", folder_of(pictures(), change=transparent(40)), "refused", "has transparent pixels"),
     Row("pictures, with a full alpha channel", folder_of(pictures(), change=transparent(0)), "right", "",
         close(pictures(), 0.01)),
-    Row("pictures, with a palette", folder_of(pictures(), change=palette), "right", "", close(pictures())),
+    Row("pictures, with a palette", folder_of(pictures(), change=converted("png", lambda opened: opened.quantize(256))),
+        "right", "", close(pictures())),
     Row("pictures, png and jpg mixed", folder_of(pictures(), change=every_second_jpg), "right", "", close(pictures())),
-    Row("pictures, CMYK jpg", folder_of(pictures(), change=cmyk), "right", "", close(pictures())),
-    Row("pictures, numbered without zeros", folder_of(pictures(), change=without_zeros), "right", "",
-        close(pictures(), 0.01)),
+    Row("pictures, CMYK jpg", folder_of(pictures(), change=converted("jpg", lambda opened: opened.convert("CMYK"),
+        quality=95)), "right", "", close(pictures())),
+    Row("pictures, numbered without zeros", named(lambda k: f"{k}.png"), "right", "", close(pictures(), 0.01)),
     Row("pictures, tif", folder_of(pictures(), change=converted("tif")), "right", "", close(pictures(), 0.01)),
     Row("pictures, tif, LZW", folder_of(pictures(), change=converted("tif", compression="tiff_lzw")), "right", "",
         close(pictures(), 0.01)),
@@ -246,7 +371,7 @@ ROWS = [
     Row("one camera, relative depth that grows with distance", one_camera(lambda i: true_depth(i) / 99), "refused",
         "near tissue is bright"),
     Row("one camera, no depth at all", video("a.mp4"), "told", "--kind relative"),
-    Row("depth beside COLMAP", colmap_folder("--depth", "d"), "refused", "does not read --depth"),
+    Row("depth beside COLMAP", colmap("--depth", "d"), "refused", "does not read --depth"),
     Row("Hamlyn", public("hamlyn", "--baseline", "5"), "told", "half a pixel was added", centred),
     Row("SERV-CT", public("servct"), "told", "not for training one scene", centred),
     Row("SCARED", public("scared"), "told", "read as world-to-camera",
@@ -258,16 +383,16 @@ ROWS = [
         change=lambda raw: (raw / "images/frame_00002.png").unlink()), "refused", "frame_00002.png"),
     Row("nerfstudio, out and for COLMAP", public("nerfstudio", "--also", "nerfstudio", "colmap"), "told",
         "points of the prior depth", centred),
-    Row("calibration, ROS", calibrated("a.yaml", ros_text), "told", "half a pixel was added", centred),
-    Row("calibration, ROS, fisheye", calibrated("a.yaml", lambda: ros_text(distortion_model="equidistant")), "refused",
+    Row("calibration, ROS", calibrated("a.yaml", ros_text()), "told", "half a pixel was added", centred),
+    Row("calibration, ROS, fisheye", calibrated("a.yaml", ros_text(distortion_model="equidistant")), "refused",
         "allowed: plumb_bob"),
-    Row("calibration, Kalibr", calibrated("a.yaml", kalibr_text), "told", "half a pixel was added", centred),
-    Row("calibration, Kalibr, of another size", calibrated("a.yaml", lambda: kalibr_text(resolution=[128, 128])),
+    Row("calibration, Kalibr", calibrated("a.yaml", kalibr_text()), "told", "half a pixel was added", centred),
+    Row("calibration, Kalibr, of another size", calibrated("a.yaml", kalibr_text(resolution=[128, 128])),
         "refused", "the calibration is of 128x128"),
-    Row("calibration, matrix K as text", calibrated("K.txt", lambda: MATRIX), "told", "half a pixel was added",
+    Row("calibration, matrix K as text", calibrated("K.txt", MATRIX), "told", "half a pixel was added",
         centred),
-    Row("calibration, OpenCV YAML", calibrated("a.yaml", lambda: OPENCV), "told", "half a pixel was added", centred),
-    Row("calibration, a hostile tag in YAML", calibrated("a.yaml", lambda: "K: !!python/object/apply:os.getcwd []"),
+    Row("calibration, OpenCV YAML", calibrated("a.yaml", OPENCV), "told", "half a pixel was added", centred),
+    Row("calibration, a hostile tag in YAML", calibrated("a.yaml", "K: !!python/object/apply:os.getcwd []"),
         "refused", "not YAML"),
     Row("frames by second and frames left out", video("a.mp4", None, "--frames", "0s:0.24s", "--drop", "1"), "told",
         "not evenly spaced", close([picture(i) for i in (0, 2, 3, 4, 5)])),
@@ -275,7 +400,7 @@ ROWS = [
     Row("crop", video("a.mp4", None, "--crop", "8", "4", "64", "48"), "told", "the intrinsics follow", size(64, 48)),
     Row("crop outside", video("a.mp4", None, "--crop", "100", "4", "64", "48"), "refused", "leaves the pictures"),
     Row("masks united", united_masks, "told", "masks: united with", half_excluded),
-    Row("StereoMIS, a mask missing, --gaps drop", stereomis_folder("--gaps", "drop",
+    Row("StereoMIS, a mask missing, --gaps drop", raw(stereomis, "--gaps", "drop",
         change=lambda raw: (raw / "masks/000002l.png").unlink()), "told", "not evenly spaced",
         timed((0, 40, 120, 160, 200))),
     Row("common format, masks inverted", common(change=each("masks", lambda x: 255 - x)), "refused",

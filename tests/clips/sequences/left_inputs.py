@@ -2,49 +2,41 @@
 
 import json
 import shutil
-import sys
 from pathlib import Path
 
+import av
+import cv2
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-import raw_sources
 from input_kinds import (
     Row,
+    both,
     centred,
     close,
+    colmap,
+    depth_files,
     depth_is_true,
     files,
     folder_of,
     half_excluded,
     mask,
     masked,
+    pair,
     prepare,
     public,
+    rated,
+    sides,
+    timed,
     video,
 )
 from made_videos import HEIGHT, WIDTH, picture, pictures, write
 from raw_sources import scene_picture
-from test_stated_depth import recording as with_depth
-from test_stated_depth import true_depth
+from scipy.spatial.transform import Rotation
 
 from endotsr.cli.main import main
-from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 FRAMES = 6
 ALL = [scene_picture(i) for i in range(FRAMES)]
-
-
-def colmap(*words: str, binary: bool = False, change=lambda raw: None):
-    """A COLMAP model of six frames as the input of `prepare`."""
-
-    def make(folder: Path) -> list[str]:
-        raw_sources.colmap(folder / "raw", binary, FRAMES)
-        change(folder / "raw")
-        return prepare("raw", *words, camera=())(folder)
-
-    return make
 
 
 def part_of(model: Path, out: Path, first: int, last: int) -> None:
@@ -171,13 +163,13 @@ def llff_trained(folder: Path) -> list[str]:
     return ["train", str(folder / "clip"), "--out", str(folder / "run"), "--iterations", "2", "-q"]
 
 
-def true_poses(folder: Path) -> bool:
-    """The written poses are those of the clip."""
+def true_poses(folder: Path, kept: slice = slice(None), tolerance: float = 1e-4) -> bool:
+    """The written poses are those of the kept frames of the clip."""
     written = np.array(read_sequence_file(folder / "o").poses.matrices).reshape(-1, 3, 4)
-    true = np.load(folder / "true.npy").reshape(-1, 3, 5)
+    true = np.load(folder / "true.npy").reshape(-1, 3, 5)[kept]
     turns = (true[:, :, :3] * [1.0, -1.0, -1.0]).transpose(0, 2, 1)
     shifts = -np.einsum("nij,nj->ni", turns, true[:, :, 3])
-    return np.allclose(written, np.concatenate([turns, shifts[:, :, None]], axis=2), atol=1e-4)
+    return np.allclose(written, np.concatenate([turns, shifts[:, :, None]], axis=2), atol=tolerance)
 
 
 POSE_ROWS = [
@@ -197,13 +189,12 @@ COPY_ROWS = [
     Row("pictures, every picture twice", folder_of(TWICE), "told", "without the copies: --frames ::2"),
 ]  # fmt: skip
 GROUPS = {"g": "12", "bf": "2"}  # options of the encoder: a whole picture in twelve
+WITH_A_PAUSE = [40 * i + 1500 * (i > 20) for i in range(60)]
 PAUSE = [*range(0, 240, 40), *range(5000, 5240, 40)]  # milliseconds
 
 
 def hidden_lead_in(folder: Path) -> list[str]:
     """An mp4 whose edit list hides the first five pictures, as a cut without coding leaves it."""
-    import av
-
     write(folder / "whole.mp4", pictures(24), options=GROUPS)
     how = {"avoid_negative_ts": "disabled"}
     with av.open(str(folder / "whole.mp4")) as whole, av.open(str(folder / "a.mp4"), "w", options=how) as out:
@@ -231,30 +222,25 @@ CLOCK_ROWS = [
     Row("video, begins inside a group of pictures", video("a.ts", pictures(40), options=GROUPS, change=begun_inside),
         "told", "coded pictures cannot be decoded and are left out", close(pictures(40)[12:])),
     Row("video, two files joined, the clock goes back", video("a.ts", pictures(40), change=twice_in_a_file), "told",
-        "its clock goes back", close(pictures(40) * 2)),
+        "its clock goes back", both(close(pictures(40) * 2), rated(25))),
     Row("video, a clock that jumps", video("a.mkv", None, milliseconds=PAUSE), "refused", "its clock jumps by 4.8 s"),
     Row("video, a clock that jumps, --source-rate", video("a.mkv", None, "--source-rate", "25", milliseconds=PAUSE),
         "told", "its clock jumps by 4.8 s", lambda folder: read_sequence_file(folder / "o").times is None),
-    Row("video, a pause in a long clip", video("a.mkv", pictures(60), milliseconds=[40 * i + 1500 * (i > 20)
-        for i in range(60)]), "told", "its clock jumps by 1.54 s", close(pictures(60))),
+    Row("video, a pause in a long clip", video("a.mkv", pictures(60), milliseconds=WITH_A_PAUSE), "told",
+        "its clock jumps by 1.54 s after picture 20", both(close(pictures(60)), timed(WITH_A_PAUSE))),
 ]  # fmt: skip
 
 
-def points_of_scared(folder: Path) -> list[str]:
+def points_of_scared(path: Path, z: np.ndarray) -> None:
     """Depth as SCARED stores it: x y z in float32, NaN without depth."""
-    import cv2
-
-    words = with_depth(folder, true_depth)
     v, u = np.mgrid[0:HEIGHT, 0:WIDTH]
-    for i, file in enumerate(sorted((folder / "depth").iterdir())):
-        file.unlink()
-        z = true_depth(i)
-        points = np.stack([(u - 63.5) / 100 * z, (v - 47.5) / 100 * z, z], axis=2).astype(np.float32)
-        cv2.imwrite(str(file.with_suffix(".tiff")), points[..., ::-1])
-    return words
+    points = np.stack([(u - 63.5) / 100 * z, (v - 47.5) / 100 * z, z], axis=2).astype(np.float32)
+    cv2.imwrite(str(path), points[..., ::-1])
 
 
-DEPTH_ROWS = [Row("depth, points x y z of SCARED", points_of_scared, "right", "", depth_is_true)]
+DEPTH_ROWS = [
+    Row("depth, points x y z of SCARED", depth_files(points_of_scared, ".tiff"), "right", "", depth_is_true),
+]
 MOVED = [np.roll(shown, -5, axis=1) for shown in pictures()]
 
 
@@ -281,22 +267,11 @@ def second_folder(folder: Path) -> list[str]:
     return prepare("one", "--right", str(folder / "other"), "--baseline", "4")(folder)
 
 
-def pair_of_folders(left: str, right: str):
-    def make(folder: Path) -> list[str]:
-        (folder / "clip").mkdir()
-        files(folder / "clip", left, pictures())
-        files(folder / "clip", right, MOVED)
-        return prepare("clip", "--baseline", "4")(folder)
-
-    return make
+def two_folders(left: str, right: str):
+    return pair(names=(left, right), frames=(pictures(), MOVED))
 
 
-def pairs_kept(folder: Path) -> bool:
-    found = describe(folder / "o")
-    both = [next(found.pictures([i])) for i in range(found.count)]
-    return len(both) == 12 and all(
-        (pair.left == one).all() and (pair.right == other).all() for pair, one, other in zip(both, pictures(), MOVED)
-    )
+pairs_kept = sides(pictures(), MOVED, 0)
 
 
 def renamed_video(name: str, **how):
@@ -315,9 +290,9 @@ PAIR_ROWS = [
     Row("stereo, two videos of unlike length", two_videos(right=MOVED[:9]), "refused", "count 9, of left.mkv 12"),
     Row("stereo, --right with a video", second_video, "right", "", pairs_kept),
     Row("stereo, --right with a folder", second_folder, "right", "", pairs_kept),
-    Row("stereo, left_frames/ and right_frames/", pair_of_folders("left_frames", "right_frames"), "right", "",
+    Row("stereo, left_frames/ and right_frames/", two_folders("left_frames", "right_frames"), "right", "",
         pairs_kept),
-    Row("stereo, left_rectified/ and right_rectified/", pair_of_folders("left_rectified", "right_rectified"), "right",
+    Row("stereo, left_rectified/ and right_rectified/", two_folders("left_rectified", "right_rectified"), "right",
         "", pairs_kept),
     Row("video of a recorder, .VOB", renamed_video("A.VOB", kind="mpg", codec="mpeg2video", options={"b": "4000000"}),
         "right", "", close(pictures())),
@@ -362,8 +337,6 @@ def squared(found: np.ndarray) -> np.ndarray:
 
 def euroc(found: np.ndarray) -> np.ndarray:
     """Stamp in nanoseconds, position, quaternion w x y z."""
-    from scipy.spatial.transform import Rotation
-
     turns = Rotation.from_matrix(found[:, :, :3]).as_quat()[:, [3, 0, 1, 2]]
     return np.column_stack([1e18 + 4e7 * np.arange(len(found)), found[:, :, 3], turns])
 

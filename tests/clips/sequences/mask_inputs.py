@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import av
 import numpy as np
 from input_kinds import Row, folder_of, half_excluded, mask, masked, rewritten
 from made_videos import HEIGHT, WIDTH, pictures, write
@@ -50,7 +51,7 @@ def as_read(frames: list[np.ndarray]):
 
 
 def jpg(folder: Path) -> None:
-    rewritten(folder, lambda opened, _: opened, "jpg", quality=30)
+    rewritten(folder, ending="jpg", quality=30)
 
 
 def of_video(frames: list[np.ndarray], *words: str, name: str = "m.mp4", **how):
@@ -67,8 +68,6 @@ def exported(frames: list[np.ndarray]):
     """The masks as pictures that were exported from a video of them."""
 
     def make(folder: Path) -> list[str]:
-        import av
-
         words = of_video(frames, options={"crf": "38"})(folder)
         (folder / "m").mkdir()
         with av.open(str(folder / "m.mp4")) as container:

@@ -1,19 +1,13 @@
 """Rows of `inputs_tried.py` about MAT-files: calibrations of MATLAB and of Bouguet's toolbox, and depth."""
 
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from input_kinds import Row, centred, depth_is_true, files, prepare
+from input_kinds import Row, baseline, centred, depth_files, depth_is_true, files, prepare
 from left_inputs import MOVED
 from made_videos import pictures
-from test_stated_depth import recording as with_depth
-from test_stated_depth import true_depth
-
-from endotsr.clips.sequences.sequence_file import read_sequence_file
+from scipy.io import savemat
 
 K = np.array(
     [[100.0, 0, 64.5], [0, 101, 48.5], [0, 0, 1]]
@@ -70,12 +64,7 @@ def of_7_3(path: Path) -> None:
 def saved(variables, **how):
     """A writer of variables as a MAT-file."""
 
-    def write(path: Path) -> None:
-        from scipy.io import savemat
-
-        savemat(path, variables, **how)
-
-    return write
+    return lambda path: savemat(path, variables, **how)
 
 
 def mat(write, *words: str, pair: bool = False, name: str = "calibration.mat"):
@@ -91,24 +80,18 @@ def mat(write, *words: str, pair: bool = False, name: str = "calibration.mat"):
     return make
 
 
-def depth_in_mat(*shapes, many: bool = False):
-    def make(folder: Path) -> list[str]:
-        from scipy.io import savemat
+def depth_in_mat(frames: int = 1):
+    """MAT-files of so many frames each."""
 
-        words = with_depth(folder, true_depth, "d", "npy")
-        for file in sorted((folder / "d").iterdir()):
-            plane = np.load(file)
-            stored = np.stack([plane] * 6, axis=2) if many else plane
-            savemat(file.with_suffix(".mat"), {"depth": stored, "unit": "mm"}, do_compression=True)
-            file.unlink()
-        return words
+    def save(path: Path, plane: np.ndarray) -> None:
+        stored = plane if frames == 1 else np.stack([plane] * frames, axis=2)
+        savemat(path, {"depth": stored.astype(np.float32), "unit": "mm"}, do_compression=True)
 
-    return make
+    return depth_files(save, ".mat")
 
 
 def paired(folder: Path) -> bool:
-    found = read_sequence_file(folder / "o").camera
-    return bool(np.isclose(found.baseline, 4.0, atol=1e-4)) and centred(folder)
+    return baseline(4.0)(folder) and centred(folder)
 
 
 IN_METRES = PAIR | {"CameraParameters1": CAMERA | {"WorldUnits": "m"}, "TranslationOfCamera2": [[-0.004, 0.0, 0.0]]}
@@ -145,5 +128,5 @@ MATLAB_ROWS = [
     Row("calibration, two cameras in a MAT-file", mat(saved({"left": CAMERA, "right": CAMERA})), "refused",
         "2 calibrations"),
     Row("depth, one MAT-file for each frame", depth_in_mat(), "right", "", depth_is_true),
-    Row("depth, several frames in a MAT-file", depth_in_mat(many=True), "refused", "one file of (height, width)"),
+    Row("depth, several frames in a MAT-file", depth_in_mat(frames=6), "refused", "one file of (height, width)"),
 ]  # fmt: skip

@@ -1,33 +1,39 @@
 """Rows of `inputs_tried.py` about files that programs write by the way: names, bits, channels, marks and metadata."""
 
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import public_layouts
 import raw_sources
 from input_kinds import (
     Row,
     blank,
     close,
+    colmap,
     converted,
     depth,
+    depth_files,
     depth_is_true,
     files,
     folder_of,
     half_excluded,
+    labels,
     mask,
     masked,
+    named,
+    pair,
     prepare,
+    public,
     rewritten,
     size,
+    trajectory,
     video,
+    with_files,
 )
 from made_videos import WIDTH, picture, pictures
-from test_stated_depth import recording as with_depth
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 from test_stated_depth import true_depth
 from test_stereo_depth import slanted_pair
 
@@ -37,44 +43,13 @@ from endotsr.clips.opencv.pictures import write_jpeg
 HOLE = (slice(0, 20), slice(0, 30))  # of the depth
 
 
-def named(name):
-    """The pictures under other names, by their number."""
-
-    def change(folder: Path) -> None:
-        for k, file in enumerate(sorted((folder / "clip").iterdir())):
-            file.rename(file.with_name(name(k)))
-
-    return folder_of(pictures(), change=change)
-
-
-def companions(folder: Path) -> None:
-    """What macOS and Windows leave beside pictures."""
-    for name in ("._0003.png", ".DS_Store", "Thumbs.db"):
-        (folder / "clip" / name).write_bytes(b"no picture")
-
-
-def labels(folder: Path) -> None:
-    """Masks with a palette: 1 is dark red, as tools that annotate instruments store them."""
-
-    def changed(opened, _):
-        made = opened.point(lambda value: value // 255).convert("P")
-        made.putpalette([0, 0, 0, 128, 0, 0])
-        return made
-
-    rewritten(folder, changed)
-
-
-def linear(folder: Path) -> None:
-    from PIL.PngImagePlugin import PngInfo
-
+def linear() -> PngInfo:
     chunks = PngInfo()
     chunks.add(b"gAMA", struct.pack(">I", 100000))
-    converted("png", pnginfo=chunks)(folder)
+    return chunks
 
 
 def gif(folder: Path) -> list[str]:
-    from PIL import Image
-
     made = [Image.fromarray(shown) for shown in pictures()]
     made[0].save(folder / "a.gif", save_all=True, append_images=made[1:], duration=40)
     return prepare("a.gif")(folder)
@@ -88,28 +63,10 @@ def with_camera(*camera):
     return make
 
 
-def with_trajectory(*lines):
-    def make(folder: Path) -> list[str]:
-        (folder / "t.txt").write_text("\n".join(lines))
-        return folder_of(pictures(), "--trajectory", str(folder / "t.txt"))(folder)
-
-    return make
-
-
-def two_folders(left, right):
-    def make(folder: Path) -> list[str]:
-        (folder / "clip").mkdir()
-        files(folder / "clip", "left", left)
-        files(folder / "clip", "right", right)
-        return prepare("clip", "--baseline", "4")(folder)
-
-    return make
-
-
 def exchanged(folder: Path) -> list[str]:
     """Depth of pairs whose left pictures are those of the right camera."""
     left, right, *_ = slanted_pair()
-    two_folders([right] * 3, [left] * 3)(folder)
+    pair(frames=([right] * 3, [left] * 3))(folder)
     moving = [[np.roll(p, k, axis=0) for k in range(3)] for p in (right, left)]
     for name, frames in zip(("left", "right"), moving):
         for k, shown in enumerate(frames):
@@ -139,14 +96,8 @@ def hole_is_empty(folder: Path) -> bool:
     return not plane[HOLE].any() and bool((plane[:, 30:] > 0).all())
 
 
-def float_tiff(folder: Path) -> list[str]:
-    from PIL import Image
-
-    words = with_depth(folder, true_depth)
-    for i, file in enumerate(sorted((folder / "depth").iterdir())):
-        file.unlink()
-        Image.fromarray(true_depth(i).astype(np.float32)).save(file.with_suffix(".tiff"))
-    return words
+def float_tiff(path: Path, plane: np.ndarray) -> None:
+    Image.fromarray(plane.astype(np.float32)).save(path)
 
 
 def coloured(i: int):
@@ -155,30 +106,21 @@ def coloured(i: int):
     return np.stack([near, 255 - near, near // 2], axis=2)
 
 
+def renamed(listed_in: str, old: str, name, frames: int, inside: str = ""):
+    """The pictures of a folder, and the file that lists them `inside` it, with other names by their number."""
+
+    def change(folder: Path) -> None:
+        listed = (folder / listed_in).read_text()
+        for k in reversed(range(frames)):  # no name is written twice
+            (folder / "images" / old.format(k)).rename(folder / "images" / name(k))
+            listed = listed.replace(inside + old.format(k), inside + name(k))
+        (folder / listed_in).write_text(listed)
+
+    return change
+
+
 def colmap_named(name):
-    """A model of twelve frames whose pictures have other names, by their number."""
-
-    def make(folder: Path) -> list[str]:
-        raw_sources.colmap(folder / "raw", False, frames=12)
-        listed = (folder / "raw/sparse/0/images.txt").read_text()
-        for k in reversed(range(12)):  # no name is written twice
-            (folder / f"raw/images/frame{k:04d}.png").rename(folder / "raw/images" / name(k))
-            listed = listed.replace(f"frame{k:04d}.png", name(k))
-        (folder / "raw/sparse/0/images.txt").write_text(listed)
-        return prepare("raw", camera=())(folder)
-
-    return make
-
-
-def nerfstudio_named(folder: Path) -> list[str]:
-    """Frames 8, 9, 10, ... without leading zeros."""
-    public_layouts.nerfstudio(folder / "raw")
-    listed = (folder / "raw/transforms.json").read_text()
-    for k in range(len(public_layouts.poses())):
-        (folder / f"raw/images/frame_{k:05d}.png").rename(folder / f"raw/images/frame_{k + 8}.png")
-        listed = listed.replace(f"images/frame_{k:05d}.png", f"images/frame_{k + 8}.png")
-    (folder / "raw/transforms.json").write_text(listed)
-    return prepare("raw", camera=())(folder)
+    return colmap(frames=12, change=renamed("sparse/0/images.txt", "frame{:04d}.png", name, 12))
 
 
 RECONSTRUCTED = [raw_sources.scene_picture(i) for i in range(12)]
@@ -197,8 +139,8 @@ ODD_ROWS = [
     Row("pictures, moving PNG", folder_of(pictures(), change=converted("png", save_all=True, append_images=[blank()])),
         "refused", "holds 2 pictures"),
     Row("pictures, red and blue exchanged", folder_of([p[..., ::-1] for p in pictures()]), "told", "blue-pictures"),
-    Row("pictures, PNG that states linear light", folder_of(pictures(), change=linear), "told", "other than sRGB",
-        close(pictures(), 0.01)),
+    Row("pictures, PNG that states linear light", folder_of(pictures(), change=converted("png", pnginfo=linear())),
+        "told", "other than sRGB", close(pictures(), 0.01)),
     Row("pictures, JPEG without an ending of it", folder_of(pictures(), change=converted("png", format="JPEG")),
         "refused", "does not start with the PNG signature"),
     Row("names beyond ASCII", named(lambda k: f"épreuve 画像 {k}.png"), "right", "", close(pictures(), 0.01)),
@@ -209,29 +151,31 @@ ODD_ROWS = [
         "frames count as evenly spaced in time", close(pictures(), 0.01)),
     Row("two names of one number", named(lambda k: "4.png" if k == 5 else f"{k:04d}.png"), "refused",
         "carry the same frame number"),
-    Row("files of the system beside pictures", folder_of(pictures(), change=companions), "right", "",
+    Row("files of the system beside pictures", folder_of(pictures(), change=with_files("clip/._0003.png",
+        "clip/.DS_Store", "clip/Thumbs.db")), "right", "",
         close(pictures(), 0.01)),
     Row("masks, 0 and 1", masked([mask(1)] * 12), "right", "", half_excluded),
     Row("masks, 0 and 1 of 16 bit", masked([mask(1).astype(np.uint16)] * 12), "right", "", half_excluded),
-    Row("masks, jpg", masked([mask()] * 12, change=lambda folder: rewritten(folder, lambda opened, _: opened, "jpg",
-        quality=40)), "right", "", half_excluded),
+    Row("masks, jpg", masked([mask()] * 12, change=lambda folder: rewritten(folder, ending="jpg", quality=40)), "right",
+        "", half_excluded),
     Row("masks, classes of instruments", masked([mask(1) + mask(1) * (np.arange(WIDTH) < 20)] * 12), "refused",
         "numbers up to 2 in all pictures"),
-    Row("masks, coloured labels", masked([mask()] * 12, change=labels), "refused", "one grey channel expected"),
+    Row("masks, coloured labels", masked([mask()] * 12, change=labels(128, 0, 0)), "refused",
+        "one grey channel expected"),
     *(Row(f"depth, {value:g} where there is none", depth(marked(value)), "right", "", hole_is_empty)
       for value in (np.nan, np.inf, -1.0)),
     Row("depth, 1e6 where there is none", depth(marked(1e6)), "refused", "mark pixels without depth"),
     Row("depth, 65535 where there is none", depth(lambda i: marked(65535)(i).astype(np.uint16), kind="png"), "refused",
         "mark pixels without depth"),
-    Row("depth, float TIFF", float_tiff, "right", "", depth_is_true),
+    Row("depth, float TIFF", depth_files(float_tiff, ".tiff"), "right", "", depth_is_true),
     Row("depth, false colours", depth(coloured, kind="png"), "refused", "one grey channel expected"),
     Row("camera in parts of the picture", with_camera("0.78", "1.04", "0.5", "0.5"), "told", "field-of-view"),
     Row("camera in millimetres", with_camera("4.2", "4.2", "64", "48"), "told", "field-of-view"),
-    Row("trajectory of more poses than frames", with_trajectory(*(f"{i / 25:.2f} 0 0 0 0 0 0 1" for i in range(15))),
+    Row("trajectory of more poses than frames", trajectory([f"{i / 25:.2f} 0 0 0 0 0 0 1" for i in range(15)]),
         "refused", "15 poses with times for 12 frames"),
-    Row("trajectory of fewer poses than frames", with_trajectory(*POSES[:9]), "refused", "3 of 12 frames have no pose"),
-    Row("trajectory that is no number", with_trajectory(*POSES[:3], "3 nan 0 0 0 0 0 1"), "refused", "line 4"),
-    Row("stereo, a right picture missing", two_folders(pictures(), pictures(9)), "refused", "left holds 12 files"),
+    Row("trajectory of fewer poses than frames", trajectory(POSES[:9]), "refused", "3 of 12 frames have no pose"),
+    Row("trajectory that is no number", trajectory([*POSES[:3], "3 nan 0 0 0 0 0 1"]), "refused", "line 4"),
+    Row("stereo, a right picture missing", pair(frames=(pictures(), pictures(9))), "refused", "left holds 12 files"),
     Row("stereo, left and right exchanged", exchanged, "refused", "with left and right exchanged"),
     Row("COLMAP, numbered without zeros", colmap_named(lambda k: f"frame{k}.png"), "right", "",
         close(RECONSTRUCTED, 0.01)),
@@ -239,6 +183,7 @@ ODD_ROWS = [
         "frames count as evenly spaced in time", close(RECONSTRUCTED, 0.01)),
     Row("COLMAP, names without an order", colmap_named(lambda k: "overview.png" if k == 5 else f"frame{k}.png"),
         "refused", "numbers in this name: 0"),
-    Row("nerfstudio, numbered without zeros", nerfstudio_named, "right", "",
+    Row("nerfstudio, numbered without zeros", public("nerfstudio", change=renamed("transforms.json",
+        "frame_{:05d}.png", lambda k: f"frame_{k + 8}.png", 4, "images/")), "right", "",
         close([public_layouts.picture(i) for i in range(len(public_layouts.poses()))], 0.01)),
 ]  # fmt: skip

@@ -1,14 +1,12 @@
 """Rows of `inputs_tried.py` about recordings of rigs: the folder mav0/ of EuRoC as its tools write it."""
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 from input_kinds import Row, prepare
-from left_inputs import matrices, squared
+from left_inputs import matrices, squared, true_poses
+from scipy.spatial.transform import Rotation
 from silent_inputs import EUROC_HEAD, quaternions
 
 from endotsr.clips.sequences.sequence_file import read_sequence_file
@@ -36,8 +34,6 @@ distortion_coefficients: [0.0, 0.0, 0.0, 0.0]
 
 def mounted(shift: float = 0.0) -> np.ndarray:
     """T_BS of a camera, metres: turned by an arbitrary angle, and moved by `shift` along its x axis."""
-    from scipy.spatial.transform import Rotation
-
     found = np.eye(4)
     found[:3, :3] = Rotation.from_euler("xyz", [0.3, -0.2, 1.5]).as_matrix()
     found[:3, 3] = [-0.0216, -0.0647, 0.0098] + found[:3, 0] * shift
@@ -92,14 +88,10 @@ def rig(*words: str, second: bool = False, depth: bool = True, change=lambda raw
 def true_rig(folder: Path, kept: slice = slice(None), baseline: float = 0.0) -> bool:
     """The written cameras are the true ones, and so are intrinsics, times and baseline."""
     found = read_sequence_file(folder / "o")
-    true = np.load(folder / "true.npy").reshape(-1, 3, 5)[kept]
-    turns = (true[:, :, :3] * [1.0, -1.0, -1.0]).transpose(0, 2, 1)
-    shifts = -np.einsum("nij,nj->ni", turns, true[:, :, 3])
-    poses = np.array(found.poses.matrices).reshape(-1, 3, 4)
     times = np.arange(14)[kept] * STEP / 1e9
     stated = np.array(found.times) if found.times else np.arange(found.frames) / found.frame_rate
     return (
-        np.allclose(poses, np.concatenate([turns, shifts[:, :, None]], axis=2), atol=1e-3)
+        true_poses(folder, kept, 1e-3)
         and np.allclose([found.camera.fx, found.camera.cx, found.camera.cy], [142.4, 80, 64], atol=1e-3)
         and np.allclose(stated - stated[0], times - times[0], atol=1e-4)
         and np.isclose(found.camera.baseline, baseline, atol=1e-4)
@@ -145,10 +137,6 @@ def further_sensors(raw: Path) -> None:
     (raw / "body.yaml").write_text("comment: the body\n")
 
 
-def whole(folder: Path) -> bool:
-    return true_rig(folder)
-
-
 def in_microseconds(text: str) -> str:
     lines = text.splitlines()
     return "\n".join([lines[0], *(f"{line[:16]},{line.split(',')[1]}" for line in lines[1:])])
@@ -157,11 +145,11 @@ def in_microseconds(text: str) -> str:
 MISSING = slice(None, -1)
 RIG_ROWS = [
     Row("EuRoC, mav0/ with one camera and the ground truth", rig(), "told",
-        "with T_BS of cam0 those of the camera", whole),
+        "with T_BS of cam0 those of the camera", true_rig),
     Row("EuRoC, a pair of cameras", rig(second=True), "told", "rectified: baseline 4 mm",
         lambda folder: true_rig(folder, baseline=4.0)),
     Row("EuRoC, mav0/ itself, further sensors", lambda folder: [word.replace("/raw", "/raw/mav0") for word in
-        rig(change=further_sensors)(folder)], "told", "not read: imu0/, leica0/", whole),
+        rig(change=further_sensors)(folder)], "told", "not read: imu0/, leica0/", true_rig),
     Row("EuRoC, a row without a picture", rig(depth=False, change=without(last_picture("cam0"))), "told",
         "without a picture, left out: 1403636580413555584.png", lambda folder: true_rig(folder, MISSING)),
     Row("EuRoC, a picture without a row", rig(depth=False, change=without_last_row), "told",
@@ -169,7 +157,7 @@ RIG_ROWS = [
     Row("EuRoC, a right picture missing", rig(second=True, change=without(last_picture("cam1"))), "told",
         "cam0: without a picture of the other camera", lambda folder: true_rig(folder, MISSING, 4.0)),
     Row("EuRoC, cam1 without sensor.yaml", rig(second=True, change=without("cam1/sensor.yaml")), "told",
-        "both cameras count as rectified", whole),
+        "both cameras count as rectified", true_rig),
     Row("EuRoC, no ground truth", rig(change=without("state_groundtruth_estimate0")), "told",
         "the camera counts as static", lambda folder: read_sequence_file(folder / "o").poses is None),
     Row("EuRoC, the ground truth begins later", rig(change=later_truth), "refused", "3 of 14 frames have no pose"),

@@ -1,36 +1,48 @@
 """Rows of `inputs_tried.py` about fields that a reader passed over: columns, rows of matrices, lines, models, marks."""
 
+import json
 import shutil
 import struct
-import sys
 import zlib
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import raw_sources
+import test_relative_depth as one_view
 from input_kinds import (
     MATRIX,
     Row,
+    baseline,
+    blank,
     calibrated,
     centred,
     close,
+    colmap,
+    converted,
+    depth_files,
     depth_is_true,
-    files,
+    exif,
     folder_of,
+    named,
+    pair,
     prepare,
     public,
+    raw,
+    sides,
     timed,
+    trajectory,
     video,
+    with_files,
 )
-from left_inputs import MOVED, colmap, moving, squared, true_poses, with_poses
+from left_inputs import MOVED, moving, squared, true_poses, with_poses
 from made_videos import pictures
-from odd_inputs import two_folders, with_trajectory
+from PIL import Image
+from PIL.TiffImagePlugin import ImageFileDirectory_v2
+from scipy.spatial.transform import Rotation
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
@@ -58,8 +70,6 @@ FISHEYE = "K: {data: [100., 0., 63.5, 0., 101., 47.5, 0., 0., 1.]}\nD: {data: [0
 
 
 def quaternions(found: np.ndarray, order: str = "xyzw") -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
     return Rotation.from_matrix(found[:, :, :3]).as_quat()[:, ["xyzw".index(axis) for axis in order]]
 
 
@@ -146,15 +156,11 @@ def cloud(form: str, names: str = "x y z", more: str = "", tail: bytes = b""):
 
 def flat_depth(folder: Path) -> bool:
     """The points are on a plane: all depths that were written are equal."""
-    from endotsr.clips.opencv import read_png
-
     seen = read_png(folder / "o/depth/000000.png")
     return bool((seen > 0).mean() > 0.2 and np.ptp(seen[seen > 0]) <= 1)
 
 
 def transposed_matrices(raw: Path) -> None:
-    import json
-
     file = raw / "transforms.json"
     data = json.loads(file.read_text())
     for entry in data["frames"]:
@@ -162,17 +168,11 @@ def transposed_matrices(raw: Path) -> None:
     file.write_text(json.dumps(data))
 
 
-def with_baseline(value: float):
-    return lambda folder: np.isclose(read_sequence_file(folder / "o").camera.baseline, value)
-
-
-def kitti_pair(folder: Path) -> list[str]:
-    words = two_folders(pictures(), pictures())(folder)
+def kitti_pair() -> str:
     across = [100.0, 0, 63.5, -0.4, 0, 101, 47.5, 0, 0, 0, 1, 0]
     own = across[:3] + [0.0] + across[4:]
     text = "\n".join(f"P{k}: {' '.join(map(str, row))}" for k, row in enumerate((own, across)))
-    (folder / "calib.txt").write_text(text + "\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n")
-    return [*words[: words.index("--camera")], "--calibration", str(folder / "calib.txt")]
+    return text + "\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n"
 
 
 POSES = [
@@ -188,10 +188,10 @@ POSES = [
     Row("trajectory, transposed 4x4 matrices", with_poses("t.npy", transposed, np.save), "refused",
         "is the matrix transposed?"),
     Row("trajectory, a head line with another number of columns",
-        with_trajectory("# stamp tx ty tz qw qx qy qz extra", *(f"{i} 0 0 0 1 0 0 0" for i in range(12))), "refused",
+        trajectory(["# stamp tx ty tz qw qx qy qz extra", *(f"{i} 0 0 0 1 0 0 0" for i in range(12))]), "refused",
         "its head line names 9 columns"),
     Row("trajectory, order of the quaternion not stated",
-        with_trajectory(*(f"{i} 0 0 0 0 0 0 1" for i in range(12))), "told", "quaternions are read as x y z w"),
+        trajectory([f"{i} 0 0 0 0 0 0 1" for i in range(12)]), "told", "quaternions are read as x y z w"),
     Row("nerfstudio, transposed matrices", public("nerfstudio", change=transposed_matrices), "refused",
         "is the matrix transposed?"),
 ]  # fmt: skip
@@ -214,22 +214,23 @@ MODELS = [
 ]  # fmt: skip
 CALIBRATIONS = [
     Row("calibration, rostopic echo with roi and several messages",
-        calibrated("a.yaml", lambda: ROS_ECHO.format(seq=1) + ROS_ECHO.format(seq=2)), "told", "half a pixel", centred),
-    Row("calibration, rostopic echo of two cameras", calibrated("a.yaml", lambda: ROS_ECHO.format(seq=1)
+        calibrated("a.yaml", ROS_ECHO.format(seq=1) + ROS_ECHO.format(seq=2)), "told", "half a pixel", centred),
+    Row("calibration, rostopic echo of two cameras", calibrated("a.yaml", ROS_ECHO.format(seq=1)
         + ROS_ECHO.format(seq=2).replace("101.0", "103.0")), "refused", "2 documents that differ"),
     Row("calibration, rostopic echo, fisheye",
-        calibrated("a.yaml", lambda: ROS_ECHO.format(seq=1).replace("plumb_bob", "equidistant")), "refused",
+        calibrated("a.yaml", ROS_ECHO.format(seq=1).replace("plumb_bob", "equidistant")), "refused",
         "distortion_model 'equidistant'"),
-    Row("calibration, with --distortion", calibrated("K.txt", lambda: MATRIX, "--distortion", "0.1", "0", "0", "0"),
+    Row("calibration, with --distortion", calibrated("K.txt", MATRIX, "--distortion", "0.1", "0", "0", "0"),
         "refused", "a calibration file states intrinsics and distortion"),
-    Row("calibration, K and D with 4 coefficients", calibrated("a.yaml", lambda: FISHEYE), "told",
+    Row("calibration, K and D with 4 coefficients", calibrated("a.yaml", FISHEYE), "told",
         "read as k1 k2 p1 p2"),
-    Row("calibration, settings of ORB-SLAM", calibrated("a.yaml", lambda: ORB.format("PinHole", 0.0)), "told",
+    Row("calibration, settings of ORB-SLAM", calibrated("a.yaml", ORB.format("PinHole", 0.0)), "told",
         "half a pixel", centred),
-    Row("calibration, fisheye settings of ORB-SLAM", calibrated("a.yaml", lambda: ORB.format("KannalaBrandt8", 0.1)),
+    Row("calibration, fisheye settings of ORB-SLAM", calibrated("a.yaml", ORB.format("KannalaBrandt8", 0.1)),
         "refused", "use PinHole or Rectified"),
-    Row("calibration, sensor.yaml of EuRoC", calibrated("a.yaml", lambda: EUROC), "told", "half a pixel", centred),
-    Row("calibration, calib.txt of KITTI", kitti_pair, "told", "P0 and P1 are read", with_baseline(4.0)),
+    Row("calibration, sensor.yaml of EuRoC", calibrated("a.yaml", EUROC), "told", "half a pixel", centred),
+    Row("calibration, calib.txt of KITTI", calibrated("calib.txt", kitti_pair(), folders=("left",
+        "right")), "told", "P0 and P1 are read", baseline(4.0)),
 ]  # fmt: skip
 
 
@@ -245,12 +246,6 @@ def chunk(kind: bytes, content: bytes):
     return folder_of(pictures(4), change=change)
 
 
-def beside_model(*files: Path) -> None:
-    for file in files:
-        file.parent.mkdir(exist_ok=True)
-        file.write_text("1")
-
-
 def public_endonerf(*names: str):
     """A simulated EndoNeRF folder without masks, with further files."""
 
@@ -263,17 +258,10 @@ def public_endonerf(*names: str):
             if name.endswith(".npy"):
                 shutil.copy(raw / "poses_bounds.npy", raw / name)
             else:
-                beside_model(raw / name)
+                with_files(name)(raw)
         return prepare("clip", camera=())(folder)
 
     return make
-
-
-def named_by_seconds(folder: Path) -> list[str]:
-    files(folder, "clip", pictures(4))
-    for k, file in enumerate(sorted((folder / "clip").iterdir())):
-        file.rename(file.with_name(f"{1305031102 + k * k / 10:.6f}.png"))
-    return prepare("clip")(folder)
 
 
 def few_points(raw: Path) -> None:
@@ -285,54 +273,11 @@ def one_more_picture(raw: Path) -> None:
     shutil.copy(raw / "images/frame_00000.png", raw / "images/frame_00099.png")
 
 
-def of_orb_slam(folder: Path) -> list[str]:
+def of_orb_slam(folder: Path) -> None:
     """A TUM folder as ORB-SLAM leaves it: its trajectory and its settings, no true one."""
-    raw_sources.tum(folder / "raw")
-    (folder / "raw/groundtruth.txt").rename(folder / "raw/CameraTrajectory.txt")
+    (folder / "groundtruth.txt").rename(folder / "CameraTrajectory.txt")
     lens = "Camera.fx: 60\nCamera.fy: 60\nCamera.cx: 31.5\nCamera.cy: 23.5\nDepthMapFactor: 5000\n"
-    (folder / "raw/TUM1.yaml").write_text("%YAML:1.0\nCamera.type: PinHole\n" + lens)
-    return prepare("raw", camera=())(folder)
-
-
-def turned_exif() -> bytes:
-    from PIL import Image
-
-    made = Image.Exif()
-    made[0x0112] = 6
-    return made.tobytes()[6:]
-
-
-def two_in_a_jpeg(folder: Path) -> None:
-    """As stereo cameras and telephones write them."""
-    from PIL import Image
-
-    for file in sorted((folder / "clip").iterdir()):
-        opened = Image.open(file).convert("RGB")
-        opened.save(file.with_suffix(".jpg"), format="MPO", save_all=True, append_images=[opened], quality=95)
-        file.unlink()
-
-
-def adobe_rgb(folder: Path) -> None:
-    from PIL import Image
-
-    for file in sorted((folder / "clip").iterdir()):
-        made = Image.Exif()
-        made.get_ifd(0x8769)[0xA001] = 65535
-        Image.open(file).convert("RGB").save(file.with_suffix(".jpg"), exif=made, quality=95)
-        file.unlink()
-
-
-def beside(*names: str):
-    """Folders and files beside left/ and right/."""
-
-    def make(folder: Path) -> list[str]:
-        words = two_folders(pictures(), pictures())(folder)
-        for name in names:
-            (folder / "clip" / name).parent.mkdir(exist_ok=True)
-            (folder / "clip" / name).write_text("1")
-        return words
-
-    return make
+    (folder / "TUM1.yaml").write_text("%YAML:1.0\nCamera.type: PinHole\n" + lens)
 
 
 def of_another_kind(folder: Path) -> None:
@@ -340,45 +285,29 @@ def of_another_kind(folder: Path) -> None:
         (folder / f"clip/{12 + k:04d}.jp2").write_bytes(b"jp2")
 
 
-def in_one_file(name: str, ending: str):
-    """Depth of a whole clip, or of each frame, as arrays."""
+def in_one_file(ending: str):
+    """Depth of a whole clip as one array."""
 
     def make(folder: Path) -> list[str]:
         words = with_depth(folder, true_depth, "d", "npy")
-        planes = {file.stem: np.load(file) for file in sorted((folder / "d").iterdir())}
-        if name == "clip":
-            stack = np.stack(list(planes.values()))
-            np.savez(folder / f"clip{ending}", depths=stack) if ending == ".npz" else np.save(
-                folder / "clip.npy", stack
-            )
-            return [str(folder / f"clip{ending}") if word == str(folder / "d") else word for word in words]
-        for stem, plane in planes.items():
-            np.savez_compressed(folder / f"d/{stem}.npz", depth=plane)
-            (folder / f"d/{stem}.npy").unlink()
-        return words
+        stack = np.stack([np.load(file) for file in sorted((folder / "d").iterdir())])
+        file = folder / f"clip{ending}"
+        np.savez(file, depths=stack) if ending == ".npz" else np.save(file, stack)
+        return [str(file) if word == str(folder / "d") else word for word in words]
 
     return make
 
 
-def with_no_data(folder: Path) -> list[str]:
+def with_no_data(path: Path, plane: np.ndarray) -> None:
     """Depth in TIFF whose tag states the number without a meaning."""
-    from PIL import Image
-    from PIL.TiffImagePlugin import ImageFileDirectory_v2
-
-    words = with_depth(folder, true_depth, "d", "npy")
-    for file in sorted((folder / "d").iterdir()):
-        tags = ImageFileDirectory_v2()
-        tags[42113], tags.tagtype[42113] = "77", 2
-        plane = np.load(file).astype(np.float32)
-        plane[:20, :30] = 77
-        Image.fromarray(plane).save(file.with_suffix(".tif"), tiffinfo=tags)
-        file.unlink()
-    return words
+    tags = ImageFileDirectory_v2()
+    tags[42113], tags.tagtype[42113] = "77", 2
+    plane = plane.astype(np.float32)
+    plane[:20, :30] = 77
+    Image.fromarray(plane).save(path, tiffinfo=tags)
 
 
 def corner_is_empty(folder: Path) -> bool:
-    from endotsr.clips.opencv import read_png
-
     seen = read_png(folder / "o/depth/000002.png")
     return bool((seen[:19, :29] == 0).all() and (seen > 0).mean() > 0.9)
 
@@ -387,9 +316,7 @@ def disparity(times: float, *words: str):
     """Disparities of a clip as 16-bit PNG."""
 
     def make(folder: Path) -> list[str]:
-        import test_relative_depth as one
-
-        where, given = one.clip(folder, lambda i: 1800 / true_depth(i))
+        where, given = one_view.clip(folder, lambda i: 1800 / true_depth(i))
         stored, file = where / "sequence.toml", read_sequence_file(where)
         stored.write_text(stored.read_text().replace("baseline = 0.0", "baseline = 4.0"))
         for k, one_file in enumerate(sorted(given.iterdir())):
@@ -406,9 +333,9 @@ def depth_of_disparity(folder: Path) -> bool:
     return found is not None and np.abs(found(2) - true_depth(2)).max() < 1
 
 
-def marked_video(name: str, mark: str, *words: str, frames=None, swapped: bool = False, **how):
+def marked_video(name: str, mark: str, *words: str, frames=None):
     """A video whose coded pictures (H.264) state a stereo pair."""
-    return video(name, frames, *words, options={"x264-params": mark, "qp": "8"}, **how)
+    return video(name, frames, *words, options={"x264-params": mark, "qp": "8"})
 
 
 def mirrored(path: Path) -> None:
@@ -424,19 +351,11 @@ def cropped(path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"\x54\xb2\x81\x04", b"\x54\xdd\x81\x10", 1))
 
 
-def sides(left, right):
-    return lambda folder: all(
-        np.abs(pair.left.astype(int) - one).mean() < 12 and np.abs(pair.right.astype(int) - other).mean() < 12
-        for i, (one, other) in enumerate(zip(left, right, strict=True))
-        for pair in [next(describe(folder / "o").pictures([i]))]
-    )
-
-
 SIDE_BY_SIDE = [np.hstack([a, b]) for a, b in zip(pictures(), MOVED)]
 STACKED = [np.vstack([a, b]) for a, b in zip(pictures(), MOVED)]
 BASELINE = ("--baseline", "4")
 PICTURES = [
-    Row("pictures, PNG turned by EXIF", chunk(b"eXIf", turned_exif()), "refused", "orientation 6"),
+    Row("pictures, PNG turned by EXIF", chunk(b"eXIf", exif(6)[6:]), "refused", "orientation 6"),
     Row("pictures, PNG of a stereo pair", chunk(b"sTER", b"\1"), "told", "--stereo side_by_side"),
     Row("pictures, PNG of high dynamic range", chunk(b"cICP", bytes([9, 16, 0, 1])), "refused", "high dynamic range"),
     Row("pictures, PNG with other primaries", chunk(b"cHRM", struct.pack(">8I", 31270, 32900, 64000, 33000, 21000,
@@ -445,33 +364,39 @@ PICTURES = [
         60000, 15000, 6000)), "right", "", close(pictures(4), 0.01)),
     Row("pictures, PNG with oblong pixels", chunk(b"pHYs", struct.pack(">IIB", 2, 1, 0)), "told", "not square"),
     Row("pictures, PNG with a chunk that is not known", chunk(b"neWc", b"1"), "told", "unknown here: neWc"),
-    Row("pictures, several in a JPEG", folder_of(pictures(4), change=two_in_a_jpeg), "told", "MPF: further pictures"),
-    Row("pictures, Adobe RGB by EXIF", folder_of(pictures(4), change=adobe_rgb), "told", "profile other than sRGB"),
-    Row("pictures beside masks, depth, times and a calibration", beside("masks/0.png", "depth/0.png", "times.txt",
-        "calib.yaml"), "told", "not read: calib.yaml, depth/, masks/; see --masks, --depth, --calibration"),
+    Row("pictures, several in a JPEG", folder_of(pictures(4), change=converted("jpg", format="MPO", save_all=True,
+        append_images=[blank()])), "told", "MPF: further pictures"),
+    Row("pictures, Adobe RGB by EXIF", folder_of(pictures(4), change=converted("jpg", exif=exif(space=65535),
+        quality=95)), "told", "profile other than sRGB"),
+    Row("pictures beside masks, depth, times and a calibration", pair(change=with_files("masks/0.png",
+        "depth/0.png", "times.txt", "calib.yaml")), "told",
+        "not read: calib.yaml, depth/, masks/; see --masks, --depth, --calibration"),
     Row("pictures, others of a kind that is not read", folder_of(pictures(), change=of_another_kind), "told",
         "not read: 5 files .jp2"),
-    Row("pictures named by their seconds", named_by_seconds, "told", "read as seconds", timed([0, 100, 400, 900])),
+    Row("pictures named by their seconds", named(lambda k: f"{1305031102 + k * k / 10:.6f}.png", pictures(4)), "told",
+        "read as seconds", timed([0, 100, 400, 900])),
     Row("COLMAP, points that points3D lacks", colmap(change=few_points), "told", "are not in points3D"),
     Row("nerfstudio, pictures that the file does not list", public("nerfstudio", change=one_more_picture), "told",
         "not listed in transforms.json and are left out"),
-    Row("TUM, trajectory and settings of ORB-SLAM", of_orb_slam, "told", "poses of CameraTrajectory.txt",
+    Row("TUM, trajectory and settings of ORB-SLAM", raw(raw_sources.tum, change=of_orb_slam), "told",
+        "poses of CameraTrajectory.txt",
         lambda folder: np.isclose(read_sequence_file(folder / "o").camera.cx, 32)),
-    Row("COLMAP, masks beside it", colmap(change=lambda raw: beside_model(raw / "masks/frame0000.png")), "told",
+    Row("COLMAP, masks beside it", colmap(change=with_files("masks/frame0000.png")), "told",
         "not read: masks/; see --masks"),
-    Row("COLMAP, rigs and frames of its new versions", colmap(change=lambda raw: beside_model(
-        raw / "sparse/0/rigs.txt", raw / "sparse/0/frames.txt")), "right", ""),
+    Row("COLMAP, rigs and frames of its new versions", colmap(change=with_files("sparse/0/rigs.txt",
+        "sparse/0/frames.txt")), "right", ""),
     Row("EndoNeRF, masks in gt_masks alone", public_endonerf("gt_masks/0.png"), "told", "not read: gt_masks/"),
     Row("EndoNeRF, a second pose file", public_endonerf("pose_bounds.npy"), "told", "not read: pose_bounds.npy"),
     Row("nerfstudio, depth and masks that the file does not name",
-        public("nerfstudio", with_depth=False, change=lambda raw: beside_model(raw / "sam/0.png")), "told",
+        public("nerfstudio", with_depth=False, change=with_files("sam/0.png")), "told",
         "not read: depth/, sam/"),
 ]  # fmt: skip
 DEPTHS = [
-    Row("depth, one npz for the clip", in_one_file("clip", ".npz"), "told", "clip.npz: --pairing order", depth_is_true),
-    Row("depth, one npy for the clip", in_one_file("clip", ".npy"), "told", "clip.npy: --pairing order", depth_is_true),
-    Row("depth, one npz for each frame", in_one_file("frames", ".npz"), "right", "", depth_is_true),
-    Row("depth, TIFF with a number that means none", with_no_data, "right", "", corner_is_empty),
+    Row("depth, one npz for the clip", in_one_file(".npz"), "told", "clip.npz: --pairing order", depth_is_true),
+    Row("depth, one npy for the clip", in_one_file(".npy"), "told", "clip.npy: --pairing order", depth_is_true),
+    Row("depth, one npz for each frame", depth_files(lambda path, plane: np.savez_compressed(path,
+        depth=plane.astype(np.float32)), ".npz"), "right", "", depth_is_true),
+    Row("depth, TIFF with a number that means none", depth_files(with_no_data, ".tif"), "right", "", corner_is_empty),
     Row("disparity times 256", disparity(256), "refused", "--unit-scale 0.00390625"),
     Row("disparity times 256, --unit-scale", disparity(256, "--unit-scale", "0.00390625"), "right", "",
         depth_of_disparity),

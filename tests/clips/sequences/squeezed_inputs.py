@@ -1,15 +1,12 @@
 """Rows of `inputs_tried.py` about stereo pairs whose views are squeezed to half their width or height."""
 
-import sys
 from pathlib import Path
 
+import av
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from input_kinds import MATRIX, Row, centred, folder_of, prepare, size
+from input_kinds import MATRIX, Row, centred, folder_of, prepare, sides, size
 from left_inputs import MOVED
 from made_videos import HEIGHT, WIDTH, pictures
-from silent_inputs import sides
 
 from endotsr.clips.opencv import area_resize
 
@@ -28,8 +25,6 @@ def video(*words: str, stacked: bool = False, mark: str = ""):
     """
 
     def make(folder: Path) -> list[str]:
-        import av
-
         frames = squeezed(stacked)
         with av.open(str(folder / "a.mkv"), "w") as container:
             stream = container.add_stream("ffv1", rate=25)

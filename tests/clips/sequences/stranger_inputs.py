@@ -1,5 +1,6 @@
 """Rows of `inputs_tried.py` about folders of a user who knows none of the conventions here."""
 
+import struct
 import zipfile
 from pathlib import Path
 
@@ -7,42 +8,38 @@ import numpy as np
 from input_kinds import (
     MATRIX,
     Row,
+    baseline,
     calibrated,
     centred,
     close,
     common,
     depth,
+    depth_files,
     depth_is_true,
     files,
     folder_of,
     half_excluded,
+    labels,
     mask,
     masked,
+    named,
     prepare,
-    rewritten,
     ros_text,
+    trajectory,
     video,
 )
 from made_videos import pictures, woven
-from odd_inputs import named, with_camera
-from test_stated_depth import recording as with_depth
+from odd_inputs import with_camera
 from test_stated_depth import true_depth
 
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
+from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.sequences.sequence_file import FILE_NAME
+from synthetic_folder import write_synthetic_folder
 
-EULER = "t,x,y,z,roll,pitch,yaw\n" + "\n".join(f"{i / 25},{i},0,0,0,0,90" for i in range(12))
+EULER = ["t,x,y,z,roll,pitch,yaw", *(f"{i / 25},{i},0,0,0,0,90" for i in range(12))]
 P = "{}: 100 0 63.5 {} 0 100 47.5 0 0 0 1 0\n"
 LINE = "{} {} 0 0 0 0 0 1"
-
-
-def palette_masks(folder: Path) -> None:
-    def changed(opened, _):
-        made = opened.point(lambda value: value // 255).convert("P")
-        made.putpalette([0, 0, 0, 255, 255, 255])
-        return made
-
-    rewritten(folder, changed)
 
 
 def one_file(change):
@@ -62,8 +59,6 @@ def looped(path: Path) -> None:
 
 def no_focal_length(folder: Path) -> list[str]:
     """The EndoNeRF layout with a negative focal length in every row."""
-    from synthetic_folder import write_synthetic_folder
-
     write_synthetic_folder(folder / "clip")
     rows = np.load(folder / "clip/poses_bounds.npy")
     rows[:, 14] = -rows[:, 14]
@@ -99,23 +94,8 @@ def zipped(folder: Path) -> list[str]:
     return prepare("clip.zip")(folder)
 
 
-def depth_files(save, ending: str, *words: str):
-    """True depth in files of another kind."""
-
-    def make(folder: Path) -> list[str]:
-        found = with_depth(folder, true_depth)
-        for i, file in enumerate(sorted((folder / "depth").iterdir())):
-            file.unlink()
-            save(file.with_suffix(ending), true_depth(i))
-        return [*found, *words]
-
-    return make
-
-
 def half_tiff(path: Path, plane) -> None:
     """A TIFF of 16-bit floating-point numbers, written by hand: Pillow has no such mode."""
-    import struct
-
     height, width = plane.shape
     data = plane.astype("<f2").tobytes()
     tags = [(256, 4, width), (257, 4, height), (258, 3, 16), (259, 3, 1), (262, 3, 1), (273, 4, 8), (277, 3, 1),
@@ -144,18 +124,12 @@ def quotes(folder: Path) -> list[str]:
     return prepare("my 'clip' \"1\" $HOME")(folder)
 
 
+def as_jpg_too(folder: Path) -> None:
+    write_jpeg(folder / "clip/0003.jpg", read_png(folder / "clip/0003.png"))
+
+
 def newline(path: Path) -> None:
     path.rename(path.with_name("00\n03.png"))
-
-
-def upper(folder: Path) -> None:
-    for file in (folder / "clip").iterdir():
-        file.rename(file.with_suffix(".PNG"))
-
-
-def heic(folder: Path) -> None:
-    for file in (folder / "clip").iterdir():
-        file.rename(file.with_suffix(".heic"))
 
 
 def letterbox(count=12):
@@ -177,42 +151,6 @@ def edited(name: str, change):
     return make
 
 
-def trajectory(text: str, *words: str):
-    """A trajectory with this content, as bytes."""
-
-    def make(folder: Path) -> list[str]:
-        (folder / "t.txt").write_bytes(text if isinstance(text, bytes) else text.encode())
-        return folder_of(pictures(), "--trajectory", str(folder / "t.txt"), *words)(folder)
-
-    return make
-
-
-def kitti(text: str, *names: str, calibration="calib.txt"):
-    def make(folder: Path) -> list[str]:
-        (folder / "raw").mkdir()
-        for name in names or ("image_2", "image_3"):
-            files(folder / "raw", name, pictures())
-        (folder / "raw" / calibration).write_text(text)
-        return prepare("raw", "--calibration", str(folder / "raw" / calibration), camera=())(folder)
-
-    return make
-
-
-def baseline(millimetres: float):
-    return lambda folder: abs(read_sequence_file(folder / "o").camera.baseline - millimetres) < 1e-6
-
-
-def pair_of(text: str, name="a.yaml"):
-    def make(folder: Path) -> list[str]:
-        (folder / "raw").mkdir()
-        for side in ("left", "right"):
-            files(folder / "raw", side, pictures())
-        (folder / name).write_text(text)
-        return prepare("raw", "--calibration", str(folder / name), camera=())(folder)
-
-    return make
-
-
 def opencv_matrix(name: str, numbers, cols: int) -> str:
     data = ", ".join(f"{number:g}." if number == int(number) else f"{number}" for number in numbers)
     return f"{name}: !!opencv-matrix\n   rows: 3\n   cols: {cols}\n   dt: d\n   data: [{data}]\n"
@@ -224,10 +162,11 @@ RECTIFIED = "%YAML:1.0\n---\n" + opencv_matrix("P1", PROJECTION, 4) + opencv_mat
 RAW_KITTI = "calib_time: 09-Jan-2012 13:57:47\n" + "".join(
     f"S_rect_0{k}: 1.28e+02 9.6e+01\n" + P.format(f"P_rect_0{k}", tx) for k, tx in enumerate((0, -40, 4, -36))
 )
+SIDES = ("left", "right")
 LINES = [LINE.format(f"{i / 25:.2f}", f"{0.001 * i:.4f}") for i in range(12)]
 INTERLACED_PAIR = [np.hstack([p, p]) for p in woven()]
 STRANGER_ROWS = [
-    Row("masks, with a palette of black and white", masked([mask()] * 12, change=palette_masks), "right", "",
+    Row("masks, with a palette of black and white", masked([mask()] * 12, change=labels(255, 255, 255)), "right", "",
         half_excluded),
     Row("video, H.265 4:2:2 10 bit", video("a.mp4", codec="libx265", layout="yuv422p10le"), "right", "",
         close(pictures())),
@@ -236,11 +175,11 @@ STRANGER_ROWS = [
     Row("pictures, a link to itself", one_file(looped), "refused", "0003.png"),
     Row("pictures, a name with a line break", one_file(newline), "refused", "allowed"),
     Row("names with spaces, quotes and a dollar sign", quotes, "right", "", close(pictures(), 0.01)),
-    Row("names in capitals", folder_of(pictures(), change=upper), "right", "", close(pictures(), 0.01)),
-    Row("a folder above the pictures", kitti(P.format("P2", 4), "first try"), "refused",
+    Row("names in capitals", named(lambda k: f"{k:04d}.PNG"), "right", "", close(pictures(), 0.01)),
+    Row("a folder above the pictures", calibrated("calib.txt", P.format("P2", 4), folders=["first try"]), "refused",
         "it holds the folders first try;"),
     Row("names of copies", named(lambda k: f"IMG_{k:04d} (2).png"), "right", "", close(pictures(), 0.01)),
-    Row("pictures, heic", folder_of(pictures(), change=heic), "refused", "12 files that end in .heic; convert"),
+    Row("pictures, heic", named(lambda k: f"{k:04d}.heic"), "refused", "12 files that end in .heic; convert"),
     Row("a zip file", zipped, "refused", "an archive; unpack it first"),
     Row("a folder that is not there", prepare("nothing"), "refused", "not found"),
     Row("pictures, letterbox", folder_of(letterbox()), "told", "--crop 0 16 128 64 keeps the rest"),
@@ -248,7 +187,7 @@ STRANGER_ROWS = [
         "4", options={"flags": "+ildct+ilme", "x264-params": "interlaced=1:tff=1"}), "told", "is interlaced"),
     Row("depth, half-float TIFF", depth_files(half_tiff, ".tiff"), "refused",
         "numbers of 16 or 64 bits"),
-    Row("depth, EXR", depth_files(exr, ".exr"), "refused", "exr"),
+    Row("depth, EXR", depth_files(exr, ".exr"), "refused", "OpenEXR is not read; convert it"),
     Row("depth, half-float npy", depth_files(npy(np.float16), ".npy"), "right", ""),
     Row("depth, int32 npy", depth_files(npy(np.int32), ".npy"), "right", ""),
     Row("depth, grey with three channels", depth_files(three_channels, ".png"), "right", ""),
@@ -261,16 +200,17 @@ STRANGER_ROWS = [
     Row("camera with decimal commas", with_camera("100,5", "100,5", "64", "48"), "refused", "100,5"),
     Row("camera, principal point in parts of the picture", with_camera("100", "100", "0.5", "0.5"), "told",
         "principal-point"),
-    Row("trajectory with decimal commas", trajectory("\n".join(LINES).replace(".", ",")), "refused",
+    Row("trajectory with decimal commas", trajectory([line.replace(".", ",") for line in LINES]), "refused",
         "write decimal points"),
-    Row("trajectory with semicolons", trajectory("\n".join(LINES).replace(" ", ";")), "told",
+    Row("trajectory with semicolons", trajectory([line.replace(" ", ";") for line in LINES]), "told",
         "one pose per frame"),
-    Row("trajectory whose stamps go back", trajectory("\n".join(LINES[::-1])), "told",
+    Row("trajectory whose stamps go back", trajectory(LINES[::-1]), "told",
         "line 2: stamps go back: the poses are sorted"),
-    Row("trajectory with a stamp twice", trajectory("\n".join([*LINES[:4], LINES[3], *LINES[4:]])), "refused", "twice"),
-    Row("trajectory with a quaternion of zeros", trajectory("\n".join([*LINES[:11], "0.44 0 0 0 0 0 0 0"])), "refused",
+    Row("trajectory with a stamp twice", trajectory([*LINES[:4], LINES[3], *LINES[4:]]), "refused", "twice"),
+    Row("trajectory with a quaternion of zeros", trajectory([*LINES[:11], "0.44 0 0 0 0 0 0 0"]), "refused",
         "quaternion"),
-    Row("trajectory with a byte order mark and CRLF", trajectory("\ufeff" + "\r\n".join(LINES), "--source-rate", "25"),
+    Row("trajectory with a byte order mark and CRLF", trajectory(("\ufeff" + "\r\n".join(LINES)).encode(),
+        "--source-rate", "25"),
         "told", "one pose per frame"),
     Row("trajectory in UTF-16", trajectory("\n".join(LINES).encode("utf-16")), "refused",
         "not UTF-8 text"),
@@ -278,33 +218,33 @@ STRANGER_ROWS = [
         lambda data: b"\xef\xbb\xbf" + data.replace(b"\n", b"\r\n")), "right", ""),
     Row("common format, sequence.toml with decimal commas", edited(FILE_NAME,
         lambda data: data.replace(b"fx = 3", b"fx = 3,")), "refused", FILE_NAME),
-    Row("calibration, calib.txt of KITTI, P2 and P3 alone", kitti(P.format("P2", 4) + P.format("P3", -36)), "told",
-        "P2 and P3 are read", baseline(400)),
-    Row("calibration, calib.txt of KITTI, one camera", kitti(P.format("P2", 4), "images"), "told",
+    Row("calibration, calib.txt of KITTI, P2 and P3 alone", calibrated("calib.txt",
+        P.format("P2", 4) + P.format("P3", -36), folders=SIDES), "told", "P2 and P3 are read", baseline(400)),
+    Row("calibration, calib.txt of KITTI, one camera", calibrated("calib.txt", P.format("P2", 4)), "told",
         "P2 is read as one camera, without a baseline", centred),
-    Row("calibration, calib_cam_to_cam.txt of KITTI", kitti(RAW_KITTI, calibration="calib_cam_to_cam.txt"), "told",
-        "P_rect", baseline(400)),
-    Row("calibration, P1 and P2 of OpenCV", pair_of(RECTIFIED), "told", "P2", baseline(4)),
+    Row("calibration, calib_cam_to_cam.txt of KITTI", calibrated("calib_cam_to_cam.txt", RAW_KITTI,
+        folders=SIDES), "told", "P_rect", baseline(400)),
+    Row("calibration, P1 and P2 of OpenCV", calibrated("a.yaml", RECTIFIED, folders=SIDES), "told", "P2", baseline(4)),
     Row("calibration, a projection with a baseline as text", calibrated("K.txt",
-        lambda: "100 0 63.5 -40\n0 101 47.5 0\n0 0 1 0\n"), "refused", "fourth column"),
-    Row("calibration, matrix with decimal commas", calibrated("K.txt", lambda: MATRIX.replace(".", ",")), "refused",
+        "100 0 63.5 -40\n0 101 47.5 0\n0 0 1 0\n"), "refused", "fourth column"),
+    Row("calibration, matrix with decimal commas", calibrated("K.txt", MATRIX.replace(".", ",")), "refused",
         "write decimal points"),
-    Row("calibration, P1 and P2 of unlike cameras", pair_of(RECTIFIED.replace("63.5, -400", "93.5, -400")), "refused",
-        "CALIB_ZERO_DISPARITY"),
-    Row("calibration, P1 and P2 of a pair above one another", pair_of(RECTIFIED.replace("-400., 0., 100., 47.5, 0.",
-        "0., 0., 100., 47.5, -400.")), "refused", "above or below it"),
-    Row("calibration, ROS, the right camera alone", calibrated("a.yaml", lambda: ros_text(
+    Row("calibration, P1 and P2 of unlike cameras", calibrated("a.yaml",
+        RECTIFIED.replace("63.5, -400", "93.5, -400"), folders=SIDES), "refused", "CALIB_ZERO_DISPARITY"),
+    Row("calibration, P1 and P2 of a pair above one another", calibrated("a.yaml", RECTIFIED.replace(
+        "-400., 0., 100., 47.5, 0.", "0., 0., 100., 47.5, -400."), folders=SIDES), "refused", "above or below it"),
+    Row("calibration, ROS, the right camera alone", calibrated("a.yaml", ros_text(
         projection_matrix={"rows": 3, "cols": 4, "data": [float(value) for value in RIGHT]})), "told",
         "a right camera"),
-    Row("one picture twice in the folder as jpg and png", folder_of(pictures(), change=lambda folder: rewritten_beside(
-        folder)), "refused", "carry the same frame number"),
+    Row("one picture twice in the folder as jpg and png", folder_of(pictures(), change=as_jpg_too), "refused",
+        "carry the same frame number"),
     Row("calibration that is not there", missing_calibration, "refused", "scope: not found"),
-    Row("calibration, YAML with tabs", calibrated("a.yaml", lambda: "camera_matrix:\n\tdata: [1]\n"), "refused",
+    Row("calibration, YAML with tabs", calibrated("a.yaml", "camera_matrix:\n\tdata: [1]\n"), "refused",
         "cannot start any token (line 2)"),
-    Row("calibration, matrix K as csv", calibrated("K.csv", lambda: MATRIX.replace(" ", ",")), "told",
+    Row("calibration, matrix K as csv", calibrated("K.csv", MATRIX.replace(" ", ",")), "told",
         "half a pixel was added", centred),
     Row("trajectory with angles", trajectory(EULER), "refused", "write quaternions"),
-    Row("trajectory, matrices in brackets", trajectory("\n".join([str(np.eye(4).tolist())] * 12)), "told",
+    Row("trajectory, matrices in brackets", trajectory([str(np.eye(4).tolist())] * 12), "told",
         "stamps are frame numbers"),
     Row("pictures of two cameras by their last number", named(lambda k: f"{k // 2:04d}_{k % 2}.png"), "told",
         "if these are two cameras"),
@@ -318,9 +258,3 @@ STRANGER_ROWS = [
     Row("--scale 0", folder_of(pictures(), "--scale", "0"), "refused", "scale"),
     Row("--rate below 0", video("a.mp4", None, "--rate", "-5"), "refused", "rate"),
 ]  # fmt: skip
-
-
-def rewritten_beside(folder: Path) -> None:
-    from endotsr.clips.opencv.pictures import write_jpeg
-
-    write_jpeg(folder / "clip/0003.jpg", read_png(folder / "clip/0003.png"))

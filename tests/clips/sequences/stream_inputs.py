@@ -2,13 +2,10 @@
 
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from input_kinds import Row, centred, close, folder_of, prepare, public, rewritten
+from input_kinds import Row, centred, close, converted, folder_of, prepare, public, with_files
 from made_videos import pictures
 from public_layouts import K
 from public_layouts import poses as true_poses
@@ -19,11 +16,7 @@ from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 def unpacked(change):
     """A keyframe of SCARED with the files of the frames in a folder."""
-
-    def make(folder: Path) -> list[str]:
-        return public("scared", "--gaps", "fill", archive=False, change=change)(folder)
-
-    return make
+    return public("scared", "--gaps", "fill", archive=False, change=change)
 
 
 def one_file_missing(raw: Path) -> None:
@@ -43,8 +36,8 @@ def with_calibrations(raw: Path) -> None:
 
 def as_downloaded(raw: Path) -> None:
     """The other files of a keyframe."""
-    for name in ("left_depth_map.tiff", "right_depth_map.tiff", "point_cloud.obj", "Left_Image.png", "Right_Image.png"):
-        (raw / name).write_bytes(b"1")
+    with_files("left_depth_map.tiff", "right_depth_map.tiff", "point_cloud.obj", "Left_Image.png",
+               "Right_Image.png")(raw)  # fmt: skip
     (raw / "endoscope_calibration.yaml").rename(raw / "camera_calibration.yaml")
 
 
@@ -79,7 +72,7 @@ def stream(write, name: str, **keys):
 
 
 def oblong(folder: Path) -> None:
-    rewritten(folder / "clip", lambda opened, _: opened, "bmp")
+    converted("bmp")(folder)
     for file in (folder / "clip").iterdir():
         data = bytearray(file.read_bytes())
         data[38:46] = bitmap(38, "<ii", 2000, 1000)[38:46]

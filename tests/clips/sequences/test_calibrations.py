@@ -7,7 +7,6 @@ import yaml
 from public_layouts import K, stereo_yaml
 from raw_sources import ini
 
-from endotsr.clips.sequences.calibration_formats import FORMATS
 from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.errors import InputError
 
@@ -135,10 +134,6 @@ def test_what_is_no_calibration_is_refused(said, tmp_path):
     with pytest.raises(InputError, match=name) as caught:
         calibrated(tmp_path / name, *SIZE)
     assert said in str(caught.value)
-
-
-def test_every_format_says_what_it_reads():
-    assert len(FORMATS) == 5 and len({entry.about for entry in FORMATS}) == 5
 
 
 def test_a_pair_of_matlab_has_transposed_matrices_and_counts_pixels_from_one(tmp_path):

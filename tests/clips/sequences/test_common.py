@@ -1,6 +1,5 @@
 """The common format: what is written is read, units and axes are exact, and every wrong file has one line."""
 
-import contextlib
 import re
 from pathlib import Path
 
@@ -149,12 +148,7 @@ def test_every_unit_becomes_millimetres(tmp_path, unit, factor):
     found = written(tmp_path / "a", poses=moving())
     assert found.depth and found.poses
     rows = [[v / factor if k % 4 == 3 else v for k, v in enumerate(row)] for row in found.poses.matrices]
-    written(
-        tmp_path / "b",
-        unit=unit,
-        depth=True,
-        poses=rows,
-    )
+    written(tmp_path / "b", unit=unit, poses=rows)
     other = read_sequence_file(tmp_path / "b")
     data = (tmp_path / "b" / FILE_NAME).read_text().replace("scale = 0.01", f"scale = {0.01 / factor!r}")
     (tmp_path / "b" / FILE_NAME).write_text(data.replace('[depth]\nfolder = "depth"\nunit = "mm"',
@@ -235,6 +229,7 @@ WRONG = {
     "a row too short": (lambda p: text(p, "    [1.0, 0.0,", "    [1.0,"), "frame 0: 11 numbers; allowed: 12"),
     "no rotation": (lambda p: text(p, "    [1.0,", "    [2.0,"), "frame 0: the first three columns are not perp"),
     "mirror": (lambda p: text(p, "    [1.0,", "    [-1.0,"), "frame 0: .*mirror image"),
+    "interpolated text": (lambda p: text(p, "interpolated = []", 'interpolated = "a"'), "interpolated = 'a' is not"),
     "pose text": (lambda p: text(p, "    [1.0,", '    ["a",'), "poses: a list of numbers"),
 }  # fmt: skip
 
@@ -258,34 +253,20 @@ def test_without_depth_the_remedy_is_named(tmp_path):
         read_sequence(tmp_path / "mono", WHOLE, 0.2)
 
 
-def inverted(folder):
-    """Masks with the other polarity than sequence.toml states."""
-    for file in (folder / "masks").iterdir():
-        write_png(file, 255 - read_png(file))
-
-
-@pytest.mark.parametrize("stated", ["white", "black"])
-def test_the_remedy_for_inverted_masks_works(tmp_path, stated, capsys):
-    """What the message says to set makes the same folder readable, in `check` and in the training."""
-    written(tmp_path, masks=True)
+def test_a_setting_overrides_the_polarity_of_inverted_masks(tmp_path):
+    written(tmp_path)
     right = read_sequence(tmp_path, WHOLE, 0.2).masks
-    if stated == "white":
-        inverted(tmp_path)
-    else:
-        text = (tmp_path / FILE_NAME).read_text()
-        (tmp_path / FILE_NAME).write_text(text.replace('excluded_value = "white"', 'excluded_value = "black"'))
-    assert main(["check", str(tmp_path)]) == 1
-    said = capsys.readouterr().out
-    if stated == "white":
-        assert "set --sequence.excluded-value black" in said
-        config, words = SequenceConfig(excluded_value="black"), ["--sequence.excluded-value", "black"]
-    else:
-        assert f'set [masks] excluded_value = "white" in {tmp_path / FILE_NAME}' in said
-        (tmp_path / FILE_NAME).write_text(text)
-        config, words = SequenceConfig(), []
-    with pytest.raises(InputError, match="other polarity") if stated == "white" else contextlib.nullcontext():
-        read_sequence(tmp_path, SequenceConfig(), 0.2)
-    assert main(["check", str(tmp_path), *words]) == 0
-    sequence = read_sequence(tmp_path, config, 0.2)
+    for file in (tmp_path / "masks").iterdir():
+        write_png(file, 255 - read_png(file))
+    with pytest.raises(InputError, match="other polarity"):
+        read_sequence(tmp_path, WHOLE, 0.2)
+    sequence = read_sequence(tmp_path, SequenceConfig(excluded_value="black"), 0.2)
     np.testing.assert_array_equal(sequence.masks, right)
-    assert any("overrides the value" in note for note in sequence.notes) == (stated == "white")
+    assert any("overrides the value" in note for note in sequence.notes)
+
+
+def test_a_wrong_statement_of_the_polarity_is_named_with_its_file(tmp_path, capsys):
+    written(tmp_path)
+    text(tmp_path, 'excluded_value = "white"', 'excluded_value = "black"')
+    assert main(["check", str(tmp_path)]) == 1
+    assert f'set [masks] excluded_value = "white" in {tmp_path / FILE_NAME}' in capsys.readouterr().out

@@ -7,7 +7,7 @@ import pytest
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.depth_outliers import AROUND, FARTHER, outlying_frames, remove_outliers
 from endotsr.clips.sequences.read import read_sequence
-from endotsr.config import PAPER, PRESETS, SequenceConfig
+from endotsr.config import PAPER, SequenceConfig
 from synthetic_folder import write_synthetic_folder
 
 FAR = 3  # frame of the folder with wrong far depths
@@ -79,8 +79,3 @@ def test_a_training_removes_them_only_if_configured(folder):
 def test_check_names_the_frame_and_the_setting(folder):
     (found,) = [finding for finding in check_sequence(folder, PAPER).findings if finding.code == "depth-outliers"]
     assert f"frame {FAR} (" in found.what and "sequence.depth_outliers" in found.remedy
-
-
-def test_the_published_preset_keeps_them():
-    rules = {name: preset.sequence.depth_outliers for name, preset in PRESETS.items()}
-    assert rules == {"paper": "kept", "sharp": "removed", "quick": "removed", "demo": "removed"}

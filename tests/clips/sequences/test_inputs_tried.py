@@ -13,3 +13,5 @@ def test_an_input_has_its_outcome(row, tmp_path):
     found = tried(row, tmp_path)
     assert found.outcome == row.expected, found
     assert row.said in found.message or found.outcome == "right", found
+    written = found.command.startswith("endotsr prepare") and (tmp_path / "o").exists()
+    assert not (found.outcome == "refused" and written), "a refusal leaves nothing"

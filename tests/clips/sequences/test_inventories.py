@@ -116,36 +116,6 @@ def test_a_video_with_a_new_field_says_so(name, old, tmp_path):
     assert "unknown here" in str(outcome(found, tmp_path / "a", found.base | {"field": (old, new)}))
 
 
-@pytest.mark.parametrize(
-    ("name", "field"),
-    [
-        ("nerfstudio", "k1"),
-        ("nerfstudio", "camera_angle_x"),
-        ("nerfstudio frame", "time"),
-        ("kalibr", "T_cn_cnm1"),
-        ("opencv", "D2"),
-        ("ini", "T_0"),
-        ("matlab pair", "RotationOfCamera2"),
-        ("colmap image binary", "TX"),
-        ("llff", "R"),
-        ("png", "PLTE"),
-        ("gaussians", "rot_1"),
-        ("mp4", "elst"),
-        ("servct camera", "P2"),
-        ("avi", "vprp"),
-        ("ts", "stream_type"),
-        ("hamlyn", "depth"),
-        ("scared frame", "camera-pose"),
-    ],
-)
-def test_a_reader_that_drops_a_field_is_found(name, field, tmp_path):
-    """The proof of a used field fails for a reader that does not look at it."""
-    found = FORMATS[name]
-    value = (found.base | found.start)[field]
-    blind = found._replace(write=lambda folder, keys: found.write(folder, keys | {field: value}))
-    assert not matters(blind, field, tmp_path)
-
-
 def test_a_neutral_value_of_a_refused_field_changes_nothing():
     inventory = Inventory("x", {"a": ""}, {"b": "no"}, {}, {"b": ("none",)})
     assert inventory.noted({"b": 0, "a": 1}, "f") == inventory.noted({"b": "none"}, "f") == []

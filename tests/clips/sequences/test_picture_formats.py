@@ -76,10 +76,6 @@ def test_a_file_that_is_cut_off_is_refused_in_one_line(ending, part, tmp_path, c
     assert capfd.readouterr() == ("", "")
 
 
-def two(ending):
-    return saved(COLOUR, ending, save_all=True, append_images=[Image.new("RGB", (47, 33))])
-
-
 def turned(ending):
     exif = Image.Exif()
     exif[0x0112] = 3
@@ -114,8 +110,6 @@ def huge_webp(form):
 
 
 REFUSED = {
-    "tiff of two": ("tiff", two("tiff"), "holds 2 pictures; allowed: one"),
-    "webp of two": ("webp", two("webp"), "holds 2 pictures; allowed: one"),
     "turned tiff": ("tiff", turned("tiff"), "orientation 3"),
     "turned webp": ("webp", turned("webp"), "orientation 3"),
     "transparent tiff": ("tiff", transparent("tiff"), "has transparent pixels"),
@@ -166,15 +160,6 @@ def test_every_folder_of_pictures_takes_them(ending, tmp_path):
         shape = (3, 48, 64)
         file = sorted((tmp_path / "clip/images").iterdir())[0]
         np.testing.assert_array_equal(read_render(file, shape), expected.images[0].astype(np.float32) / 255)
-
-
-def test_openexr_is_refused_with_a_remedy(tmp_path):
-    """Whether OpenCV reads it depends on its build and on a variable of the environment."""
-    file = written(tmp_path, b"v/1\x01\x02\0\0\0", "exr")
-    with pytest.raises(InputError, match=r"a\.exr: OpenEXR is not read; convert it"):
-        read_plane(file)
-    with pytest.raises(InputError, match=r"no picture by its name"):
-        read_picture(file)
 
 
 @pytest.mark.parametrize("ending", FILES.listed)

@@ -7,7 +7,6 @@ from endotsr.clips.sequences.splits import (
     blocks,
     end_of_clip,
     every_eighth,
-    parse_frame_range,
     split_frames,
     time_stamps,
 )
@@ -56,14 +55,6 @@ def test_too_few_frames_are_refused():
         split_frames(2, "every_eighth", 8)
     training, held_out = split_frames(3, "every_eighth", 8)
     assert list(training) == [0, 2] and list(held_out) == [1]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("", range(9)), ("2:", range(2, 9)), (":5", range(5)), ("1:8:3", range(1, 8, 3)), ("-4:-1", range(5, 8))],
-)
-def test_frame_ranges(text, expected):
-    assert list(parse_frame_range(text, 9)) == list(expected)
 
 
 def test_time_never_reaches_one():

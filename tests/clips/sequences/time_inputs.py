@@ -1,14 +1,10 @@
 """Rows of `inputs_tried.py` about lists of times beside pictures, as recorders and other programs write them."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import raw_sources
-from common_folder import written
-from input_kinds import Row, files, folder_of, prepare, timed
+from input_kinds import Row, common, folder_of, pair, prepare, raw, timed, with_files
 from left_inputs import lens_of, matrices
 from made_videos import pictures
 from rig_inputs import STEP, true_rig
@@ -34,13 +30,8 @@ def lines(of, separator: str = "\n") -> str:
     return separator.join(of(k, ms) for k, ms in enumerate(UNEVEN)) + separator
 
 
-def kitti(folder: Path) -> list[str]:
-    """A sequence of KITTI in colour: image_2/, image_3/ and times.txt."""
-    (folder / "clip").mkdir()
-    for name in ("image_2", "image_3"):
-        files(folder / "clip", name, pictures())
-    (folder / "clip/times.txt").write_text(lines(lambda k, ms: f"{ms / 1e3:e}"))
-    return prepare("clip", "--baseline", "4")(folder)
+def kitti_times(clip: Path) -> None:
+    (clip / "times.txt").write_text(lines(lambda k, ms: f"{ms / 1e3:e}"))
 
 
 def two_lists(folder: Path) -> list[str]:
@@ -81,13 +72,8 @@ def on_one_clock(by_names: bool):
     return make
 
 
-def tum(change=lambda raw: None):
-    def make(folder: Path) -> list[str]:
-        raw_sources.tum(folder / "raw")
-        change(folder / "raw")
-        return prepare("raw", camera=("--camera", "60", "60", "32", "24"))(folder)
-
-    return make
+def tum(change):
+    return raw(raw_sources.tum, change=change, camera=("--camera", "60", "60", "32", "24"))
 
 
 def tum_in_nanoseconds(raw: Path) -> None:
@@ -106,23 +92,11 @@ def tum_kept(folder: Path) -> bool:
     return found.frames == 5 and np.isclose(found.frame_rate, 25, atol=0.01) and found.poses is not None
 
 
-def in_training(command: str, *names: str, change=None):
-    """A folder in the common format with further entries, looked at before a training."""
-
-    def make(folder: Path) -> list[str]:
-        written(folder / "clip", **({} if change is None else change))
-        for name in names:
-            (folder / "clip" / name).parent.mkdir(exist_ok=True)
-            (folder / "clip" / name).write_text("1")
-        return [command, str(folder / "clip")]
-
-    return make
-
-
 IN_NANOSECONDS = "#timestamp [ns]\r\n" + lines(lambda k, ms: f"{1403636579763555584 + ms * 10**6}", "\r\n")
 NAMED = "filename,timestamp\n" + lines(lambda k, ms: f"clip\\{k:04d}.png,{EPOCH + ms / 1e3:.6f}")
 TIME_ROWS = [
-    Row("times, times.txt of KITTI", kitti, "told", "times.txt: times of the pictures in seconds, 0.48 s in all",
+    Row("times, times.txt of KITTI", pair(names=("image_2", "image_3"), change=kitti_times), "told",
+        "times.txt: times of the pictures in seconds, 0.48 s in all",
         timed(UNEVEN)),
     Row("times, nanoseconds by the head line", listed(IN_NANOSECONDS), "told", "times of the pictures in nanoseconds",
         timed(UNEVEN)),
@@ -166,9 +140,10 @@ TIME_ROWS = [
         tum_kept),
 ]  # fmt: skip
 BESIDE_ROWS = [
-    Row("common format, further files, check", in_training("check", "times.txt", "gt_masks/0.png"), "told",
+    Row("common format, further files, check", common(change=with_files("times.txt", "gt_masks/0.png")), "told",
         "not read: gt_masks/, times.txt"),
-    Row("common format, masks that sequence.toml does not state, check", in_training("check", "masks/0.png",
-        change={"masks": False}), "told", "not read: masks/"),
-    Row("common format, further files, inspect", in_training("inspect", "times.txt"), "told", "not read: times.txt"),
+    Row("common format, masks that sequence.toml does not state, check", common(masks=False,
+        change=with_files("masks/0.png")), "told", "not read: masks/"),
+    Row("common format, further files, inspect", common(command="inspect", change=with_files("times.txt")), "told",
+        "not read: times.txt"),
 ]  # fmt: skip
