@@ -13,11 +13,12 @@
 # %% [markdown]
 # # 22. A hand-held scope
 #
-# Most scopes are held by hand, and their recordings have no poses. With depth, the pose of one frame relative to another
-# is a problem of registration: move the points of one picture by the right pose, and they fall on pixels of the other
-# picture that look the same. This chapter derives the residual {eq}`eq-b19` and its Jacobian {eq}`eq-b19b` and recovers
-# the pose of a simulated scope. It also shows a motion of the scope that cannot be distinguished from a motion of the
-# tissue. Both equations are on the page {doc}`/specification/b19_registration` and not in the paper.
+# Most scopes are held by hand, and their recordings have no poses. If the depth is known, the pose of one frame
+# relative to another is a problem of registration: points of one picture that are moved by the right pose fall on
+# pixels of the other picture that look the same. This chapter derives the residual {eq}`eq-b19` and its Jacobian
+# {eq}`eq-b19b`, and recovers the pose of a simulated scope. It also shows a motion of the scope that cannot be
+# distinguished from a motion of the tissue. Both equations are on the page {doc}`/specification/b19_registration` and
+# not in the paper.
 #
 # | Symbol | Meaning |
 # |---|---|
@@ -48,9 +49,9 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 # %% [markdown]
 # ## Two frames
 #
-# The simulated scope orbits tissue that does not move. The lamp moves with the scope, so the local mean of the pictures is
-# removed and the rest is divided by the local contrast. The figure shows the residuals without motion and at the true pose.
-# Will they be 0 at the true pose?
+# The simulated scope orbits tissue that does not move. The lamp moves with the scope and changes the brightness of the
+# pictures. For this reason the local mean of each picture is removed, and the rest is divided by the local contrast.
+# The figure shows the residuals without motion and at the true pose. Will they be 0 at the true pose?
 
 # %%
 size = SimulatorSettings(width=160, height=128, frames=24)
@@ -88,7 +89,8 @@ print("no motion {:.3f}, true pose {:.3f}".format(*medians))
 assert 0 < medians[1] < 0.5 * medians[0]
 
 # %% [markdown]
-# They are smaller and not 0: the frames have noise, and interpolation and rounding have errors of their own.
+# At the true pose the residuals are smaller, but not 0: the frames have noise, and interpolation and rounding have
+# errors of their own.
 
 # %% [markdown]
 # ## The residual
@@ -104,9 +106,10 @@ assert 0 < medians[1] < 0.5 * medians[0]
 # \end{aligned}
 # $$
 #
-# **(22.1) The kernel.** $k$ is cubic on $|s|<1$ and on $1\le|s|<2$. It is 1 at 0 and 0 at every other whole number, so
-# the sum equals the picture at the pixel centres. The values and slopes of the pieces agree at 1 and at 2, so the slope of
-# the sum is continuous. These conditions leave one number free, the slope $a=k'(1)$. $a=-\tfrac12$ reproduces parabolas.
+# **(22.1) The kernel.** The function $k$ is cubic on $|s|<1$ and on $1\le|s|<2$. It is 1 at 0 and 0 at every other
+# whole number, so the sum equals the picture at the pixel centres. The values and slopes of the pieces agree at 1 and
+# at 2, so the slope of the sum is continuous. These conditions leave one number free, the slope $a=k'(1)$. With
+# $a=-\tfrac12$ the sum reproduces parabolas.
 #
 # <!-- definition: endotsr.definition.registration.keys -->
 # ```python
@@ -147,18 +150,19 @@ for u, v in ((3.3, 2.7), (4.0, 3.0), (5.9, 3.5)):
 # %% [markdown]
 # ## The reverse pass
 #
-# **(22.2) The slope of the kernel** is the derivative of the two cubics times the sign of $s$; it multiplies $I_{ji}$
-# in the place of $k$ and gives $I_u$ and $I_v$.
+# **(22.2) The slope of the kernel** is the derivative of the two cubics times the sign of $s$. With this slope in the
+# place of $k$ in one of the two factors, the sum gives $I_u$ or $I_v$.
 #
-# **(22.3) The point.** $u=f_xX/Z+c_x$ gives $\partial u/\partial(X,Z)=(f_x/Z,\,-f_xX/Z^2)$, and $v$ likewise. So
+# **(22.3) The point.** Since $u=f_xX/Z+c_x$, the derivatives are $\partial u/\partial(X,Z)=(f_x/Z,\,-f_xX/Z^2)$, and
+# in the same way for $v$. Together
 # $\mathbf g=\partial r/\partial(X,Y,Z)=\bigl(f_xI_u/Z,\;f_yI_v/Z,\;-(f_xXI_u+f_yYI_v)/Z^2\bigr)$.
 #
-# **(22.4) Pose and points.** $(X,Y,Z)^\top=W\mathbf x+\mathbf d$ is (7.10) and (7.11) without a covariance:
-# $g_W=\sum_m g_{r_m}\mathbf g_m\mathbf x_m^\top$, $g_{\mathbf d}=\sum_m g_{r_m}\mathbf g_m$,
+# **(22.4) Pose and points.** The map $(X,Y,Z)^\top=W\mathbf x+\mathbf d$ is that of (7.10) and (7.11) without a
+# covariance: $g_W=\sum_m g_{r_m}\mathbf g_m\mathbf x_m^\top$, $g_{\mathbf d}=\sum_m g_{r_m}\mathbf g_m$,
 # $g_{\mathbf x_m}=g_{r_m}W^\top\mathbf g_m$, and $g_{q_m}=-g_{r_m}$.
 #
-# **(22.5) A row of the Jacobian.** The correction {eq}`eq-b16` moves a point by
-# $\boldsymbol\omega\times(X,Y,Z)^\top+\boldsymbol\tau$ to first order. With
+# **(22.5) A row of the Jacobian.** To first order the correction {eq}`eq-b16` moves a point $\mathbf Y=(X,Y,Z)^\top$
+# by $\boldsymbol\omega\times\mathbf Y+\boldsymbol\tau$. With
 # $\mathbf g\cdot(\boldsymbol\omega\times\mathbf Y)=\boldsymbol\omega\cdot(\mathbf Y\times\mathbf g)$ the row is
 # $(\mathbf Y\times\mathbf g,\;\mathbf g)$.
 #
@@ -250,13 +254,14 @@ assert courses[-1][1] < 0.1
 # %% [markdown]
 # ## What no picture tells
 #
-# **(22.7) Two motions, one picture.** Let the whole tissue move by the rigid motion $B$, and the camera be at $T_j$. The
-# picture and the depth are those of still tissue and a camera at $T_jB$. They depend on $T_jB$ alone, so the residual,
-# and any other function of pictures and depth, has the same value for both. Breathing has such a common part. An estimate
-# from pictures and depth assigns it to the scope, and the path is wrong by that amount.
+# **(22.7) Two motions, one picture.** Let the whole tissue move by the rigid motion $B$, and let the camera be at
+# $T_j$. The picture and the depth are then those of still tissue and a camera at $T_jB$. They depend on $T_jB$ alone,
+# so the residual, and any other function of pictures and depth, has the same value for both. Breathing has such a
+# common part. An estimate from pictures and depth assigns this part to the scope, and the path of the scope is wrong
+# by that amount.
 #
-# In the next cell the tissue breathes in front of a scope that does not move. The rigid motion that fits the tissue best
-# is the motion that a registration reports for the scope. The tissue moves by 2.5 mm; by how much does the scope seem to
+# In the next cell the tissue breathes in front of a scope that does not move. A registration reports, as the motion of
+# the scope, the rigid motion that fits the tissue best. The tissue moves by 2.5 mm. By how much does the scope seem to
 # move?
 
 # %%
@@ -286,7 +291,7 @@ assert apparent > 0.3
 # %% [markdown]
 # ## The gradient check
 #
-# The pair has the residual with respect to pose, points and reference values.
+# The check differentiates the residual with respect to pose, points and reference values.
 
 # %%
 with one_thread():
