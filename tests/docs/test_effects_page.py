@@ -1,7 +1,7 @@
 """docs/effects.md: its generated parts are what the committed results say."""
 
 import math
-import re
+from argparse import Namespace
 
 import pytest
 from pages.effects import page as effects
@@ -50,23 +50,11 @@ def test_interval_of_a_mean():
 
 def test_unknown_words_and_missing_results_are_refused(tmp_path):
     with pytest.raises(SystemExit, match=r"docs/make\.py effects"):
-        effects.main(["paint"])
+        effects.PROGRAM.run(["paint"])
     with pytest.raises(InputError, match="made by"):
         effects.read(tmp_path)
-
-
-@pytest.mark.parametrize(
-    "words, named",
-    [
-        (["detect", "five"], "'five' is not allowed; allowed: a whole number"),
-        (["detect", "2", "-1"], "'-1' is not allowed; allowed: a whole number"),
-        (["truth", "1", "x"], "'x' is not allowed"),
-        (["train", "1", "nowhere"], "scene 'nowhere' is not allowed; allowed: still, breathing"),
-    ],
-)
-def test_words_that_mean_nothing_are_refused(words, named):
-    with pytest.raises(SystemExit, match=re.escape(named)):
-        effects.main(words)
+    with pytest.raises(SystemExit, match="scene 'nowhere' is not allowed; allowed: still, breathing"):
+        effects.PROGRAM.run(["measure", "train", "nowhere"])
 
 
 def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
@@ -82,10 +70,11 @@ def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
 
     monkeypatch.setattr(effects_study, "answer_of", answer_of)
     monkeypatch.setattr(effects, "RESULTS", tmp_path)
+    detect = lambda: effects.measured(Namespace(what="detect", seeds=1, first=effects_study.FIRST_SEED))
     with pytest.raises(KeyboardInterrupt):
-        effects.main(["detect", "1"])
+        detect()
     assert [path.name for path in tmp_path.iterdir()] == ["effects_detect.json.part"]
-    effects.main(["detect", "1"])
+    detect()
     clips = [trial.key for trial in effects_study.trials([effects_study.FIRST_SEED])]
     assert asked == clips[:4] + clips[3:]
     assert [path.name for path in tmp_path.iterdir()] == ["effects_detect.json"]

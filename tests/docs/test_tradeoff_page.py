@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from pages.store import program
 from pages.tradeoff import page as tradeoff
 from pages.tradeoff.parts import fragments, promise, scatter_of_equal, time_sentence
 
@@ -29,22 +30,11 @@ def test_a_scene_on_which_the_advice_fails_is_named(result):
     assert rows[0].endswith("holds |") and "does not hold" in rows[1]
 
 
-def test_a_measurement_of_the_command_is_drawn(result, tmp_path, capsys):
-    """It has no dials and no certificate."""
-    with pytest.raises(SystemExit, match="holds no measurement; make one with `endotsr tradeoff --out"):
-        tradeoff.main(["draw", str(tmp_path)])
-    without = {key: value for key, value in result.items() if key not in ("dials", "omitted")}
-    (tmp_path / "tradeoff.json").write_text(json.dumps(without), encoding="utf-8")
-    tradeoff.main(["draw", str(tmp_path)])
-    assert capsys.readouterr().out == f"{tmp_path / 'tradeoff.png'}\n"
-    assert (tmp_path / "tradeoff.svg").is_file()
-
-
 def test_command_refuses_words_that_it_does_not_know(monkeypatch):
-    monkeypatch.setattr(tradeoff, "write_page", lambda: pytest.fail("wrote the page"))
+    monkeypatch.setattr(program.Program, "write", lambda self: pytest.fail("wrote the page"))
     for words in (["page"], ["train"], ["measure", "x"]):
-        with pytest.raises(SystemExit, match=r"python docs/make\.py tradeoff render"):
-            tradeoff.main(words)
+        with pytest.raises(SystemExit):
+            tradeoff.PROGRAM.run(words)
 
 
 def test_what_the_page_says_of_a_looser_stop():

@@ -11,17 +11,28 @@ import pytest
 ROOT = Path(__file__).parents[2]
 RESULTS, PAGE = ROOT / "docs" / "results", ROOT / "docs" / "hard_cases.md"
 sys.path.insert(0, str(RESULTS))
+from pages.hard_cases import pictures  # noqa: E402
 from pages.hard_cases.gallery import CASES, DTYPES  # noqa: E402
-from pages.hard_cases.page import END, FIRST, LAST, START, gallery, measure, plain, promise  # noqa: E402
-from pages.hard_cases.pictures import measured  # noqa: E402
+from pages.hard_cases.page import gallery, measure, measured, promise  # noqa: E402
 
 UNITS = {"float64": 2.0**-53, "float32": 2.0**-24}
 IDS = [case.run.__name__ for case in CASES]
 
 
 @pytest.fixture(scope="module")
+def record():
+    return measured()
+
+
+@pytest.fixture(scope="module")
 def rows():
     return {row["run"]: row for row in measure()}
+
+
+def shown(name):
+    """A part of the page."""
+    mark = f"<!-- hard_cases:{name}"
+    return PAGE.read_text(encoding="utf-8").partition(f"{mark}:start -->")[2].partition(f"{mark}:end -->")[0]
 
 
 @pytest.mark.parametrize("case", CASES, ids=IDS)
@@ -33,16 +44,15 @@ def test_ours_is_right_and_the_naive_formula_is_not(case, rows):
     assert not lost <= 10 * max(row["float32"]["ours_error"], rounding)  # NaN counts as lost
 
 
-def test_the_page_shows_what_the_command_computes(rows):
+def test_the_page_shows_what_the_command_computes(record):
     """Up to the last digits, which may differ between machines: titles, sentences, values that are not finite."""
     number = re.compile(r"-?\d[\d.]*(?:e[+-]\d+)?(?: \((?:exact|\de[+-]\d+)\))?")
     shape = lambda text: number.sub("#", text.partition("Made by")[0]).strip()
-    shown = PAGE.read_text(encoding="utf-8").partition(START)[2].partition(END)[0]
-    assert shape(shown) == shape(gallery(list(rows.values()), "Made by"))
+    assert shape(shown("gallery")) == shape(gallery(record))
     stored = json.loads((RESULTS / "hard_cases.json").read_text(encoding="utf-8"))["cases"]
-    for old, new in zip(stored, rows.values(), strict=True):
+    for old, new in zip(stored, record["cases"], strict=True):
         for dtype in DTYPES:
-            truth, again = old[dtype]["truth"], plain(new)[dtype]["truth"]
+            truth, again = old[dtype]["truth"], new[dtype]["truth"]
             assert truth == pytest.approx(again, rel=1e-6, abs=1e-12), old["title"]
 
 
@@ -52,14 +62,13 @@ def test_every_case_of_the_gallery_is_in_the_catalogue():
         assert f"\n| {case.name} |" in catalogue, case.name
 
 
-def test_the_first_sentence_of_the_page_is_what_the_gallery_says(rows):
-    shown = PAGE.read_text(encoding="utf-8").partition(FIRST)[2].partition(LAST)[0]
+def test_the_first_sentence_of_the_page_is_what_the_gallery_says(record):
     whole = lambda text: re.sub(r"[\d.]+e-\d+", "#", text.strip())  # the last digit may differ between machines
-    assert whole(shown) == whole(promise(list(rows.values())))
+    assert whole(shown("promise")) == whole(promise(record))
 
 
 def test_the_three_pictures_fail_above_and_not_below():
-    found = measured()
+    found = pictures.measured()
     assert all(np.isfinite(ours).all() for _, ours in found.values())
     usual = {name: pair[0] for name, pair in found.items()}
     assert np.isnan(usual["Opaque Gaussian"]).sum() > 300 and np.isnan(usual["NaN under the instrument"]).sum() > 300

@@ -18,7 +18,6 @@ from unittest import mock
 import msgspec
 
 from endotsr.config import PAPER, Config, config_from_dict
-from endotsr.results.report.tables import plain
 from endotsr.studies.bench.case import BenchCase, representative
 from endotsr.training.fitting import model, objective
 from endotsr.training.fitting.fused import step
@@ -152,15 +151,3 @@ def _numbers(state: Any) -> int:
     """Bytes of the Gaussians and of their moments."""
     moments = [*state.adam.first.values(), *state.adam.second.values()]
     return sum(a.nbytes for a in (*arrays(state.gaussians).values(), *moments))
-
-
-def table(result: dict[str, Any]) -> str:
-    """The result as a table for the terminal."""
-    rows = [
-        [name, f"{x['everything_ms']:.1f}", f"{x['off_ms']:.1f}", f"{x['saved']:.1%}", f"{x['off_over_absent']:.3f}",
-         f"{x['memory_saved']:.1%}", f"{x['memory_over_absent']:.3f}", f"{x['allocated_over_absent']:.3f}"]
-        for name, x in result["parts"].items()
-    ]  # fmt: skip
-    heads = ("part", "with it, ms", "off, ms", "time saved", "off / absent", "memory saved", "memory / absent",
-             "allocated / absent")  # fmt: skip
-    return plain(heads, rows)

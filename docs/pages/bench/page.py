@@ -65,26 +65,22 @@ def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Sa
     for path in scenes:
         read_arrays(path)
     out.mkdir(parents=True, exist_ok=True)
-    measures: dict[str, tuple[Callable[[], Any], Callable[[Any], str] | None]] = {
-        "start": (lambda: start.measure_start(3), start.table),
-        "stages": (lambda: stages.measure_stages(grid(scenes), say), None),
-        "peers": (lambda: peers.measure_peers((60_000,), PRECISIONS, 2, 2), peers.table),
-        "scaling": (lambda: scaling.measure_scaling(LARGEST, AXES, say), scaling.table),
-        "effects": (lambda: apart(measured_effects), bench_effects.table),
+    measures: dict[str, Callable[[], Any]] = {
+        "start": lambda: start.measure_start(3),
+        "stages": lambda: stages.measure_stages(grid(scenes), say),
+        "peers": lambda: peers.measure_peers((60_000,), PRECISIONS, 2, 2),
+        "scaling": lambda: scaling.measure_scaling(LARGEST, AXES, say),
+        "effects": lambda: apart(measured_effects),
     }
-    for name, (measure, table) in measures.items():
-        if name not in names:
-            continue
+    for name in (name for name in measures if name in names):
         try:
-            result = measure()
+            result = measures[name]()
         except InputError as error:
             if name != "peers" or len(names) == 1:
                 raise
             say(f"peers not measured: {error}")
             continue
         write_json(out / FILES[name], dated(result))
-        if table:
-            say(table(result))
 
 
 def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:

@@ -16,7 +16,6 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
-from endotsr.results.report.tables import plain
 from endotsr.studies.bench.case import BenchCase, Precision, apart
 from endotsr.studies.bench.clock import repeated, spread
 from endotsr.training.scene import workload
@@ -144,17 +143,6 @@ def relative_error(found: FloatArray, expected: FloatArray) -> float:
     difference = np.linalg.norm(found.astype(np.float64) - expected)
     size = float(np.linalg.norm(expected.astype(np.float64)))
     return float(difference) / size if size > 0 else float(difference)
-
-
-def table(result: dict[str, Any]) -> str:
-    """Times, ratio and the largest error as a table for the terminal."""
-    rows = []
-    for case in result["cases"]:
-        ours, gsplat, lists = (case[name]["median_ms"] for name in ("ours", "gsplat", "pair_lists"))
-        times = [f"{ours:.1f}", f"{gsplat:.0f}", f"{case['ratio']:.0f}", f"{lists:.0f}"]
-        rows.append([str(case["gaussians"]), case["precision"], *times, verdict(case)])
-    columns = ("Gaussians", "precision", "endotsr ms", "gsplat ms", "ratio", "lists ms", "largest error")
-    return plain(columns, rows, (1, 6))
 
 
 def verdict(case: dict[str, Any]) -> str:

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from endotsr.results.report.tables import plain
 from endotsr.studies.bench.case import BenchCase, apart, measure
 from endotsr.studies.bench.clock import REST, SPLAT, STAGES
 from endotsr.studies.bench.stages import Say, line
@@ -141,16 +140,3 @@ def _slope(axis: dict[str, Any] | None) -> float | None:
         return None
     chosen = upper_decade(axis["size"])
     return float(np.polyfit(np.array(axis["size"])[chosen], np.array(axis["peak_memory_bytes"])[chosen], 1)[0])
-
-
-def table(result: dict[str, Any]) -> str:
-    """Exponents of every curve, then memory, as tables for the terminal."""
-    rows = []
-    for axis in result["axes"].values():
-        fits = ", ".join(f"{name} {p:.2f}" for name, p in axis["exponent"].items() if p is not None)
-        rows.append([axis["unit"], f"{min(axis['size']):,.0f} - {max(axis['size']):,.0f}", fits])
-    lines = [plain(("along", "range", "exponents over the upper decade"), rows, (0, 2))]
-    for name, slope in result["memory"].items():
-        if slope is not None:
-            lines.append(f"{name.replace('_', ' ')}: {slope:,.0f}")
-    return "\n".join(lines)

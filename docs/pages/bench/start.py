@@ -15,7 +15,6 @@ import time
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.results.report.tables import plain
 
 MOMENTS = ("imported", "sequence made", "initialised", "first iteration", "first iteration with everything")
 
@@ -68,12 +67,6 @@ def _first_iterations() -> None:
         state.iteration = iteration  # the residuals are activated at the first of the two
         training_step(state, constants)
     say(MOMENTS[4])
-
-
-def table(result: dict[str, Any]) -> str:
-    """The result as a table for the terminal."""
-    rows = [[moment, *(f"{result[kind][moment]:.2f}" for kind in ("cold", "warm"))] for moment in MOMENTS]
-    return plain(("seconds from the call to", "cold", "warm"), rows)
 
 
 if __name__ == "__main__":

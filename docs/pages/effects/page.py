@@ -1,19 +1,18 @@
 """Measure the detections of `endotsr inspect` and the savings of `--effects auto`; write the tables of docs/effects.md.
 
-    python docs/make.py effects detect [SEEDS [FIRST]]      simulated clips: detections, false positives
-    python docs/make.py effects train [SEEDS [NAME ...]]    held-out PSNR and time, `auto` against `everything`;
-                                                             NAME is a scene (none = all) or an EndoNeRF folder
-    python docs/make.py effects truth [SEEDS [ITERATIONS]]  errors against the truth, leakage between light and motion
-    python docs/make.py effects real FOLDER ...             verdicts on EndoNeRF folders and on `sinus_endoscopy`
-    python docs/make.py effects                             write the page from docs/results
+    python docs/make.py effects measure detect [--seeds 5] [--first 200]    simulated clips: detections, false positives
+    python docs/make.py effects measure train [NAME ...] [--seeds 5]        held-out PSNR and time, `auto` against
+                                                         `everything`; a NAME is a scene, or an EndoNeRF folder
+    python docs/make.py effects measure truth [--seeds 5] [--iterations 1000]    errors against the truth, leakage
+                                                                             between light and motion
+    python docs/make.py effects measure real FOLDER ...  verdicts on EndoNeRF folders and on `sinus_endoscopy`
 
 An interrupted `detect`, `train` or `truth` continues when it is started again with the same arguments.
 `python docs/make.py bench measure effects` measures the time of the parts.
 """
 
-import sys
+import argparse
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,19 +24,20 @@ from endotsr.results.report.style import save
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated, now
 from pages.effects import parts as effects_parts
-from pages.effects import sinus as effects_sinus
+from pages.effects import study
 from pages.effects import truth as effects_truth
+from pages.recordings.hand_held_clips import recorded
 from pages.store import kept
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import loaded
+from pages.store.program import RESULTS, Program
 
-DOCS = Path(__file__).parents[2]
-PAGE, RESULTS = DOCS / "effects.md", DOCS / "results"
 FILES = {
     "detect": "effects_detect.json", "train": "effects_train.json", "real": "effects_real.json",
     "truth": "effects_truth.json", "bench": "bench_effects.json",
 }  # fmt: skip
 STUDY = ("effects/study",)  # makes the clips
-SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS, REAL_ITERATIONS = 5, 40, 24, DEMO.training.iterations, 1000
+THIRD = "0.33333"  # of the size of `sinus_endoscopy`
+FRAMES, TRAIN_FRAMES, ITERATIONS, REAL_ITERATIONS = 40, 24, DEMO.training.iterations, 1000
 SCENES = {
     "still": ("noise",),
     "breathing": ("noise", "breathing"),
@@ -50,52 +50,38 @@ SCENES = {
 }
 
 
-def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
+def detect(options: argparse.Namespace) -> dict[str, Any]:
     """The study of the tests, with seeds on which no threshold was tuned."""
-    from pages.effects.study import FIRST_SEED, answer_of, summary, trials, wrong
-
-    chosen = range(FIRST_SEED if first is None else first, (FIRST_SEED if first is None else first) + seeds)
-    clips = {trial.key: trial for trial in trials(chosen)}
-
-    def measure(key: str) -> dict[str, Any]:
-        answer = answer_of(clips[key], FRAMES)
-        print(f"{key}: {', '.join(wrong(clips[key], answer['said'])) or 'right'}", flush=True)
-        return answer
-
+    chosen = range(options.first, options.first + options.seeds)
+    clips = {(trial.key,): trial for trial in study.trials(chosen)}
     about = {"frames": FRAMES, "sources": kept.sources("clips/effects", "clips/simulator", beside=STUDY)}
-    return summary(chosen, FRAMES, kept.measured(RESULTS / FILES["detect"], about, clips, measure))
+    answers = kept.measured(options.record, about, clips, lambda key: study.answer_of(clips[(key,)], FRAMES))
+    return study.summary(chosen, FRAMES, {key: answer for (key,), answer in answers.items()})
 
 
-def train(seeds: int, names: list[str]) -> dict[str, Any]:
+def train(options: argparse.Namespace) -> dict[str, Any]:
     """Every named scene (none = all) and folder with both settings: tissue PSNR, processor time, size of a Gaussian.
 
     Raises: InputError for a name that is neither in SCENES nor a folder.
     """
-    folders = {Path(name).name: Path(name) for name in names if Path(name).is_dir()}
-    scenes = [name for name in names if Path(name).name not in folders] or list(SCENES)
-    unknown = [name for name in scenes if name not in SCENES]
-    if unknown:
+    folders = {Path(name).name: Path(name) for name in options.names if Path(name).is_dir()}
+    scenes = [name for name in options.names if Path(name).name not in folders] or list(SCENES)
+    if unknown := [name for name in scenes if name not in SCENES]:
         raise InputError(f"scene {unknown[0]!r} is not allowed; allowed: {', '.join(SCENES)}, or a folder")
-    every = {name: None for name in scenes} | folders
-    pairs = {f"{name} {seed}": (name, seed) for seed in range(seeds) for name in every}
+    runs = [(name, seed) for seed in range(options.seeds) for name in (*scenes, *folders)]
     ready: list[bool] = []
 
-    def measure(key: str) -> dict[str, Any]:
+    def measure(name: str, seed: int) -> dict[str, Any]:
         if not ready:
             _load_kernels()
             ready.append(True)
-        name, seed = pairs[key]
-        folder = every[name]
-        found = _pair(_clip(name, seed), seed, ITERATIONS) if folder is None else _real_pair(folder, seed)
-        print(key, found, flush=True)
-        return found
+        folder = folders.get(name)
+        return _pair(_clip(name, seed), seed, ITERATIONS) if folder is None else _real_pair(folder, seed)
 
     about = {"frames": TRAIN_FRAMES, "iterations": ITERATIONS, "real_iterations": REAL_ITERATIONS}
-    answers = kept.measured(
-        RESULTS / FILES["train"], about | {"sources": kept.sources("", beside=STUDY)}, pairs, measure
-    )
-    found = {name: [answers[f"{name} {seed}"] for seed in range(seeds)] for name in every}
-    return {"seeds": seeds, **about, "scenes": found, "real": list(folders)}
+    sources = {"sources": kept.sources("", beside=STUDY)}
+    found = kept.nested(kept.measured(options.record, about | sources, runs, measure))
+    return {"seeds": options.seeds, **about, "scenes": found, "real": list(folders)}
 
 
 def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
@@ -105,9 +91,8 @@ def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
 
 def _clip(name: str, seed: int) -> Any:
     from endotsr.clips.simulator.simulate import simulate
-    from pages.effects.study import settings_of
 
-    return simulate(settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence
+    return simulate(study.settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence
 
 
 def _load_kernels() -> None:
@@ -143,17 +128,16 @@ def _pair(sequence: Any, seed: int, iterations: int) -> dict[str, Any]:
     return found
 
 
-def real(folders: list[Path]) -> dict[str, Any]:
+def real(options: argparse.Namespace) -> dict[str, Any]:
     """Verdicts and plans on folders; results of other clips are kept."""
     from endotsr.clips.effects.inspect import inspect_sequence, inspection_record
     from endotsr.clips.effects.plan import make_plan, plan_record
 
-    file = RESULTS / FILES["real"]
-    found = read_json(file, "docs/pages/effects/page.py real")["clips"] if file.exists() else {}
-    for folder in folders:
-        sinus = effects_sinus.is_sinus(folder)
-        read_clip = effects_sinus.read_sinus if sinus else _read_endonerf
-        inspection = inspect_sequence(read_clip(folder))
+    found = loaded(options.record)["clips"] if options.record.exists() else {}
+    for folder in map(Path, options.names):
+        sinus = (folder / "cameras_points.npz").exists()
+        clip = recorded("sinus_endoscopy", folder.parent, THIRD) if sinus else _read_endonerf(folder)
+        inspection = inspect_sequence(clip)
         plan = plan_record(make_plan(inspection, PAPER))
         found[folder.name] = inspection_record(inspection) | {"plan": plan, "date": now()}
     return {"clips": found}
@@ -177,52 +161,41 @@ def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
         "real": (effects_parts.real, "real"),
     }
     return {
-        name: make(found[file]) if file in found else f"Not measured yet: `python docs/make.py effects {file}`."
+        name: make(found[file]) if file in found else f"Not measured yet: `python docs/make.py effects measure {file}`."
         for name, (make, file) in makers.items()
     }
 
 
 def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
-    """The measurements that exist, by name. Raises: InputError if a file cannot be read, or if none exists."""
-    found = {name: folder / file for name, file in FILES.items() if (folder / file).exists()}
+    """The measurements that exist, by name. Raises: InputError if none exists."""
+    found = {name: loaded(folder / file) for name, file in FILES.items() if (folder / file).exists()}
     if not found:
-        raise InputError(f"{folder}: holds no measurement; made by docs/pages/effects/page.py")
-    return {name: read_json(path, f"docs/pages/effects/page.py {name}") for name, path in found.items()}
+        raise InputError(f"{folder}: holds no measurement; made by `python docs/make.py effects measure`")
+    return found
 
 
-def main(words: list[str], page: Path = PAGE) -> None:
-    """The command."""
-    what, rest = (words[0], words[1:]) if words else ("", [])
-    if what not in COMMANDS and what:
-        sys.exit(__doc__)
-    try:
-        if what:
-            file = RESULTS / FILES[what]
-            write_json(file, dated(COMMANDS[what](rest)))
-            kept.finished(file)
-        else:
-            found = read()
-            write_marked(page, fragments(found), "effects")
-            if "train" in found:
-                save(effects_parts.answer_figure(found["train"]), RESULTS / "effects.svg")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+def draw(record: None) -> None:
+    """The picture of the savings."""
+    if "train" in (found := read()):
+        save(effects_parts.answer_figure(found["train"]), RESULTS / "effects.svg")
 
 
-def _number(words: list[str], place: int, usual: int | None) -> Any:
-    """The number at an index of the words. Raises: InputError unless it is a whole number of at least 0."""
-    if len(words) <= place:
-        return usual
-    if not words[place].isdigit():
-        raise InputError(f"{words[place]!r} is not allowed; allowed: a whole number")
-    return int(words[place])
+COMMANDS = {"detect": detect, "train": train, "truth": effects_truth.truth, "real": real}
 
 
-COMMANDS: dict[str, Callable[[list[str]], dict[str, Any]]] = {
-    "detect": lambda words: detect(_number(words, 0, SEEDS), _number(words, 1, None)),
-    "train": lambda words: train(_number(words, 0, SEEDS), words[1:]),
-    "truth": lambda words: effects_truth.truth(
-        RESULTS / FILES["truth"], _number(words, 0, SEEDS), _number(words, 1, effects_truth.ITERATIONS)
-    ),
-    "real": lambda words: real([Path(word) for word in words]),
-}
+def measured(options: argparse.Namespace) -> None:
+    """One of the measurements, to its own record."""
+    options.record = RESULTS / FILES[options.what]
+    write_json(options.record, dated(COMMANDS[options.what](options)))
+    kept.finished(options.record)
+
+
+PROGRAM = Program(
+    __name__, "effects.md", lambda: fragments(read()), "", measured,
+    {
+        "what": {"choices": list(COMMANDS)},
+        "names": {"nargs": "*", "metavar": "NAME", "help": "scenes or folders"},
+        "--seeds": 5, "--first": study.FIRST_SEED, "--iterations": effects_truth.ITERATIONS,
+    },
+    draw,
+)  # fmt: skip

@@ -6,6 +6,7 @@ from endotsr.results.report.style import BLUE, GREEN, INK, SMALL, name_axes, new
 from endotsr.results.report.tables import markdown
 from pages.effects.study import ANSWERS, UNITS
 from pages.store.intervals import interval
+from pages.store.tables import noted, where_with_cores
 
 ANSWERED = {
     "motion": ("Pixels of tissue move", "time bases (`model.deformation`)", "deformation",
@@ -27,12 +28,6 @@ ANSWERED = {
 }  # fmt: skip
 
 
-def machine(result: dict[str, Any]) -> str:
-    """Date and machine of a measurement."""
-    about = result["machine"]
-    return f"{about['processor']} ({about['cores']} cores), {result['date'][:10]}"
-
-
 def costs(result: dict[str, Any]) -> str:
     """Effect, appearance, the component that models it, its cost, and its use."""
     rows = []
@@ -41,7 +36,7 @@ def costs(result: dict[str, Any]) -> str:
         time = f"{measured['saved']:.0%}" if measured else "-"
         memory = f"{measured['memory_saved']:.0%}" if measured else "-"
         rows.append((effect, looks, component, time, memory, worth))
-    table = markdown(("Effect", "What it looks like", "Component", "Time", "Memory", "Worth it for"), rows)
+    heads = ("Effect", "What it looks like", "Component", "Time", "Memory", "Worth it for")
     parts = result["parts"].values()
     ratios, sizes = [x["off_over_absent"] for x in parts], {x["memory_over_absent"] for x in parts}
     equal = "the same memory" if sizes == {1.0} else "other memory"
@@ -52,11 +47,11 @@ def costs(result: dict[str, Any]) -> str:
         equal += f", and it allocated {allocated}"
     note = (
         f"Time is processor time of an iteration with {result['gaussians']} Gaussians at "
-        f"{result['width']}x{result['height']} ({machine(result)}); memory is that of Gaussians and optimiser. In the "
-        f"same run an iteration with a component off took {min(ratios):.3f} to {max(ratios):.3f} times as long as code "
-        f"without that component, with {equal}."
+        f"{result['width']}x{result['height']} ({where_with_cores(result)}); memory is that of Gaussians and "
+        f"optimiser. In the same run an iteration with a component off took {min(ratios):.3f} to {max(ratios):.3f} "
+        f"times as long as code without that component, with {equal}."
     )
-    return f"{table}\n\n{note}"
+    return noted(heads, rows, note)
 
 
 def detections(result: dict[str, Any]) -> str:
@@ -66,14 +61,14 @@ def detections(result: dict[str, Any]) -> str:
          _of(x["false"], x["negatives"]), _upper(x["false"], x["negatives"]))
         for name, x in result["effects"].items()
     ]  # fmt: skip
-    table = markdown(("Test", "Detected", "95 % lower limit", "False positives", "95 % upper limit"), rows)
+    heads = ("Test", "Detected", "95 % lower limit", "False positives", "95 % upper limit")
     first = result["first_seed"]
     note = (
         f"{result['clips']} simulated clips of {result['frames']} frames, seeds {first} to "
         f"{first + result['seeds'] - 1}, none of which was used to set a threshold; noise of "
-        f"{255 * result['noise']:.1f} grey levels ({machine(result)})."
+        f"{255 * result['noise']:.1f} grey levels ({where_with_cores(result)})."
     )
-    return f"{table}\n\n{note}"
+    return noted(heads, rows, note)
 
 
 def amplitudes(result: dict[str, Any]) -> str:
@@ -168,12 +163,12 @@ def training(result: dict[str, Any]) -> str:
     note = (
         f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
         f"preset `demo` with its {result['iterations']} iterations, {result['frames']} frames of 160x128; processor "
-        f"time of the training ({machine(result)})."
+        f"time of the training ({where_with_cores(result)})."
     )
     if result["real"]:
         names = ", ".join(f"`{name}`" for name in result["real"])
         note += f" {names} is a real clip, trained at half size with {result['real_iterations']} iterations."
-    return f"{markdown(heads, rows)}\n\n{note}"
+    return noted(heads, rows, note)
 
 
 def real(result: dict[str, Any]) -> str:

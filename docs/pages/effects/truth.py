@@ -6,15 +6,15 @@ of tissue against the true change of their light. In the first scene all motion 
 colour is wrong except for the change of light caused by motion under the lamp.
 """
 
-from pathlib import Path
+import argparse
 from typing import Any
 
 import numpy as np
 
 from endotsr.results.report.tables import markdown
-from pages.effects.parts import machine
 from pages.store import kept
 from pages.store.intervals import shown
+from pages.store.tables import means, where_with_cores
 
 ITERATIONS, FRAMES = 1000, 24
 GREY = 255.0  # grey levels of a display unit
@@ -32,20 +32,14 @@ VARIANTS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {
 """Name in the table -> preset, and settings on top of it."""
 
 
-def truth(file: Path, seeds: int, iterations: int) -> dict[str, Any]:
+def truth(options: argparse.Namespace) -> dict[str, Any]:
     """Every scene with every variant and seed: JSON-able, "scenes" {scene: {variant: rows of `scores`}}."""
-    runs = {f"{s} {v} {seed}": (s, v, seed) for seed in range(seeds) for s in SCENES for v in VARIANTS}
-
-    def measure(key: str) -> dict[str, float]:
-        scene, variant, seed = runs[key]
-        found = scores(simulated_scene(scene, seed), variant, seed, iterations)
-        print(key, {name: round(value, 3) for name, value in found.items()}, flush=True)
-        return found
-
-    about = {"frames": FRAMES, "iterations": iterations}
-    answers = kept.measured(file, about | {"sources": kept.sources("", beside=("effects/study",))}, runs, measure)
-    scenes = {s: {v: [answers[f"{s} {v} {seed}"] for seed in range(seeds)] for v in VARIANTS} for s in SCENES}
-    return {"seeds": seeds, **about, "scenes": scenes}
+    runs = [(scene, variant, seed) for seed in range(options.seeds) for scene in SCENES for variant in VARIANTS]
+    about = {"frames": FRAMES, "iterations": options.iterations}
+    measure = lambda scene, variant, seed: scores(simulated_scene(scene, seed), variant, seed, options.iterations)
+    identity = about | {"sources": kept.sources("", beside=("effects/study",))}
+    scenes = kept.nested(kept.measured(options.record, identity, runs, measure))
+    return {"seeds": options.seeds, **about, "scenes": scenes}
 
 
 def simulated_scene(scene: str, seed: int) -> Any:
@@ -126,11 +120,11 @@ def light_courses(run: Any, simulated: Any) -> tuple[np.ndarray, np.ndarray]:
 def table(result: dict[str, Any]) -> str:
     """The two scenes as two tables."""
     light, motion = (result["scenes"][name] for name in ("light", "motion"))
-    errors = ("psnr", "depth_mm", "scene_units", "pixels")
+    errors = [(name, 2) for name in ("psnr", "depth_mm", "scene_units", "pixels")]
     first = markdown(
         ("Light alone", "PSNR, dB", "Depth error, mm", "False motion, mm", "False motion, px", "Light explained"),
         [
-            (name, *_means(rows, errors), _part(rows, "light_error_grey", "light_grey", 2))
+            (name, *means(rows, errors), _part(rows, "light_error_grey", "light_grey", 2))
             for name, rows in light.items()
         ],
     )
@@ -138,19 +132,19 @@ def table(result: dict[str, Any]) -> str:
         "Motion alone", "PSNR, dB", "Depth error, mm", "Trajectory error, mm", "Trajectory error, px",
         "Motion explained", "Colour residual, grey levels", "Its error, grey levels",
     )  # fmt: skip
-    colours = ("colour_grey", "light_error_grey")
+    colours = (("colour_grey", 2), ("light_error_grey", 2))
     moves = ("scene_units", "motion_scene_units")
     second = markdown(
         heads,
-        [(name, *_means(r, errors), _part(r, *moves, 1), *_means(r, colours)) for name, r in motion.items()],
+        [(name, *means(r, errors), _part(r, *moves, 1), *means(r, colours)) for name, r in motion.items()],
     )
     runs = sum(len(rows) for scene in (light, motion) for rows in scene.values())
     lit, moved = light["`paper`"][0], motion["`paper`"][0]  # the true sizes are the same for all variants
     note = (
         f"Mean over {result['seeds']} seeds with the 95 % interval; {result['iterations']} iterations, "
-        f"{result['frames']} frames of 160x128, {runs} runs ({machine(result)}). With light alone the light of a "
-        f"piece of tissue changes by {lit['light_grey']:.1f} grey levels (RMS). With motion alone the tissue "
-        f"moves by {moved['motion_scene_units']:.2f} mm ({moved['motion_pixels']:.2f} px), and its light "
+        f"{result['frames']} frames of 160x128, {runs} runs ({where_with_cores(result)}). With light alone the "
+        f"light of a piece of tissue changes by {lit['light_grey']:.1f} grey levels (RMS). With motion alone the "
+        f"tissue moves by {moved['motion_scene_units']:.2f} mm ({moved['motion_pixels']:.2f} px), and its light "
         f"changes by {moved['light_grey']:.1f} grey levels, because it moves under the lamp."
     )
     return f"{first}\n\n{second}\n\n{note}\n\n{gains(result)}"
@@ -167,11 +161,6 @@ def gains(result: dict[str, Any]) -> str:
         f"Paired by seed, A changes the held-out PSNR of `paper` by {of['light']} dB with light alone and by "
         f"{of['motion']} dB with motion alone."
     )
-
-
-def _means(rows: list[dict[str, float]], names: tuple[str, ...]) -> list[str]:
-    """Mean and interval of every number over the seeds."""
-    return [shown([row[name] for row in rows], 2) for name in names]
 
 
 def _part(rows: list[dict[str, float]], error: str, whole: str, power: int) -> str:

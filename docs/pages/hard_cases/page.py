@@ -1,7 +1,6 @@
 """The gallery of hard cases: naive formula, truth and endotsr, in float64 and float32.
 
-python docs/make.py hard_cases     rewrites hard_cases.json, hard_cases.png, and the sentence and the gallery in
-                                      docs/hard_cases.md, in a few seconds
+    python docs/make.py hard_cases measure     in a few seconds
 
 Every naive formula is executed, on the same rounded inputs as ours; the truth is exact or has 60 digits (mpmath).
 """
@@ -9,23 +8,18 @@ Every naive formula is executed, on the same rounded inputs as ours; the truth i
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
+import argparse
 import math
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from endotsr.results.report.style import save
-from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import machine, now, versions
+from pages.hard_cases import pictures
 from pages.hard_cases.gallery import CASES, DTYPES
-from pages.hard_cases.pictures import PICTURE, drawn, measured
-
-DOCS = Path(__file__).parents[2]
-RECORD, PAGE = DOCS / "results" / "hard_cases.json", DOCS / "hard_cases.md"
-START, END = "<!-- gallery:start (made by docs/pages/hard_cases/page.py) -->", "<!-- gallery:end -->"
-FIRST, LAST = "<!-- promise:start (made by docs/pages/hard_cases/page.py) -->", "<!-- promise:end -->"
+from pages.store.program import RESULTS, Program
 
 
 def error(value: float, truth: float) -> float:
@@ -53,10 +47,14 @@ def cell(value: float, miss: float) -> str:
     return f"{value:.7g} ({f'{miss:.0e}' if miss else 'exact'})" if math.isfinite(value) else f"**{value}**"
 
 
-def gallery(rows: list[dict[str, Any]], about: str) -> str:
-    """The gallery as Markdown."""
-    lines = []
-    for row in rows:
+def gallery(record: dict[str, Any]) -> str:
+    """The gallery as Markdown, and where it was made."""
+    lines, computer = [], record["machine"]
+    about = (
+        f"Made by `python docs/make.py hard_cases` on {record['made'][:10]}, {computer['processor']} "
+        f"({computer['cores']} cores), {', '.join(f'{name} {v}' for name, v in record['versions'].items())}."
+    )
+    for row in map(numbers, record["cases"]):
         lines += [f"### {row['name']}: {row['title']}", "", row["why"], "", "| | float64 | float32 |", "|---|---|---|"]
         lines.append("| right | " + " | ".join(f"{row[d]['truth']:.7g}" for d in DTYPES) + " |")
         for label, key in ((row["naive"], "naive"), ("endotsr", "ours")):
@@ -65,8 +63,9 @@ def gallery(rows: list[dict[str, Any]], about: str) -> str:
     return "\n".join([*lines, about])
 
 
-def promise(rows: list[dict[str, Any]]) -> str:
+def promise(record: dict[str, Any]) -> str:
     """What the page shows, in one sentence: the worst error in float32 of both ways of computing."""
+    rows = [numbers(row) for row in record["cases"]]
     usual = [row["float32"]["naive_error"] for row in rows]
     none = sum(not math.isfinite(value) for value in usual)
     coarse = sum(math.isfinite(value) and value >= 0.01 for value in usual)
@@ -83,12 +82,6 @@ def rounded_up(value: float) -> str:
     return f"{math.ceil(value / 10.0 ** (digits - 1)) / 10:.1f}e{digits:03d}"
 
 
-def between(text: str, start: str, end: str, made: str) -> str:
-    """The text with what lies between two marks replaced."""
-    head, tail = text.split(start)[0], text.split(end)[1]
-    return f"{head}{start}\n\n{made}\n{end}{tail}"
-
-
 def plain(data: Any) -> Any:
     """The same with words in place of numbers that JSON does not have."""
     if isinstance(data, dict):
@@ -96,16 +89,23 @@ def plain(data: Any) -> Any:
     return str(data) if isinstance(data, float) and not math.isfinite(data) else data
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    rows, computer, made = measure(), machine(), now()
+def numbers(row: dict[str, Any]) -> dict[str, Any]:
+    """The reverse of `plain` for a case."""
+    return row | {label: {key: float(value) for key, value in row[label].items()} for label in DTYPES}
+
+
+def measured(options: argparse.Namespace | None = None) -> dict[str, Any]:
+    """The record."""
     libraries = {name: version for name, version in versions().items() if name in ("python", "numpy", "numba")}
-    about = (
-        f"Made by `python docs/make.py hard_cases` on {made[:10]}, {computer['processor']} "
-        f"({computer['cores']} cores), {', '.join(f'{name} {v}' for name, v in libraries.items())}."
-    )
-    text = between(PAGE.read_text(encoding="utf-8"), START, END, gallery(rows, about))
-    PAGE.write_text(between(text, FIRST, LAST, promise(rows) + "\n"), encoding="utf-8")
-    save(drawn(measured()), PICTURE)
-    record = {"made": made, "machine": computer, "versions": libraries, "cases": [plain(row) for row in rows]}
-    write_json(RECORD, record)
+    return {"made": now(), "machine": machine(), "versions": libraries, "cases": [plain(row) for row in measure()]}
+
+
+def draw(record: dict[str, Any]) -> None:
+    """The three pictures."""
+    save(pictures.drawn(pictures.measured()), RESULTS / "hard_cases.png")
+
+
+PROGRAM = Program(
+    __name__, "hard_cases.md", {"promise": promise, "gallery": gallery}, "hard_cases.json", measured, draw=draw,
+    stamped=False,
+)  # fmt: skip

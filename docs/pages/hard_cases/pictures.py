@@ -1,10 +1,9 @@
-"""Three failing pictures beside ours: python docs/make.py hard_cases.pictures writes hard_cases.png beside it.
+"""Three failing pictures beside ours.
 
 The usual formula is above and endotsr below, both in float32 on the same input; a value that is not a number is
 magenta. The formulas are those of the gallery, evaluated at every pixel.
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,9 @@ from numpy.typing import NDArray
 from endotsr.method.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.method.splatting.projection import footprint
 from endotsr.results.report.figures import colour_mapped
-from endotsr.results.report.style import SMALL, name_axes, new_figure, save
+from endotsr.results.report.style import SMALL, name_axes, new_figure
 from pages.hard_cases.gallery.rasteriser import by_division, needle, weight_gradient
 
-PICTURE = Path(__file__).parents[2] / "results" / "hard_cases.png"
 F32 = np.float32
 SIDE = 40  # pixels
 LENGTH, FAR = 10_000, 3_500  # px: semi-axis of the needle; along both axes from its middle to that of the picture
@@ -76,20 +74,12 @@ def unknown_under_the_instrument() -> Pair:
 
 
 CASES = {
-    "Needle": (
-        needle_opacity,
-        f"C2: opacity {FAR} px from its middle",
-        "difference of large products",
-        "sum of two squares",
-    ),
+    "Needle": (needle_opacity, f"C2: opacity {FAR} px from its middle", "difference of large products",
+               "sum of two squares"),
     "Opaque Gaussian": (opaque_gradient, "A4: gradient in front of it", "T = T / (1 - alpha)", "T kept or replayed"),
-    "NaN under the instrument": (
-        unknown_under_the_instrument,
-        "L6: gradient of SSIM",
-        "multiplied by the mask",
-        "selected by the mask",
-    ),
-}
+    "NaN under the instrument": (unknown_under_the_instrument, "L6: gradient of SSIM", "multiplied by the mask",
+                                 "selected by the mask"),
+}  # fmt: skip
 
 
 def measured() -> dict[str, Pair]:
@@ -110,8 +100,3 @@ def drawn(found: dict[str, Pair]) -> Any:
             axes.set(xticks=[], yticks=[])
             name_axes(axes, x=way, title=f"{name}\n{what}" if axes is column[0] else "", sizes=SMALL)
     return figure
-
-
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    save(drawn(measured()), PICTURE)

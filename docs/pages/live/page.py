@@ -2,32 +2,28 @@
 
     python docs/make.py live measure FOLDER [CHAPTER ...]   open these chapters, or all, in a headless browser with the
                                                             filled FOLDER, and keep the stored rows of the others
-    python docs/make.py live                                rewrite the table in notebooks/index.md
 
-The record is docs/results/live.json. Processor time is that of all processes of the browser.
+The table is in notebooks/index.md. Processor time is that of all processes of the browser.
 """
 
+import argparse
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.results.report.tables import markdown
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
 from pages.live.bundle import CHAPTERS, cells, files, formulas
 from pages.live.supply import supply
-from pages.store.marks import read_json, write_marked
+from pages.store.commands import loaded
+from pages.store.program import DOCS, Program
+from pages.store.tables import noted, where_and_cores
 
-ROOT = Path(__file__).parents[3]
-PAGE, FILE = ROOT / "notebooks" / "index.md", ROOT / "docs" / "results" / "live.json"
-COMMAND = "python docs/make.py live measure FOLDER"
+ROOT = DOCS.parent
 LONGEST = 900.0  # seconds for one chapter
 STATUS = "document.querySelector('.live-bar [role=status]').textContent"
 OUTPUTS = "[...document.querySelectorAll('.live-row span')].map((word) => word.textContent)"
@@ -87,21 +83,22 @@ def processor_seconds(process: int) -> float:
     return total
 
 
-def measured(folder: Path, chapters: list[str]) -> dict[str, Any]:
+def measured(options: argparse.Namespace) -> dict[str, Any]:
     """The record, with new rows for these chapters.
 
     Raises: InputError for a name that is no chapter that runs.
     """
+    chapters = options.chapters
     if wrong := sorted({*chapters} - {*CHAPTERS}):
         raise InputError(f"{', '.join(wrong)}: runs in no page; allowed: {', '.join(CHAPTERS)}")
-    found = read_json(FILE, COMMAND)["chapters"] if chapters else {}
+    found = loaded(options.record)["chapters"] if chapters else {}
     for name in chapters or CHAPTERS:
         with tempfile.TemporaryDirectory() as scratch:
-            row = opened(name, folder, Path(scratch))
+            row = opened(name, options.folder, Path(scratch))
         row |= {"cells": len(cells(name)), "formulas": len(formulas(name))}
         found[name] = row | {"bytes": supply().size + sum(map(len, files(name).values()))}
         print(f"{name}: {row['passed']} of {row['cells']} cells, {row['last']['seconds']:.0f} s", flush=True)
-    return {"date": date.today().isoformat(), "machine": machine(), "pyodide": supply().version, "chapters": found}
+    return {"pyodide": supply().version, "chapters": found}
 
 
 def table(result: dict[str, Any]) -> str:
@@ -114,23 +111,17 @@ def table(result: dict[str, Any]) -> str:
         size = f"{row['bytes'] / 1e6:.1f} MB"
         rows.append([f"{{doc}}`{name}`", f"{row['passed']} of {row['cells']}", f"{row['formulas']}", size, *times])
     heads = ("Chapter", "Cells", "Formulas", "Read", "First result", "Last cell", "First, elapsed")
-    load, about = max(row["load"] for row in result["chapters"].values()), result["machine"]
-    machine_text = f"{about['processor']}, {about['cores']} cores, {result['date']}"
-    return (
-        f"{markdown(heads, rows)}\n\nProcessor time of a headless browser from the press to the first result and to "
+    load = max(row["load"] for row in result["chapters"].values())
+    about = (
+        "Processor time of a headless browser from the press to the first result and to "
         "the last cell, then elapsed time to the first result, from local files "
-        f"(Pyodide {result['pyodide']}, {machine_text}). The machine did other work meanwhile: up to {load:.0f} "
-        "processes were waiting or running."
+        f"(Pyodide {result['pyodide']}, {where_and_cores(result)}). The machine did other work meanwhile: "
+        f"up to {load:.0f} processes were waiting or running."
     )
+    return noted(heads, rows, about)
 
 
-def main(words: list[str]) -> None:
-    """The command."""
-    try:
-        if words[:1] == ["measure"] and len(words) > 1:
-            write_json(FILE, measured(Path(words[1]), words[2:]))
-        elif words:
-            sys.exit(__doc__)
-        write_marked(PAGE, {"table": table(read_json(FILE, COMMAND))}, "live")
-    except InputError as error:
-        sys.exit(f"error: {error}")
+PROGRAM = Program(
+    __name__, "../notebooks/index.md", {"table": table}, "live.json", measured,
+    {"folder": {"type": Path, "metavar": "FOLDER"}, "chapters": {"nargs": "*", "metavar": "CHAPTER"}},
+)  # fmt: skip

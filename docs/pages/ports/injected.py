@@ -1,18 +1,14 @@
-"""Rates at which the judge names mistakes: the table of docs/guides/port.md, by `python docs/make.py ports.injected`.
+"""Rates at which the judge names mistakes: the table of docs/guides/port.md.
 
 The counts are those of `python tests/port/injected/inject.py --json docs/results/injected.json`.
 """
 
-from pathlib import Path
 from typing import Any
 
 from endotsr.results.report.tables import markdown
-from pages.effects.parts import machine
-from pages.store.marks import read_json, write_marked
+from pages.store.program import Program
+from pages.store.tables import noted, where_with_cores
 
-DOCS = Path(__file__).parents[2]
-PAGE, FILE = DOCS / "guides" / "port.md", DOCS / "results" / "injected.json"
-MADE_BY = "python tests/port/injected/inject.py --json docs/results/injected.json"
 PORTS = {
     "c99": "in C99",
     "reference": "the reference itself, float32",
@@ -30,11 +26,11 @@ def fragments(result: dict[str, Any]) -> dict[str, str]:
     right_ports = [o for o in result["outcomes"] if not o["flag"]]
     clean = sum(not o["refused"] and not o["named"] for o in right_ports)
     note = (
-        f"Version {result['golden']} ({machine(result)}). Of the "
+        f"Version {result['golden']} ({where_with_cores(result)}). Of the "
         f"{len(right_ports)} right ports, {clean} pass with no mistake named."
     )
-    counts = markdown(("Port", "Single mistakes", "Named rightly"), rows)
-    return {"counts": f"{counts}\n\n{note}", "missed": markdown(("Mistake", "Port", "What the report says"), missed)}
+    counts = noted(("Port", "Single mistakes", "Named rightly"), rows, note)
+    return {"counts": counts, "missed": markdown(("Mistake", "Port", "What the report says"), missed)}
 
 
 def _right(outcome: dict[str, Any]) -> bool:
@@ -57,6 +53,4 @@ def _reason(outcome: dict[str, Any]) -> str:
     return f"names none; `{outcome['likeliest']}` comes first"
 
 
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    write_marked(PAGE, fragments(read_json(FILE, MADE_BY)), "injected")
+PROGRAM = Program(__name__, "guides/port.md", fragments, "injected.json")

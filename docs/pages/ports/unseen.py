@@ -1,25 +1,16 @@
-"""Rates at which the judge recognises unlisted mistakes: part of docs/guides/port.md, by
-
-    python docs/make.py ports.unseen
+"""Rates at which the judge recognises unlisted mistakes: part of docs/guides/port.md.
 
 Two kinds of sets, which are not mixed: *blind* ones, written by somebody who has not seen the judge and judged once
 (docs/results/blind_mistakes.json; protocol: tests/port/blind.py), and the set beside which the judge was developed,
 whose counts are those of `python tests/port/unseen/by_hand/measure.py --record now`.
 """
 
-from pathlib import Path
 from typing import Any
 
 from endotsr.results.report.tables import markdown
-from pages.effects.parts import machine
-from pages.store.marks import read_json, write_marked
-
-ROOT = Path(__file__).parents[3]
-PAGE = ROOT / "docs" / "guides" / "port.md"
-FILE = ROOT / "tests" / "port" / "unseen" / "by_hand" / "record.json"
-BLIND = ROOT / "docs" / "results" / "blind_mistakes.json"
-CHANGED = ROOT / "docs" / "results" / "golden_mutants.json"
-MADE_BY = "python tests/port/unseen/by_hand/measure.py --record now"
+from pages.store.marks import read_json
+from pages.store.program import RESULTS, Program
+from pages.store.tables import noted, where_with_cores
 
 
 def fragments(runs: dict[str, Any]) -> dict[str, str]:
@@ -28,12 +19,12 @@ def fragments(runs: dict[str, Any]) -> dict[str, str]:
     names = [name for name in titles if name in runs]
     last = runs[names[-1]]
     rows = [(what, *(_share(runs[name]["rates"][what]) for name in names)) for what in last["rates"]]
-    table = markdown(("Of mistakes that are on no list", *(titles[name] for name in names)), rows)
-    note = f"Version {last['golden']}, {last['rates']['refused'][1]} mistakes, float64 ({machine(last)})."
-    changed = read_json(CHANGED, "python tests/port/mutants/survey.py by_hand --apart")
+    heads = ("Of mistakes that are on no list", *(titles[name] for name in names))
+    note = f"Version {last['golden']}, {last['rates']['refused'][1]} mistakes, float64 ({where_with_cores(last)})."
+    changed = read_json(RESULTS / "golden_mutants.json", "python tests/port/mutants/survey.py by_hand --apart")
     return {
-        "rates": f"{table}\n\n{note}",
-        "blind": blind_table(read_json(BLIND, "tests/port/blind.py")),
+        "rates": noted(heads, rows, note),
+        "blind": blind_table(read_json(RESULTS / "blind_mistakes.json", "tests/port/blind.py")),
         "changed": changed_table(changed),
     }
 
@@ -70,6 +61,4 @@ def _share(rate: list[float]) -> str:
     return f"{100 * good / of:.1f} % ({100 * low:.0f} to {100 * high:.0f})"
 
 
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    write_marked(PAGE, fragments(read_json(FILE, MADE_BY)), "unseen")
+PROGRAM = Program(__name__, "guides/port.md", fragments, "../../tests/port/unseen/by_hand/record.json")

@@ -35,14 +35,17 @@ def simulated(
 
 
 @lru_cache(maxsize=1)
-def recorded(name: str, data: Path) -> Sequence:
-    """A real clip, prepared from its original files. Raises: InputError if a command fails."""
+def recorded(name: str, data: Path, scale: str = "0.16667") -> Sequence:
+    """A real clip, prepared from its original files, `sinus_endoscopy` at a scale.
+
+    Raises: InputError if a command fails.
+    """
     import endotsr
 
     with tempfile.TemporaryDirectory() as root:
         clip = Path(root) / "clip"
         if name == "sinus_endoscopy":
-            said("prepare", data / name, "--out", clip, "--scale", "0.16667")
+            said("prepare", data / name, "--out", clip, "--scale", scale)
         else:
             stereo = ("--stereo", "side_by_side", "--calibration", data / name / "calibration.yaml")
             said("prepare", data / name / "video.mp4", *stereo, "--out", clip, "--scale", "0.25")

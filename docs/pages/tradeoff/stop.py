@@ -1,10 +1,9 @@
-"""The cost of a looser stop: `python docs/make.py tradeoff.stop` trains two models and renders each with all stops.
+"""The cost of a looser stop: `python docs/make.py tradeoff.stop measure` trains two models and renders with all stops.
 
-The result is docs/results/stop.json; `python docs/make.py tradeoff` writes its sentences to docs/tradeoff.md.
+`python docs/make.py tradeoff` writes the sentences to docs/tradeoff.md.
 """
 
-from datetime import date
-from pathlib import Path
+import argparse
 from typing import Any
 
 import msgspec
@@ -13,17 +12,16 @@ import numpy as np
 import endotsr
 from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.training.fitting.model import render_at
-from endotsr.training.runs.files import write_json
-from endotsr.training.runs.machine import machine
+from pages.store.program import Program
+from pages.store.tables import where
 
-FILE = Path(__file__).parents[2] / "results" / "stop.json"
 TRAINED, RENDERED = (1e-3, 1e-2), (1e-2, 1e-3, 1e-6)
 SCENE = {"width": 96, "height": 76, "frames": 24}
 POINTS = {"first_frame_points": 3000, "other_frame_points": 750}
 ITERATIONS = 400
 
 
-def measured() -> dict[str, Any]:
+def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Mean PSNR over the tissue of the held-out frames, dB: stop of the training -> stop of the render -> value."""
     clip, found = endotsr.load_sequence("simulated", simulator=SCENE), {}
     for trained in TRAINED:
@@ -37,7 +35,7 @@ def measured() -> dict[str, Any]:
                 out = render_at(model.gaussians, model.spectral, config, clip.cameras[k], float(clip.times[k]))
                 values.append(psnr_tissue(np.clip(out.colour, 0, 1), clip.frame(k).image, clip.masks[k]))
             row[f"{rendered:g}"] = float(np.mean(values))
-    return {"date": date.today().isoformat(), "machine": machine(), "psnr_tissue": found}
+    return {"psnr_tissue": found}
 
 
 def sentences(result: dict[str, Any]) -> str:
@@ -46,7 +44,7 @@ def sentences(result: dict[str, Any]) -> str:
     first, _, last = (f"{rendered:g}" for rendered in RENDERED)
     scene = f"{SCENE['width']}x{SCENE['height']}, {SCENE['frames']} frames, {ITERATIONS} iterations of `demo`, one seed"
     return (
-        f"On a small simulated scene ({scene}; {result['machine']['processor']}, {result['date']}), a model that was "
+        f"On a small simulated scene ({scene}; {where(result)}), a model that was "
         f"trained with a stop of {TRAINED[0]:g} has {tight[last]:.2f} dB when it is rendered with {last}, and "
         f"{tight[first]:.2f} dB with {first}. One that was trained with {TRAINED[1]:g} has {loose[last]:.2f} dB and "
         f"{loose[first]:.2f} dB. Of its loss, {tight[last] - loose[last]:.1f} dB are in the trained Gaussians and "
@@ -54,6 +52,4 @@ def sentences(result: dict[str, Any]) -> str:
     )
 
 
-def main(words: list[str]) -> None:
-    """Write the part of the page; takes no words."""
-    write_json(FILE, measured())
+PROGRAM = Program(__name__, record="stop.json", measure=measured)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from endotsr.results.report.tables import duration, plain
+from endotsr.results.report.tables import duration
 from endotsr.studies.tradeoff.study import Ranked, dominates
 from endotsr.studies.tradeoff.text import levels, milliseconds, small
 
@@ -120,14 +120,6 @@ def judge_presets(points: Sequence[dict[str, Any]], presets: dict[str, str]) -> 
 def _ranked(point: dict[str, Any]) -> Ranked:
     error = point["error"]
     return Ranked(point["name"], point["visits"], (error["max"], error["rms"], *error["gradients"].values()))
-
-
-def training_lines(result: dict[str, Any]) -> list[str]:
-    """Text for the terminal: the final state of every training compared with the base, and the summary."""
-    rows = training_rows(result)
-    lines = [plain(("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians"), rows)]
-    lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
-    return lines + summary(result)
 
 
 def summary(result: dict[str, Any]) -> list[str]:

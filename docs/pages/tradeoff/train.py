@@ -1,9 +1,13 @@
 """Train a sequence with one setting changed at a time, and measure held-out frames during each training.
 
-OUT/training.json is written after every training; after an interruption, the same command continues the study.
+    python docs/make.py tradeoff.train measure SEQUENCE [--minutes 90] [--lpips FILE]
+
+A SEQUENCE is a sequence folder or the word `simulated`. The study is stored after every training; after an
+interruption, the same command continues it. `python docs/make.py tradeoff` then writes docs/tradeoff.md.
 """
 
 import argparse
+import shutil
 from pathlib import Path
 
 import msgspec
@@ -16,43 +20,51 @@ from endotsr.method.kernels.threads import use_threads
 from endotsr.results.evaluation.lpips import load_lpips_weights
 from endotsr.training.runs.files import refuse_folder
 from endotsr.training.runs.sources import SIMULATED, load_sequence
-from pages.tradeoff.text import training_lines
+from pages.store.program import DOCS, LPIPS, RESULTS, Program
+from pages.tradeoff.parts import training
 from pages.tradeoff.training import run_training_study
 
 TRAINING = "training.json"  # in the folder of the measurement
 
 
-def options(words: list[str]) -> argparse.Namespace:
-    """The options of a study of training."""
-    parser = argparse.ArgumentParser(prog="tradeoff.py train", description=__doc__)
-    parser.add_argument("sequence", help="sequence folder, or `simulated`")
-    parser.add_argument("--out", type=Path, required=True, help="folder of the measurement")
-    parser.add_argument("--minutes", type=float, default=8.0, help="length of the whole study; it sets the iterations")
-    parser.add_argument("--iterations", type=int, help="iterations of each training instead")
-    parser.add_argument("--preset", choices=list(PRESETS), help="of the base (default: demo for `simulated`, or paper)")
-    parser.add_argument("--scale", type=float, default=1.0, help="image scale of the base training")
-    parser.add_argument("--lpips", type=Path, help="AlexNet LPIPS weights")
-    parser.add_argument("--threads", type=int, default=2, help="threads, 0 = all cores")
-    found = parser.parse_args(words)
-    if not found.minutes > 0 or (found.iterations is not None and found.iterations < 1):
-        raise InputError("tradeoff.py train: allowed: --minutes > 0, --iterations >= 1")
-    return found
-
-
-def run(words: list[str]) -> None:
-    """The study, printed as a table. Raises: InputError."""
-    o = options(words)
+def run(o: argparse.Namespace) -> Path:
+    """The study, printed as a table. Returns: its file. Raises: InputError."""
+    if not o.minutes > 0 or (o.iterations is not None and o.iterations < 1):
+        raise InputError("tradeoff.train: allowed: --minutes > 0, --iterations >= 1")
     use_threads(o.threads)
+    name = o.sequence if o.sequence == SIMULATED else Path(o.sequence).resolve().name
+    out = o.out or DOCS / "_build" / "tradeoff" / name
     data = msgspec.to_builtins(PRESETS[o.preset or ("demo" if o.sequence == SIMULATED else "paper")])
     data["sequence"]["scale"] = o.scale
-    refuse_folder(o.out)
+    refuse_folder(out)
     with StepBar("iterations") as bar:
         result = run_training_study(
-            o.out / TRAINING,
+            out / TRAINING,
             config_from_dict(data, "command line"),
             lambda config: load_sequence(o.sequence, config, SimulatorSettings()),
-            o.sequence if o.sequence == SIMULATED else Path(o.sequence).resolve().name,
+            name,
             minutes=o.minutes, iterations=o.iterations, weights=load_lpips_weights(o.lpips),
             begin=bar.begin, step=bar.step, say=bar.say,
         )  # fmt: skip
-    print("\n".join(training_lines(result)))
+    print(training(name, result))
+    return out / TRAINING
+
+
+def measured(options: argparse.Namespace) -> None:
+    """One study of training; without --out to docs/results/tradeoff_training_NAME.json."""
+    file = run(options)
+    if options.out is None:
+        shutil.move(file, RESULTS / f"tradeoff_training_{file.parent.name}.json")
+
+
+OPTIONS = {
+    "sequence": {"metavar": "SEQUENCE"},
+    "--out": {"type": Path, "metavar": "DIR", "help": "folder of the measurement (default: docs/results at its end)"},
+    "--minutes": {"type": float, "default": 8.0, "help": "length of the whole study; it sets the iterations"},
+    "--iterations": {"type": int, "help": "iterations of each training instead"},
+    "--preset": {"choices": list(PRESETS), "help": "of the base (default: demo for `simulated`, or paper)"},
+    "--scale": {"type": float, "default": 1.0, "help": "image scale of the base training"},
+    "--lpips": LPIPS,
+    "--threads": {"type": int, "default": 2, "help": "threads, 0 = all cores"},
+}
+PROGRAM = Program(__name__, measure=measured, options=OPTIONS)

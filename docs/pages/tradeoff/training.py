@@ -210,7 +210,7 @@ def run_training_study(
         done[configuration.name] = entry
         result |= {"configurations": list(done.values()), "date": now()}
         write_json(file, result)
-        say(summary_line(entry))
+        say(f"{configuration.name}: {entry['milestones'][-1]['psnr_full']:.2f} dB after {entry['seconds']:.1f} s")
     write_json(file, result)
     return result
 
@@ -253,12 +253,3 @@ def _begun(
         "versions": versions(),
         "threads": numba.get_num_threads(),
     }
-
-
-def summary_line(entry: dict[str, Any]) -> str:
-    """One training in one line."""
-    last = entry["milestones"][-1]
-    return (
-        f"{entry['name']:<16} {last['psnr_full']:6.2f} dB, SSIM {last['ssim_full']:.4f} after "
-        f"{last['seconds']:6.1f} s, {last['gaussians']} Gaussians"
-    )

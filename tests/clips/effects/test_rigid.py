@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pages.effects.sinus import read_sinus
 from pages.effects.study import settings_of
+from pages.recordings.hand_held_clips import recorded
 from scenes import clip
 
 from data_folder import data_folder
@@ -112,5 +112,5 @@ def test_flow_that_does_not_return_counts_as_noise():
 def test_the_rigid_anatomy_of_a_real_clip_does_not_move():
     """35 frames of a nose, the camera moves: the size of the flow is 20 pixels."""
     folder = data_folder("sinus_endoscopy")
-    verdict = _motion(read_sinus(folder))
+    verdict = _motion(recorded(folder.name, folder.parent, "0.33333"))
     assert verdict.kind == "none"

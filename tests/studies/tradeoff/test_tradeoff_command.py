@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from pages.tradeoff.train import run as run_training
+from pages.tradeoff import train
 from test_splat_file import write_npz
 
 from endotsr.cli.main import main
@@ -12,6 +12,10 @@ from endotsr.errors import InputError
 from endotsr.studies.tradeoff.results import read_format, read_measurement
 
 pytestmark = pytest.mark.slow
+
+
+def run_training(*words):
+    return train.run(train.PROGRAM._parser("").parse_args([*words]))
 
 
 @pytest.fixture(scope="module")
@@ -119,9 +123,9 @@ def test_mistakes_of_a_study_of_training(tmp_path):
         ([], "not found"),
     ):
         with pytest.raises(InputError, match=said):
-            run_training([str(tmp_path / "none"), "--out", str(tmp_path / "out"), *words])
+            run_training(str(tmp_path / "none"), "--out", str(tmp_path / "out"), *words)
     assert not (tmp_path / "out").exists()
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "training.json").write_text("{}")
     with pytest.raises(InputError, match="not a measurement of this version"):
-        run_training(["simulated", "--out", str(tmp_path / "out")])
+        run_training("simulated", "--out", str(tmp_path / "out"))

@@ -5,8 +5,8 @@ import json
 import msgspec
 import numpy as np
 import pytest
-from pages.tradeoff import training
-from pages.tradeoff.text import summary, training_lines, training_rows
+from pages.tradeoff import parts, training
+from pages.tradeoff.text import summary, training_rows
 from pages.tradeoff.training import changed, configurations, measured, run_training_study
 
 from endotsr.cli.parts.options import base_settings
@@ -112,7 +112,7 @@ def test_what_the_time_does_not_allow_is_left_out_and_said(tmp_path, monkeypatch
     monkeypatch.setattr(training, "planned_iterations", lambda *a: 4)
     result = study(tmp_path / "training.json", minutes=1e-9)
     assert result["configurations"] == [] and set(result["left_out"]) == {c.name for c in configurations(BASE)}
-    assert training_lines(result)[-1].startswith("left out")
+    assert "- 2 N: no time left for it" in parts.training("name", result)
 
 
 def test_the_words_of_a_configuration_make_its_settings():
