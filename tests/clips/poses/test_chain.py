@@ -74,6 +74,11 @@ def test_identical_frames_have_one_pose():
     np.testing.assert_allclose(found.poses[1].translation, found.poses[2].translation, atol=1e-3)
 
 
+def test_one_frame_is_refused():
+    with pytest.raises(InputError, match="one frame: there is no motion"):
+        estimated(Views(*(plane[:1] for plane in VIEWS[:3]), VIEWS.camera))
+
+
 def test_depth_that_is_not_finite_is_no_depth():
     depth = VIEWS.depth.copy()
     depth[:, ::2] = np.nan

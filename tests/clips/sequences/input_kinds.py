@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import public_layouts
 import raw_sources
 from common_folder import written
-from made_videos import CAMERA, HEIGHT, WIDTH, pictures, write
+from made_videos import CAMERA, HEIGHT, WIDTH, files, pictures, write
 from test_calibrations import K, kalibr, ros
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
@@ -121,13 +121,6 @@ def cut(part: float, whole=None):
         path.write_bytes(data[: int(len(data) * part)])
 
     return change
-
-
-def files(folder: Path, name: str, frames, ending="png") -> None:
-    (folder / name).mkdir(parents=True)
-    for i, frame in enumerate(frames):
-        path = folder / name / f"{i:04d}.{ending}"
-        write_png(path, frame) if ending == "png" else write_jpeg(path, frame)
 
 
 def folder_of(frames, *words: str, ending="png", change=lambda folder: None):

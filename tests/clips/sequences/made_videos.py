@@ -1,4 +1,4 @@
-"""Videos with real codecs, as cameras and recorders leave them: interlaced, uneven in time, turned."""
+"""Folders of pictures, and videos with real codecs, as cameras leave them: interlaced, uneven in time, turned."""
 
 import os
 from collections.abc import Iterator
@@ -9,6 +9,9 @@ from pathlib import Path
 import av
 import numpy as np
 from numpy.typing import NDArray
+
+from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.pictures import write_jpeg
 
 WIDTH, HEIGHT = 128, 96
 CAMERA = ("--camera", "100", "100", "64", "48")
@@ -36,6 +39,14 @@ def woven(count: int = 12) -> list[Picture]:
         frame[1::2] = picture(2 * i + 1)[1::2]
         found.append(frame)
     return found
+
+
+def files(folder: Path, name: str, frames, ending: str = "png") -> None:
+    """Pictures, masks or depth in a folder: 0000.png, 0001.png, ..."""
+    (folder / name).mkdir(parents=True)
+    for i, frame in enumerate(frames):
+        path = folder / name / f"{i:04d}.{ending}"
+        write_png(path, frame) if ending == "png" else write_jpeg(path, frame)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
-from made_videos import CAMERA, UNEVEN, picture, pictures, write
+from made_videos import CAMERA, UNEVEN, files, picture, pictures, write
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
@@ -111,11 +111,10 @@ def test_masks_are_united(tmp_path, capsys):
     border = np.zeros((HEIGHT, WIDTH), np.uint8)
     border[-3:] = 255
     write_png(tmp_path / "border.png", border)
-    (tmp_path / "logo").mkdir()
+    logos = np.zeros((FRAMES, HEIGHT, WIDTH), np.uint8)
     for i in range(FRAMES):
-        logo = np.zeros((HEIGHT, WIDTH), np.uint8)
-        logo[15, i] = 255
-        write_png(tmp_path / "logo" / f"{i:03d}.png", logo)
+        logos[i, 15, i] = 255
+    files(tmp_path, "logo", logos)
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--unite-masks"]
     assert main([*words, str(tmp_path / "border.png"), str(tmp_path / "logo")]) == 0
     before, after = describe(tmp_path / "clip"), describe(tmp_path / "o")

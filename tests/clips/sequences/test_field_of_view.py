@@ -1,12 +1,14 @@
 """A dark border that all frames share is excluded by `prepare`, kept on request, and never by surprise."""
 
+import shutil
+
 import msgspec
 import numpy as np
 import pytest
-from made_videos import write
+from made_videos import files, write
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv import read_png
 from endotsr.clips.sequences.camera import intrinsics_of_view
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.field_of_view import FieldOfView
@@ -29,9 +31,8 @@ def scope(count=FRAMES, shape=INSIDE):
 
 def prepared(folder, *words, pictures=None):
     """The folder that `prepare` writes from a folder of pictures."""
-    (folder / "source").mkdir(exist_ok=True)
-    for i, picture in enumerate(pictures or scope()):
-        write_png(folder / "source" / f"{i}.png", picture)
+    shutil.rmtree(folder / "source", ignore_errors=True)
+    files(folder, "source", pictures or scope())
     base = ["prepare", str(folder / "source"), "--out", str(folder / "clip"), "--replace", "--field-of-view", "70"]
     assert main([*base, *words]) == 0
     return folder / "clip"
@@ -66,11 +67,9 @@ def test_the_border_can_be_kept(tmp_path, capsys):
 
 
 def test_given_masks_stay_as_they_are_unless_the_border_is_excluded(tmp_path, capsys):
-    (tmp_path / "given").mkdir()
     tool = np.zeros((HEIGHT, WIDTH), np.uint8)
     tool[50:60, 60:80] = 255
-    for i in range(FRAMES):
-        write_png(tmp_path / "given" / f"{i}.png", tool)
+    files(tmp_path, "given", [tool] * FRAMES)
     clip = prepared(tmp_path, "--masks", str(tmp_path / "given"))
     assert "dark in every frame" in capsys.readouterr().out
     assert all((mask == (tool > 0)).all() for mask in masks_of(clip))

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from common_folder import moving, written
+from made_videos import files
 from raw_sources import HEIGHT, WIDTH, colmap, ini, scene_picture, stereomis, tum, write_video
 from scipy.spatial.transform import Rotation
 
@@ -54,9 +55,7 @@ def test_a_lossless_video_gives_the_pictures_it_was_made_of(tmp_path):
 
 @pytest.mark.parametrize(("stereo", "join"), [("side_by_side", np.hstack), ("stacked", np.vstack)])
 def test_halves_of_a_stereo_picture(tmp_path, stereo, join):
-    (tmp_path / "clip").mkdir()
-    for i in range(3):
-        write_png(tmp_path / "clip" / f"{i}.png", join([scene_picture(i), scene_picture(i, 5.0)]))
+    files(tmp_path, "clip", [join([scene_picture(i), scene_picture(i, 5.0)]) for i in range(3)])
     found, _ = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA, stereo=stereo, baseline=4.0)
     assert (found.camera.width, found.camera.height, found.camera.baseline) == (WIDTH, HEIGHT, 4.0)
     np.testing.assert_array_equal(read_png(tmp_path / "out/images/000002.png"), scene_picture(2))
@@ -222,8 +221,7 @@ def test_tum(tmp_path):
 
 
 def test_a_distorted_picture_is_straightened(tmp_path):
-    (tmp_path / "clip").mkdir()
-    write_png(tmp_path / "clip/0.png", scene_picture(0))
+    files(tmp_path, "clip", [scene_picture(0)])
     found, notes = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA, distortion=(-0.2, 0.0, 0.0, 0.0))
     assert found.camera.distortion == [] and any("undistorted" in note for note in notes)
     matrix = np.array([[60.0, 0, 29.5], [0, 61.0, 24.5], [0, 0, 1]])
@@ -254,9 +252,7 @@ def masks(root, *names):
 @pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_source_leaves_nothing(tmp_path, case):
     damage, options, message = WRONG[case]
-    (tmp_path / "clip").mkdir()
-    for i in range(3):
-        write_png(tmp_path / f"clip/{i}.png", scene_picture(i))
+    files(tmp_path, "clip", [scene_picture(i) for i in range(3)])
     damage(tmp_path)
     extra = {"trajectory": tmp_path / "t.txt"} if (tmp_path / "t.txt").exists() else {}
     extra |= {"masks": tmp_path / "m"} if (tmp_path / "m").exists() else {}
@@ -334,9 +330,7 @@ def test_the_command(tmp_path, capsys):
 
 def test_a_pair_without_a_baseline_is_told_which_number_is_missing(tmp_path, capsys):
     for side in ("left", "right"):
-        (tmp_path / "clip" / side).mkdir(parents=True)
-        for i in range(3):
-            write_png(tmp_path / "clip" / side / f"{i}.png", scene_picture(i))
+        files(tmp_path / "clip", side, [scene_picture(i) for i in range(3)])
     words = ["--camera", *map(str, CAMERA)]
     assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 0
     assert "next: set the baseline of the two cameras, [camera] baseline" in capsys.readouterr().out

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from common_folder import FRAMES, written
-from made_videos import write
+from made_videos import files, write
 
 from data_folder import data_folder
 from endotsr.cli.main import main
@@ -87,18 +87,16 @@ def test_a_picture_without_a_border_has_no_field_of_view():
 
 
 def test_a_proposal_that_leaves_no_tissue_is_refused_with_the_frames(tmp_path, capsys, monkeypatch):
-    (tmp_path / "source").mkdir()
-    for i, picture in enumerate(scene("pulling")[0]):
-        write_png(tmp_path / "source" / f"{i}.png", picture)
+    files(tmp_path, "source", scene("pulling")[0])
     whole = np.ones((128, 160), bool)
+    refused, warned = "hardly any tissue in 3 of 5 frames: 0000, 0001, 0002", "tissue is left in 2 frames: 0, 1"
     for count, code in ((3, 2), (2, 0)):
         masks = [whole if i < count else ~whole for i in range(5)]
         made = Proposal(masks, "made up", 0.0, tuple(range(count)))
         monkeypatch.setattr("endotsr.clips.sequences.make_masks.propose_masks", lambda pictures, made=made: made)
         assert main(["masks", str(tmp_path / "source"), "--out", str(tmp_path / "m")]) == code
         said = capsys.readouterr()
-        expected = "hardly any tissue in 3 of 5 frames: 0, 1, 2" if code else "tissue is left in 2 frames: 0, 1"
-        assert expected in (said.err if code else said.out)
+        assert refused in said.err if code else warned in said.out
 
 
 def drifting(offset):
@@ -144,9 +142,7 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
 def test_a_mask_of_all_frames_is_united_with_the_proposal(tmp_path, capsys):
     """A stated field of view stays; it is not a reason to refuse, and not replaced."""
     pictures, true = scene("pulling")
-    (tmp_path / "source").mkdir()
-    for i, picture in enumerate(pictures):
-        write_png(tmp_path / "source" / f"{i}.png", picture)
+    files(tmp_path, "source", pictures)
     static = np.zeros(pictures[0].shape[:2], bool)
     static[-20:] = True
     write_png(tmp_path / "view.png", np.where(static, 255, 0).astype(np.uint8))
@@ -159,12 +155,10 @@ def test_a_mask_of_all_frames_is_united_with_the_proposal(tmp_path, capsys):
 
 
 def test_masks_of_any_source_keep_their_mark(tmp_path):
-    (tmp_path / "source").mkdir()
-    for i, picture in enumerate(scene("pulling")[0]):
-        write_png(tmp_path / "source" / f"{i}.png", picture)
+    files(tmp_path, "source", scene("pulling")[0])
     assert main(["masks", str(tmp_path / "source"), "--out", str(tmp_path / "found")]) == 0
     assert json.loads((tmp_path / "found/proposal.json").read_text())["proposed"] is True
-    assert read_png(tmp_path / "found/masks/0.png").max() == 255
+    assert read_png(tmp_path / "found/masks/0000.png").max() == 255
     words = ["--camera", "140", "140", "80", "64", "--masks", str(tmp_path / "found/masks")]
     assert main(["prepare", str(tmp_path / "source"), "--out", str(tmp_path / "clip"), *words]) == 0
     masks = read_sequence_file(tmp_path / "clip").masks
@@ -187,9 +181,7 @@ def test_masks_take_the_place_of_those_of_a_prepared_sequence(tmp_path):
 
 
 def test_nothing_found_writes_nothing(tmp_path, capsys):
-    (tmp_path / "source").mkdir()
-    for i, picture in enumerate(scene("still")[0]):
-        write_png(tmp_path / "source" / f"{i}.png", picture)
+    files(tmp_path, "source", scene("still")[0])
     assert main(["masks", str(tmp_path / "source"), "--out", str(tmp_path / "found")]) == 1
     assert "no masks proposed" in capsys.readouterr().out and not (tmp_path / "found").exists()
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_videos import write
+from made_videos import files, write
 from raw_sources import colmap
 from test_stereo_depth import slanted_pair
 
@@ -102,12 +102,10 @@ def test_check_names_depth_that_the_light_contradicts(tmp_path):
 def test_the_parallax_of_a_pair_speaks_against_a_disparity(tmp_path, capsys):
     left, right, moved = slanted_pair()[:3]
     for name, picture in (("left", left), ("right", right)):
-        (tmp_path / "clip" / name).mkdir(parents=True)
-        for i in range(3):
-            write_png(tmp_path / "clip" / name / f"{i}.png", np.roll(picture, i, 0))
+        files(tmp_path / "clip", name, [np.roll(picture, i, 0) for i in range(3)])
     (tmp_path / "depth").mkdir()
     for i in range(3):
-        np.save(tmp_path / "depth" / f"{i}.npy", np.roll(moved, i, 0).astype(np.float32))
+        np.save(tmp_path / "depth" / f"{i:04d}.npy", np.roll(moved, i, 0).astype(np.float32))
     height, width = left.shape[:2]
     words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--baseline", "4"]
     words += ["--camera", "200", "200", str(width / 2), str(height / 2), "--depth", str(tmp_path / "depth")]

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import public_layouts
 import raw_sources
 from common_folder import written
-from made_videos import pictures
+from made_videos import files, pictures
 from rig_inputs import rig
 
 from endotsr.clips.opencv import write_png
@@ -34,9 +34,7 @@ def planted(folder: Path) -> Path:
 
 def pairs(folder: Path) -> None:
     for side in ("left", "right"):
-        (folder / side).mkdir(parents=True)
-        for k, shown in enumerate(pictures(3)):
-            write_png(folder / side / f"{k}.png", shown)
+        files(folder, side, pictures(3))
     (folder / "left/times.txt").write_text("0\n0.04\n0.08\n")
 
 
@@ -123,9 +121,7 @@ def test_a_name_that_looks_like_a_pattern_is_read(tmp_path):
 )
 def test_a_list_of_times_that_is_no_regular_file_is_named(make, tmp_path):
     folder = tmp_path / "clip"
-    folder.mkdir()
-    for k, shown in enumerate(pictures(3)):
-        write_png(folder / f"{k}.png", shown)
+    files(tmp_path, "clip", pictures(3))
     make(folder / "times.csv")
     clip = describe(folder, SourceOptions())
     assert any("not read: times.csv" in note for note in clip.notes), clip.notes
