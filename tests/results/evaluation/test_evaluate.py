@@ -60,26 +60,16 @@ def test_perfect_render_is_null_and_counted(sequence):
     strict(result)
 
 
-def test_render_that_is_not_finite_does_not_reach_the_json(sequence):
-    def render(index):
-        image = unit_image(sequence, index) + np.float32(0.1)
-        if index == 9:
-            image[1, 4, 8] = np.nan
-        return image
-
-    result = evaluate.evaluate_frames(sequence, [1, 9], render)
-    strict(result)
-    assert result["per_frame"][1]["psnr_tissue"] is None
+@pytest.mark.parametrize("odd", ["a render that is not finite", "an empty mask"])
+def test_a_frame_without_a_value_is_null_and_left_out_of_the_mean(odd, sequence):
+    renders = {i: unit_image(sequence, i) + np.float32(0.1) for i in (1, 9)}
+    if odd == "an empty mask":
+        sequence.masks[9] = False
+    else:
+        renders[9][1, 4, 8] = np.nan
+    result = strict(evaluate.evaluate_frames(sequence, [1, 9], renders.__getitem__))
+    assert result["per_frame"][1]["psnr_tissue"] is None and result["not_finite"] > 0
     assert result["mean"]["psnr_tissue"] == pytest.approx(20.0, abs=1e-4)
-    assert result["not_finite"] > 0
-
-
-def test_an_empty_mask_has_no_tissue_value(sequence):
-    sequence.masks[9] = False
-    result = evaluate.evaluate_frames(sequence, [1, 9], lambda i: unit_image(sequence, i) + np.float32(0.1))
-    assert result["per_frame"][1]["psnr_tissue"] is None
-    assert result["mean"]["psnr_tissue"] == pytest.approx(20.0, abs=1e-4)
-    strict(result)
 
 
 def test_render_of_a_wrong_size_is_refused(sequence):

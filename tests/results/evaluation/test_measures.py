@@ -16,7 +16,7 @@ from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.depth import held_out_depth
 from endotsr.results.evaluation.measures import MEASURES, flicker, measure_lines, measured
-from endotsr.results.evaluation.right_view import moved_left, right_camera, right_view, stereo_baseline
+from endotsr.results.evaluation.right_view import moved_left, right_view, stereo_baseline
 
 LEVEL = np.float32(1 / 255)
 
@@ -165,15 +165,6 @@ def test_excluded_pixels_are_moved_with_the_tissue():
     counted = moved_left(sequence, 0, 5.0).counted  # f B / z = 6 px
     assert not counted[20:40, 24:44].any()
     assert counted[5:15, 5:50].all() and counted[25:35, 5:20].all()
-
-
-def test_the_right_camera_stands_to_the_right():
-    camera = Camera(np.eye(3), np.array([0.0, 0.0, 5.0]), 60.0, 60.0, 32, 32, 64, 64)
-    from endotsr.method.splatting.camera import project
-
-    point = np.array([[0.0], [0.0], [45.0]])
-    left, right = project(camera, point)[0], project(right_camera(camera, 4.0), point)[0]
-    assert float(left[0] - right[0]) == pytest.approx(60.0 * 4.0 / 50.0)  # disparity f B / z
 
 
 def test_without_a_right_picture_there_is_a_reason(tmp_path):

@@ -29,14 +29,11 @@ def case(noise=0.02, shape=(3, 14, 19)):
 
 
 @pytest.mark.parametrize("noise", [0.002, 0.02, 0.2])
-def test_full_is_never_the_lower_psnr_but_can_be_the_lower_ssim(noise):
+def test_full_can_be_the_lower_ssim(noise):
     """The error lies beside a single excluded pixel in every window: its own value is low, and counts in full."""
-    render, truth, mask = case(noise)
-    assert psnr(render, truth, mask) >= psnr_tissue(render, truth, mask)
     truth, mask = np.full((3, 33, 33), 0.5), np.ones((33, 33), bool)
     mask[16, 16], render = False, truth.copy()
     render[:, 15:18, 15:18] += noise
-    assert psnr(render, truth, mask) >= psnr_tissue(render, truth, mask)
     assert ssim_full(render, truth, mask) < ssim_tissue(render, truth, mask)
 
 
@@ -59,7 +56,6 @@ def test_every_metric_equals_its_definition():
     for metric in (psnr, psnr_tissue, ssim_full, ssim_tissue):
         expected = getattr(definition, metric.__name__)(render, truth, mask)
         assert metric(render, truth, mask) == pytest.approx(expected, abs=1e-12), metric
-    assert ssim_full(render, truth, mask) > ssim_tissue(render, truth, mask)
 
 
 def test_ssim_equals_skimage():

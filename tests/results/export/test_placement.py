@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from endotsr.clips.sequences.record import recorded
 from endotsr.errors import InputError
-from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.harmonics import harmonics_forward
 from endotsr.method.splatting.render import Scene
 from endotsr.results.export import placement
@@ -82,16 +81,6 @@ def test_an_outside_reader_finds_z_forward_and_y_down(pose, content, tmp_path):
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_a_written_scene_looks_as_the_first_frame_to_the_identity(pose, tmp_path):
-    scene = scene_seen_by(pose)
-    seen = scene.render(TIME, scene.cameras[0])
-    export(scene, tmp_path / "a.ply", Times(times=(TIME,)))
-    again = open_scene(tmp_path / "a.ply").render(0.0, CAMERA)
-    np.testing.assert_allclose(again.colour, seen.colour, atol=2e-3)
-    assert seen.opacity.mean() > 0.05
-
-
-@pytest.mark.parametrize("pose", POSES)
 @pytest.mark.parametrize("source", ["run", "slim", "ply"])
 def test_the_identity_camera_of_a_file_shows_the_first_frame(pose, source, tmp_path):
     scene = scene_seen_by(pose)
@@ -116,13 +105,6 @@ def test_a_camera_of_render_json_is_in_the_same_axes(pose, tmp_path):
     entry = json.loads((tmp_path / "a/render.json").read_text())["pictures"][0]["camera"]
     np.testing.assert_allclose(entry["rotation"], np.eye(3), atol=1e-12)
     np.testing.assert_allclose(entry["translation"], [-0.5, 0, 0], atol=1e-12)
-
-
-def test_trimesh_reads_the_points_in_front_of_it(tmp_path):
-    trimesh = pytest.importorskip("trimesh", reason="trimesh, an outside reader, is not installed")
-    export(scene_seen_by("EndoNeRF"), tmp_path / "a.ply", Times(times=(TIME,)), Content("points", 0.0))
-    found = trimesh.load(tmp_path / "a.ply").vertices
-    np.testing.assert_allclose(found.T, plain().position, atol=1e-4)
 
 
 def test_a_scene_of_a_ply_file_keeps_its_axes(tmp_path):
@@ -154,11 +136,3 @@ def test_an_endonerf_world_is_turned_without_rounding():
         before, after = (np.sort(np.abs(getattr(one, name)), axis=0) for one in (scene, turned))
         np.testing.assert_array_equal(after, before)
     assert placement.placed_scene(scene, placement.HERE) is scene
-
-
-def test_a_camera_goes_there_and_back():
-    camera = Camera(Rotation.from_euler("xyz", [0.1, 0.2, 0.3]).as_matrix(), np.array([1.0, 2, 3]), *CAMERA[2:])
-    there = placement.Placement(OBLIQUE, np.array([3.0, -4.0, 25.0]))
-    again = placement.training_camera(placement.placed_camera(camera, there), there)
-    np.testing.assert_allclose(again.rotation, camera.rotation, atol=1e-14)
-    np.testing.assert_allclose(again.translation, camera.translation, atol=1e-13)

@@ -77,9 +77,12 @@ def test_bytes_are_rounded_and_clipped():
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 2), (5, 9), (32, 48)])
-def test_pictures_of_any_size(rng, size):
-    truth = rng.random((3, *size))
-    panels = figures.triptych(rng.random((3, *size)), truth, rng.random(size) < 0.5)
+@pytest.mark.parametrize("tissue", [0.0, 0.5])
+def test_pictures_of_any_size_and_mask(rng, size, tissue):
+    truth, mask = rng.random((3, *size)), rng.random(size) < tissue
+    panels = figures.triptych(rng.random((3, *size)), truth, mask)
+    assert (panels.error[~mask] == figures.EXCLUDED).all()
+    assert mask.any() or (panels.row, panels.column) == (0, 0)
     picture = figures.triptych_picture(panels)
     assert picture.shape == (2 * size[0] + 6, 3 * size[1] + 12, 3)
     inset = picture[size[0] + 6, 0]
@@ -92,13 +95,6 @@ def test_frame_surrounds_the_window_and_leaves_it_untouched(frame):
     np.testing.assert_array_equal(panels.window(marked), panels.window(panels.render))
     assert (marked[panels.row - 1, panels.column] == 255).all()
     assert (marked[panels.row - 2, panels.column] == 0).all()
-
-
-def test_empty_mask_is_all_grey(frame):
-    render, truth, mask = frame
-    panels = figures.triptych(render, truth, ~mask)
-    assert (panels.error == figures.EXCLUDED).all()
-    assert (panels.row, panels.column) == (0, 0)
 
 
 def test_depth_colours_and_gaps():

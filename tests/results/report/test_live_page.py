@@ -40,14 +40,10 @@ def pages(monkeypatch):
     return found
 
 
-def test_a_page_at_every_iteration_changes_no_bit_of_the_run(quiet_run, pages, tmp_path):
+def test_the_page_follows_the_run_at_every_iteration_and_changes_no_bit_of_it(quiet_run, pages, tmp_path):
     assert main(train_words(tmp_path / "run", "--no-evaluate")) == 0
-    assert len(pages) == 1 + 30 + 1
     assert_same_run(quiet_run[0], tmp_path / "run")
-
-
-def test_the_page_follows_the_run(pages, tmp_path):
-    assert main(train_words(tmp_path / "run", "--no-evaluate")) == 0
+    assert len(pages) == 1 + 30 + 1
     assert "<img" not in pages[0], "nothing is rendered before the kernels are compiled"
     assert ">7</b><span>of 30 iterations<" in pages[7] and "frame 1 after iteration 7" in pages[7]
     assert "time left" in pages[7] and re.search(r"<b>\d:\d\d</b><span>time left", pages[7])

@@ -214,11 +214,6 @@ def test_the_view_that_is_asked_for_is_drawn_and_a_distance_is_that_of_the_rende
     assert "An estimate" in content
 
 
-def test_the_page_names_the_frame(opened):
-    content = dom(opened[1], "t=0.5")
-    assert re.search(r'id="time">frame \d+ of 64, t = 0.500<', content)
-
-
 def test_the_page_names_the_second_of_a_recording_whose_rate_is_known(tmp_path):
     scene = moving_scene()
     timed = replace(scene, record=msgspec.structs.replace(scene.record, duration=2.5))
