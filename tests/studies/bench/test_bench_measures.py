@@ -12,15 +12,10 @@ from pages.bench import scaling
 
 from endotsr.config import PAPER
 from endotsr.method.kernels.timer import NO_TIMER, timed
-from endotsr.method.splatting import render
-from endotsr.method.splatting.render import Scene
-from endotsr.method.splatting.settings import PAPER as PAPER_RULES
-from endotsr.studies.bench import clock, pairs, peaks
+from endotsr.studies.bench import clock, peaks
 from endotsr.studies.bench.case import BenchCase, measure, prepare, representative
 from endotsr.studies.bench.clock import STAGES
 from endotsr.studies.bench.limits import limits, work
-from endotsr.studies.bench.stages import ns_per_pair
-from endotsr.studies.bench.stages import table as stage_table
 from endotsr.training.fitting import trainer
 from endotsr.training.fitting.schedules import densify_now
 from endotsr.training.scene import workload
@@ -118,40 +113,6 @@ def test_representative_iteration_has_everything_but_densification():
     assert not densify_now(iteration, PAPER)
 
 
-def pairs_by_loops(scene: Scene, camera) -> int:
-    """Pairs of isotropic Gaussians straight from the rule of compositing."""
-    count = 0
-    order = np.argsort(scene.position[2], kind="stable")
-    for row in range(camera.height):
-        for column in range(camera.width):
-            through = 1.0
-            for i in order:
-                x, y, z = scene.position[:, i]
-                variance = (np.exp(scene.log_scale[0, i]) * camera.fx / z) ** 2 + PAPER_RULES.low_pass
-                dx, dy = column + 0.5 - camera.fx * x / z - camera.cx, row + 0.5 - camera.fy * y / z - camera.cy
-                alpha = np.exp(-(dx * dx + dy * dy) / (2 * variance)) / (1 + np.exp(-scene.opacity_logit[i]))
-                alpha = min(alpha, PAPER_RULES.alpha_max)
-                if alpha < PAPER_RULES.alpha_cutoff:
-                    continue
-                if through * (1 - alpha) < PAPER_RULES.transmittance_stop:
-                    break
-                through *= 1 - alpha
-                count += 1
-    return count
-
-
-def test_pairs_are_those_of_the_rule():
-    """Small Gaussians near the axis, so that the projected ellipse is a circle to far below the margin of a pair."""
-    camera = workload.camera(32, 24)._replace(fx=4000.0, fy=4000.0)
-    rng = np.random.default_rng(5)
-    position = np.stack([rng.uniform(-0.012, 0.012, 40), rng.uniform(-0.009, 0.009, 40), rng.uniform(3, 5, 40)])
-    quaternion = np.repeat([[1.0], [0], [0], [0]], 40, axis=1)
-    scene = Scene(position, quaternion, np.full((3, 40), np.log(0.008)), rng.uniform(-1, 8, 40), np.zeros((16, 3, 40)))
-    _, saved = render.render_forward(scene, camera, PAPER_RULES, degree=0)
-    found = pairs.count_pairs(saved)
-    assert 0 < found.blended == pairs_by_loops(scene, camera) <= found.visited
-
-
 def test_exponent_is_that_of_the_upper_decade():
     size = [1.0, 3, 10, 30, 100]
     times = [7.0 if x < 10 else 0.02 * x**1.5 for x in size]
@@ -207,11 +168,6 @@ def test_limit_is_the_longer_of_arithmetic_and_traffic(result):
     assert set(limits(result, PEAKS)) == set(clock.STAGES)
     double = result | {"case": result["case"] | {"precision": "float64"}}
     assert work(double)["FDM"].bytes == 2 * work(result)["FDM"].bytes
-
-
-def test_table_shows_every_stage(result):
-    shown = stage_table(result | {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)})
-    assert all(name in shown for name in clock.STAGES) and "blended pairs" in shown
 
 
 def test_peaks_are_positive_numbers():

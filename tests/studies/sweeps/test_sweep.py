@@ -6,7 +6,7 @@ import json
 import os
 
 import pytest
-from tiny_sweep import BASE, CONFIGURATIONS, iterations, rows_of, write_spec
+from tiny_sweep import BASE, CONFIGURATIONS, assert_same_arrays, iterations, rows_of, write_spec
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError
@@ -89,16 +89,10 @@ def test_a_run_with_a_start_begins_with_that_state_and_keeps_its_gaussians(whole
 
 def test_the_start_is_the_other_configuration_at_that_iteration(whole, tmp_path):
     """Continued as it is, without another setting, the start gives the whole run of that configuration, bit for bit."""
-    import numpy as np
-
     text = ONE + CONFIGURATIONS + '[configurations.again]\nstart = { configuration = "base", iteration = 15 }\n'
     text += "model = { appearance = false, spectral_motion = false, laplacian = false }\n"
     rows = sweep(write_spec(tmp_path, text), tmp_path / "out", make=lambda job: _only(job, "again"))
-    again = tmp_path / "out" / "runs" / rows[2]["name"] / "checkpoint.npz"
-    plain = whole[1] / "runs" / whole[2][0]["name"] / "checkpoint.npz"
-    with np.load(again) as a, np.load(plain) as b:
-        for key in set(a.files) - {"header"}:
-            assert a[key].tobytes() == b[key].tobytes(), key
+    assert_same_arrays(tmp_path / "out" / "runs" / rows[2]["name"], whole[1] / "runs" / whole[2][0]["name"])
 
 
 def _only(job, configuration):

@@ -43,10 +43,6 @@ def result():
     return run_study(moving_scene(count=80, width=32), repeats=1)
 
 
-def test_no_preset_is_dominated_without_a_reason(result):
-    assert unexplained(result) == []
-
-
 def test_listed_reasons_are_needed(result):
     """A preset that nothing dominates needs no excuse."""
     verdicts = judge_presets(result["points"], result["presets"])

@@ -89,9 +89,9 @@ def test_fronts_hold_what_nothing_dominates(study):
         assert set(front) <= chosen and len(front) == len(places), cost
 
 
-def visits_by_hand(saved, settings, width, height):
-    """Pixel by pixel from the projected Gaussians, in plain Python."""
-    projected, total = saved.projected, 0
+def pairs_by_hand(saved, settings, width, height):
+    """Visited and blended pairs, pixel by pixel from the projected Gaussians, in plain Python."""
+    projected, visited, blended = saved.projected, 0, 0
     logit = saved.scene.opacity_logit
     A, m, r = footprint(projected)
     for row in range(height):
@@ -104,25 +104,26 @@ def visits_by_hand(saved, settings, width, height):
                 q = r[i] * dy**2 + A[i] * (dx - m[i] * dy) ** 2
                 alpha = min(settings.alpha_max, np.exp(-q / 2) / (1 + np.exp(-logit[i])))
                 if alpha < settings.alpha_cutoff:
-                    total += settings.support == "everywhere"
+                    visited += settings.support == "everywhere"
                     continue
-                total += 1
+                visited += 1
                 if t * (1 - alpha) < settings.transmittance_stop:
                     break
                 t *= 1 - alpha
-    return total
+                blended += 1
+    return visited, blended
 
 
 @pytest.mark.parametrize("preset", ["paper", "exact"])
 @pytest.mark.parametrize("path", ["auto", "definition"])
-def test_visits_are_counted_right_on_both_paths(preset, path):
+def test_pairs_are_counted_right_on_both_paths(preset, path):
     scene = moving_scene(count=60, width=20)
     scene.gaussians.opacity_logit[:] += 2  # some pixels finish early
     view, _ = scene_at(scene.gaussians, scene.spectral, scene.model, scene.time)
     _, saved = render_forward(view, scene.camera, PRESETS[preset], compositor=path)
-    by_hand = visits_by_hand(saved, PRESETS[preset], scene.camera.width, scene.camera.height)
-    assert count_pairs(saved).visited == by_hand
-    unstopped = visits_by_hand(saved, PRESETS[preset]._replace(transmittance_stop=0.0), 20, 16)
+    found, by_hand = count_pairs(saved), pairs_by_hand(saved, PRESETS[preset], scene.camera.width, scene.camera.height)
+    assert (found.visited, found.blended) == by_hand and found.blended > 0
+    unstopped = pairs_by_hand(saved, PRESETS[preset]._replace(transmittance_stop=0.0), 20, 16)
     assert preset == "exact" or by_hand < unstopped
 
 

@@ -85,14 +85,12 @@ def test_a_folder_with_other_files_is_not_replaced(written, cold_run, tmp_path):
     assert (folder / "notes.txt").exists() and (folder / "001.js").exists()
 
 
-def test_the_command_writes_it_and_a_slim_model_is_refused(cold_run, tmp_path, capsys):
+def test_the_command_writes_it(cold_run, tmp_path, capsys):
     out = tmp_path / "page.html"
     assert main(["export", str(cold_run), "--out", str(out), "--no-held-out", "--json", str(tmp_path / "a.json")]) == 0
     said = json.loads((tmp_path / "a.json").read_text())
     assert said["bytes"] == out.stat().st_size and len(said["windows"]) == 2 and not said["held_out"]
     assert "2 windows of at most" in capsys.readouterr().out
-    assert main(["export", str(cold_run), "--out", str(tmp_path / "model.npz")]) == 2
-    assert str(cold_run / "windows" / "000") in capsys.readouterr().err
 
 
 def test_python_writes_it_and_follows_points(cold_run, tmp_path):

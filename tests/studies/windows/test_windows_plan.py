@@ -88,17 +88,17 @@ def test_chains_begin_cold_and_make_waves():
 
 
 @pytest.mark.parametrize(
-    ("wanted", "words"),
-    [(Wanted(20, 8), "at least 24"), (Wanted(40, 1), "--overlap 1"), (Wanted(40, 8, 0), "--chain 0")],
+    ("wanted", "split", "words"),
+    [
+        (Wanted(20, 8), SPLIT, "at least 24"),
+        (Wanted(40, 1), SPLIT, "--overlap 1"),
+        (Wanted(40, 8, 0), SPLIT, "--chain 0"),
+        (Wanted(), SequenceConfig(split="end"), "split end"),
+    ],
 )
-def test_what_is_not_allowed_is_refused_with_what_is(wanted, words):
+def test_what_is_not_allowed_is_refused_with_what_is(wanted, split, words):
     with pytest.raises(InputError, match=words):
-        planned_windows(frames(100), wanted, SPLIT)
-
-
-def test_the_split_of_an_end_has_no_windows():
-    with pytest.raises(InputError, match="split end"):
-        planned_windows(frames(100), Wanted(), SequenceConfig(split="end"))
+        planned_windows(frames(100), wanted, split)
 
 
 def test_frames_of_a_window_are_a_range_of_the_folder():
