@@ -3,6 +3,8 @@
 Checkpoints are written by iterations alone, so that no test depends on the speed of the machine.
 """
 
+import shutil
+
 import numba
 import pytest
 from tiny import train_words
@@ -28,3 +30,9 @@ def finished_run(tmp_path_factory):
     out = tmp_path_factory.mktemp("finished") / "run"
     assert main(train_words(out)) == 0
     return out
+
+
+@pytest.fixture
+def run_copy(finished_run, tmp_path):
+    """A copy of the finished run that a test may change."""
+    return shutil.copytree(finished_run, tmp_path / "run")

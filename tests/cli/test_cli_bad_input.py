@@ -1,5 +1,7 @@
 """Everything a person can hand over that cannot be used: one line, exit code 2, and no run folder."""
 
+import shutil
+
 import numpy as np
 import pytest
 from tiny import SETTINGS, assert_refused, run_line, train_words, written_folder
@@ -22,92 +24,67 @@ def folder(tmp_path):
     return written_folder(tmp_path)
 
 
-def test_missing_folder(tmp_path, capsys):
-    refused(capsys, tmp_path / "nowhere", "nowhere", "not found")
-
-
-@pytest.mark.parametrize("name", ["images", "masks", "depth"])
-def test_missing_part(name, folder, capsys):
-    (folder / name).rename(folder / "elsewhere")
-    refused(capsys, folder, name, "not found")
-
-
-def test_unequal_counts(folder, capsys):
-    (folder / "depth" / "000004.png").unlink()
-    refused(capsys, folder, "depth", "9", "8")
-
-
-def test_truncated_png(folder, capsys):
-    file = folder / "images" / "000003.png"
+def cut_short(file):
     file.write_bytes(file.read_bytes()[:-40])
-    refused(capsys, folder, "000003.png", "truncated")
 
 
-def test_unreadable_png(folder, capsys):
-    (folder / "masks" / "000002.png").write_bytes(b"not a picture")
-    refused(capsys, folder, "masks/000002.png", "not a PNG")
+def in_every_file(folder, picture_of):
+    for file in folder.iterdir():
+        write_png(file, picture_of(read_png(file)))
 
 
-def test_wrong_size(folder, capsys):
-    write_png(folder / "depth" / "000005.png", np.full((16, 48), 50, np.uint16))
-    refused(capsys, folder, "000005.png", "48x16", "48x32")
+def changed_poses(file, change):
+    np.save(file, change(np.load(file)))
 
 
-def test_mask_of_the_wrong_polarity(folder, capsys):
-    for file in (folder / "masks").iterdir():
-        write_png(file, 255 - read_png(file))
-    refused(capsys, folder, "masks")
+def with_nan(rows):
+    rows[4, 3] = np.nan
+    return rows
 
 
-def test_no_depth_anywhere(folder, capsys):
-    for file in (folder / "depth").iterdir():
-        write_png(file, np.zeros((32, 48), np.uint16))
-    refused(capsys, folder, "depth")
+DAMAGES = {  # what is done to the folder, and what the refusal names
+    "no folder": (shutil.rmtree, ("sequence", "not found")),
+    "no images": (lambda f: (f / "images").rename(f / "elsewhere"), ("images", "not found")),
+    "no masks": (lambda f: (f / "masks").rename(f / "elsewhere"), ("masks", "not found")),
+    "no depth": (lambda f: (f / "depth").rename(f / "elsewhere"), ("depth", "not found")),
+    "unequal counts": (lambda f: (f / "depth" / "000004.png").unlink(), ("depth", "9", "8")),
+    "truncated picture": (lambda f: cut_short(f / "images" / "000003.png"), ("000003.png", "truncated")),
+    "no picture": (lambda f: (f / "masks" / "000002.png").write_bytes(b"x"), ("masks/000002.png", "not a PNG")),
+    "wrong size": (
+        lambda f: write_png(f / "depth" / "000005.png", np.full((16, 48), 50, np.uint16)),
+        ("000005.png", "48x16", "48x32"),
+    ),
+    "masks of the wrong polarity": (lambda f: in_every_file(f / "masks", lambda mask: 255 - mask), ("masks",)),
+    "no depth anywhere": (lambda f: in_every_file(f / "depth", lambda depth: 0 * depth), ("depth",)),
+    "poses with NaN": (lambda f: changed_poses(f / "poses_bounds.npy", with_nan), ("pose",)),
+    "poses of another shape": (lambda f: changed_poses(f / "poses_bounds.npy", lambda rows: rows[:, :10]), ("pose",)),
+    "poses as text": (lambda f: (f / "poses_bounds.npy").write_text("0 0 0"), ("pose",)),
+    "no poses": (lambda f: (f / "poses_bounds.npy").unlink(), ("pose",)),
+}
 
 
-@pytest.mark.parametrize("damage", ["nan", "shape", "text", "missing"])
-def test_broken_poses(damage, folder, capsys):
-    file = folder / "poses_bounds.npy"
-    rows = np.load(file)
-    if damage == "nan":
-        rows[4, 3] = np.nan
-        np.save(file, rows)
-    elif damage == "shape":
-        np.save(file, rows[:, :10])
-    elif damage == "text":
-        file.write_text("0 0 0")
-    else:
-        file.unlink()
-    refused(capsys, folder, "pose")
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_folder_is_one_line_and_no_run(damage, folder, capsys):
+    spoil, named = DAMAGES[damage]
+    spoil(folder)
+    refused(capsys, folder, *named)
 
 
-def test_too_few_frames(folder, capsys):
-    refused(capsys, folder, "2", "at least 3", more=["--frames", "0:2"])
-
-
-def test_bad_frame_range(folder, capsys):
-    refused(capsys, folder, "'a:b'", more=["--frames", "a:b"])
-
-
-def test_scale_too_small(folder, capsys):
-    refused(capsys, folder, "scale", more=["--scale", "0.1"])
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        (["--frames", "0:2"], ("2", "at least 3")),
+        (["--frames", "a:b"], ("'a:b'",)),
+        (["--scale", "0.1"], ("scale",)),
+    ],
+)
+def test_frames_and_scales_that_leave_too_little_are_refused(more, named, folder, capsys):
+    refused(capsys, folder, *named, more=more)
 
 
 def test_frames_of_a_simulated_sequence(tmp_path, capsys):
     words = train_words(tmp_path / "run", "--frames", "0:5", source="simulated")
     assert_refused(capsys, words, "endotsr simulate SCENE --frames N")
-
-
-@pytest.mark.parametrize("kind", ["folder", "file"])
-def test_existing_output(kind, tmp_path, capsys):
-    out = tmp_path / "run"
-    if kind == "folder":
-        out.mkdir()
-        (out / "notes.txt").write_text("mine")
-    else:
-        out.write_text("mine")
-    assert_refused(capsys, train_words(out), str(out), "exists already")
-    assert (out / "notes.txt" if kind == "folder" else out).read_text() == "mine"
 
 
 @pytest.mark.parametrize("command", ["evaluate", "train --calibrate-only --out", "render"])

@@ -70,22 +70,16 @@ def test_results_of_sequences(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("name", "words", "said"),
     [
-        (["--times", "0.5"], "the format page with --times: a page contains all times"),
-        (["--content", "mesh"], "the format page with --content: a page contains all times"),
-        (["--keys", "1"], "--keys 1 is not allowed; allowed: an integer from 2"),
+        ("a.html", ["--times", "0.5"], "the format page with --times: a page contains all times"),
+        ("a.html", ["--content", "mesh"], "the format page with --content: a page contains all times"),
+        ("a.html", ["--keys", "1"], "--keys 1 is not allowed; allowed: an integer from 2"),
+        ("a.ply", ["--keys", "9"], "--keys has no effect without the format page"),
+        ("a.ply", ["--title", "mine"], "--title has no effect without the format page"),
+        ("a.ply", ["--sequence", "elsewhere"], "--sequence has no effect without the format page"),
     ],
 )
-def test_a_page_refuses_a_choice_of_times_or_content(words, said, finished_run, tmp_path, capsys):
-    page = tmp_path / "page.html"
-    assert_refused(capsys, ["export", str(finished_run), "--out", str(page), *words], said)
-    assert not page.exists()
-
-
-@pytest.mark.parametrize("words", [["--keys", "9"], ["--title", "mine"], ["--sequence", "elsewhere"]])
-def test_options_of_a_page_are_refused_elsewhere(words, finished_run, tmp_path, capsys):
-    file = tmp_path / "scene.ply"
-    said = f"{words[0]} has no effect without the format page"
-    assert_refused(capsys, ["export", str(finished_run), "--out", str(file), *words], said)
-    assert not file.exists()
+def test_options_of_another_format_are_refused(name, words, said, finished_run, tmp_path, capsys):
+    assert_refused(capsys, ["export", str(finished_run), "--out", str(tmp_path / name), *words], said)
+    assert list(tmp_path.iterdir()) == []

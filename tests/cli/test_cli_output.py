@@ -94,8 +94,9 @@ COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _endotsr; echo "${{COMPREPLY[@
 def test_the_readme_and_the_overview_list_every_command(capsys):
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| `endotsr ([a-z]+)` \|", readme, re.MULTILINE) == [*COMMANDS]
-    assert main(["--help"]) == 0
-    assert re.findall(r"^  ([a-z]+)  ", capsys.readouterr().out, re.MULTILINE) == [*COMMANDS]
+    for words in (["--help"], []):
+        assert main(words) == 0
+        assert re.findall(r"^  ([a-z]+)  ", capsys.readouterr().out, re.MULTILINE) == [*COMMANDS]
 
 
 def test_every_first_word_completes():

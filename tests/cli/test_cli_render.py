@@ -1,20 +1,14 @@
 """`render`: cameras, sizes, depth and films of a trained run, and what is refused."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
-from tiny import assert_refused
+from tiny import assert_refused, render
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
 from film_reader import read_video
-
-
-def render(run, out, *words):
-    assert main(["render", str(run), "--out", str(out), *words]) == 0
-    return json.loads((out / "render.json").read_text())
 
 
 def test_a_shifted_camera_moves_the_picture_and_is_named(finished_run, tmp_path):
@@ -82,9 +76,8 @@ def test_a_film_alone_shows_all_frames(finished_run, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["film.gif"]
 
 
-def test_a_film_in_slow_motion(finished_run, tmp_path, capsys):
-    run = tmp_path / "run"
-    shutil.copytree(finished_run, run)
+def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
+    run = run_copy
     record = json.loads((run / "sequence.json").read_text(encoding="utf-8"))
     (run / "sequence.json").write_text(json.dumps(record | {"duration": 0.9}), encoding="utf-8")
     for words, said in (

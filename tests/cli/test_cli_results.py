@@ -6,7 +6,7 @@ import shutil
 import numba
 import numpy as np
 import pytest
-from tiny import SETTINGS, assert_refused
+from tiny import SETTINGS, assert_refused, render
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
@@ -17,11 +17,6 @@ from endotsr.studies.bench.clock import REST, STAGES
 from endotsr.training.runs.files import os_error_line, write_json
 
 CALIBRATE = ("train", "--calibrate-only", "--out")
-
-
-def render(run, out, *words):
-    assert main(["render", str(run), "--out", str(out), *words]) == 0
-    return json.loads((out / "render.json").read_text())
 
 
 def test_render_at_any_time(finished_run, tmp_path):
@@ -78,9 +73,8 @@ def test_depth_pictures_keep_a_known_step():
     assert depth_bytes(np.array([[1e9]]), step)[0, 0] == 65535
 
 
-def test_evaluate_again_gives_the_same_numbers(finished_run, tmp_path, capsys):
-    out = tmp_path / "run"
-    shutil.copytree(finished_run, out)
+def test_evaluate_again_gives_the_same_numbers(finished_run, run_copy, capsys):
+    out = run_copy
     (out / "report.html").unlink()
     shutil.rmtree(out / "renders")
     assert main(["evaluate", str(out), "--no-view"]) == 0
@@ -153,16 +147,7 @@ def test_more_threads_than_cores_are_all_cores():
 
 def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_path, capsys):
     before = {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
-    words = [
-        "train",
-        "--calibrate-only",
-        "--out",
-        str(finished_run),
-        "--json",
-        str(tmp_path / "found.json"),
-        "--loss.ssim-weight",
-        "0.2",
-    ]
+    words = [*CALIBRATE, str(finished_run), "--json", str(tmp_path / "found.json"), "--loss.ssim-weight", "0.2"]
     assert main(words) == 0
     said = capsys.readouterr().out
     found = json.loads((tmp_path / "found.json").read_text())
@@ -241,6 +226,7 @@ def test_bench_times_every_stage(tmp_path, capsys):
     slowest = max(stage["median_ms"] for stage in result["stages"].values())
     assert 0 < slowest and result["iteration"]["quartiles_ms"][1] > 0  # times themselves are not for a test
     assert all(name in said for name in result["stages"]) and "limit ms" in said and "first iteration" in said
+    assert "blended pairs" in said
 
 
 @pytest.mark.parametrize(
@@ -270,6 +256,4 @@ def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
 
 
 def test_check_command_names_what_it_does_not_know(capsys):
-    assert main(["gradcheck", "no_such_stage"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "no_such_stage" in said
+    assert_refused(capsys, ["gradcheck", "no_such_stage"], "no_such_stage")

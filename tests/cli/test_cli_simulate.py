@@ -60,6 +60,8 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["still", "--stereo.on", "false"], ("without an excluded pixel", "stereo")),
         (["still", "--relief", "30"], ("leaves the field of view",)),
         (["still", "--wdth", "40"], ("--wdth: no such option", "--width")),
+        (["still", "--noise.on", "perhaps"], ("perhaps",)),
+        (["still", "--noise.of", "1"], ("unknown key noise.of", "on, sigma")),
     ],
 )
 def test_bad_input_is_refused_and_nothing_is_left(tmp_path, capsys, words, named):

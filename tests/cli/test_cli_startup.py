@@ -22,12 +22,6 @@ def test_overview_imports_nothing_heavy(words):
     assert done.returncode == 0 and done.stderr.strip() == "[]"
 
 
-def test_overview_names_every_command(capsys):
-    assert main([]) == 0
-    said = capsys.readouterr().out
-    assert all(f"  {name} " in said for name in COMMANDS)
-
-
 def test_version(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"endotsr {__version__}\n"
@@ -39,12 +33,6 @@ def test_every_command_has_help(name, capsys):
     assert f"endotsr {name}" in capsys.readouterr().out
 
 
-def test_unknown_command(capsys):
-    assert main(["tarin"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "'tarin'" in said and "train" in said
-
-
 @pytest.mark.parametrize("former", FORMER)
 def test_a_command_that_has_moved_names_its_new_place(former, capsys):
     assert_refused(capsys, [former, "run", "--out", "x"], f"the command {former!r} has moved: `{FORMER[former]}`")
@@ -52,13 +40,13 @@ def test_a_command_that_has_moved_names_its_new_place(former, capsys):
     assert words[0] in COMMANDS or words[0] == "--completion"
 
 
-@pytest.mark.parametrize("typed, meant", [("trian", "train"), ("evalute", "evaluate"), ("exprot", "export")])
-def test_an_unknown_command_is_answered_with_the_similar_one(typed, meant, capsys):
-    assert_refused(capsys, [typed], f"unknown command {typed!r}; did you mean {meant}? allowed: demo, prepare")
-
-
-def test_an_unknown_command_like_no_other_lists_them_all(capsys):
-    assert_refused(capsys, ["xyz"], "unknown command 'xyz'; allowed: demo, prepare")
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [("trian", " did you mean train?"), ("evalute", " did you mean evaluate?"), ("exprot", " did you mean export?"),
+     ("xyz", "")],
+)  # fmt: skip
+def test_an_unknown_command_is_answered_with_the_similar_one(typed, said, capsys):
+    assert_refused(capsys, [typed], f"unknown command {typed!r};{said} allowed: demo, prepare")
 
 
 def test_a_positional_argument_with_a_dot_is_no_section(capsys):

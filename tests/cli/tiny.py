@@ -61,6 +61,12 @@ def assert_refused(capsys, words: list[str], *named: str) -> None:
         assert word in said, f"{word!r} not in {said!r}"
 
 
+def render(run: Path, out: Path, *words: str) -> dict:
+    """The pictures of a run, and what render.json says of them."""
+    assert main(["render", str(run), "--out", str(out), *words]) == 0
+    return json.loads((out / "render.json").read_text())
+
+
 def written_folder(root: Path) -> Path:
     """A tiny EndoNeRF folder with 9 frames of 48x32."""
     folder = root / "sequence"
