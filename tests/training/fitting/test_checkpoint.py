@@ -218,8 +218,3 @@ def test_failure_at_the_last_moment_leaves_the_previous_checkpoint(tmp_path, mon
         save(path, *make(), iteration=8)
     assert os.listdir(tmp_path) == ["a.npz"]
     assert load_checkpoint(path).iteration == 7
-
-
-def test_foreign_rng_state_is_refused():
-    with pytest.raises(InputError, match="rng_state"):
-        restore_rng({"bit_generator": "MT19937"})

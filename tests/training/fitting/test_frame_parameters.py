@@ -33,13 +33,11 @@ from endotsr.training.fitting.model import (
     corrected_cameras,
     render_at,
     spectral_from,
-    with_corrected_cameras,
-    with_pose_correction,
 )
 from endotsr.training.fitting.state import new_training, save_state, state_from_checkpoint, training_constants
 from endotsr.training.fitting.trainer import train, training_step
 from endotsr.training.runs.model import Model
-from endotsr.training.scene.parameters import Pose, exposure_of, trained
+from endotsr.training.scene.parameters import exposure_of, trained
 
 GAIN = np.array([1.0, 0.97, 0.75, 0.8, 0.85, 1.0, 0.7, 0.75, 0.8, 0.95, 0.8, 0.7])  # of the frames, known
 SIDEWAYS = 4.0  # mm, by which every second training camera is off
@@ -292,13 +290,3 @@ def test_a_slim_model_holds_the_corrected_cameras_and_no_correction(disturbed, r
         np.testing.assert_array_equal(found.rotation, camera.rotation)
         np.testing.assert_array_equal(found.translation, camera.translation)
         assert not np.array_equal(found.translation, given.translation)
-
-
-def test_a_sequence_without_corrections_is_the_sequence_itself(disturbed, runs):
-    assert with_corrected_cameras(disturbed, None) is disturbed
-    seen = with_corrected_cameras(disturbed, runs["pose", True].frames)
-    camera = disturbed.cameras[0]
-    assert seen.images is disturbed.images and not np.array_equal(seen.cameras[0].rotation, camera.rotation)
-    assert with_pose_correction(camera, None)[0] is camera
-    moved, _ = with_pose_correction(camera, Pose(np.zeros(3), np.array([1.0, 2.0, 3.0])))
-    np.testing.assert_array_equal(moved.translation, camera.translation + [1, 2, 3])

@@ -5,12 +5,10 @@ import pytest
 
 from endotsr.config import (
     PAPER,
-    SHARP,
     Config,
     LossConfig,
     ModelConfig,
     OptimiserConfig,
-    lengthened,
     with_iterations,
 )
 from endotsr.training.fitting import schedules
@@ -43,25 +41,21 @@ def test_rates_of_the_paper_preset():
     assert (rates["opacity_logit"], rates["log_scale"], rates["quaternion"]) == (0.05, 0.005, 0.001)
 
 
-def test_corrections_of_poses_have_a_rate_only_where_the_model_has_them_and_decay_like_the_position():
-    config = changed("model", pose_correction=True)
+def assert_rates_of_a_part(part, rate, names):
+    """Only a model with this part has them; they decay like that of the position."""
+    config = changed("model", **{part: True})
     start, last = (learning_rates(i, config) for i in (0, config.training.iterations))
-    assert start["pose_rotation"] == start["pose_translation"] == config.optimiser.pose > 0
-    assert last["pose_rotation"] == last["pose_translation"]
-    assert last["pose_rotation"] == pytest.approx(config.optimiser.pose * config.optimiser.final_factor)
-    assert not {"pose_rotation", "pose_translation"} & set(learning_rates(0, PAPER))
+    for name in names:
+        assert start[name] == rate > 0 and last[name] == pytest.approx(rate * config.optimiser.final_factor)
+        assert name not in learning_rates(0, PAPER)
+
+
+def test_corrections_of_poses_have_a_rate_only_where_the_model_has_them_and_decay_like_the_position():
+    assert_rates_of_a_part("pose_correction", PAPER.optimiser.pose, ("pose_rotation", "pose_translation"))
 
 
 def test_exposure_has_a_rate_only_where_the_model_has_it_and_decays_like_the_position():
-    config = changed("model", exposure=True)
-    start, last = (learning_rates(i, config) for i in (0, 6000))
-    assert start["exposure_log_gain"] == start["exposure_bias"] == config.optimiser.exposure > 0
-    assert (
-        last["exposure_log_gain"]
-        == last["exposure_bias"]
-        == pytest.approx(config.optimiser.exposure * config.optimiser.final_factor)
-    )
-    assert not {"exposure_log_gain", "exposure_bias"} & set(learning_rates(0, PAPER))
+    assert_rates_of_a_part("exposure", PAPER.optimiser.exposure, ("exposure_log_gain", "exposure_bias"))
 
 
 def test_residuals_start_after_the_activation_with_the_rates_of_the_paper():
@@ -171,10 +165,3 @@ def test_tracked_motion_is_trained_from_the_first_iteration_at_a_constant_rate_u
     assert "appearance_coefficients" not in learning_rates(3000, config)
     without = msgspec.structs.replace(config, model=msgspec.structs.replace(config.model, spectral_motion=False))
     assert "motion_coefficients" not in learning_rates(1, without)
-
-
-def test_the_visits_of_a_frame_stretch_a_run_and_fix_its_length():
-    assert lengthened(SHARP, 55) == with_iterations(SHARP, 55 * 72)
-    assert lengthened(lengthened(SHARP, 55), 70) == lengthened(SHARP, 55)
-    assert lengthened(SHARP, 20) == with_iterations(SHARP, 3000) and lengthened(PAPER, 10_000) == PAPER
-    assert lengthened(SHARP, 55).training.visits_per_frame == 0

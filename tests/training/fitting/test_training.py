@@ -131,10 +131,6 @@ def test_loss_falls_and_every_part_takes_part(finished):
     assert log[-1]["psnr"] > log[0]["psnr"] + 3
 
 
-def test_only_training_frames_are_drawn(finished, sequence):
-    assert {e["frame"] for e in finished[1]} <= set(sequence.train_index.tolist())
-
-
 # --- the same, always ---
 
 

@@ -1,6 +1,5 @@
 """Initialisation, equation (B12): counts, back-projection, neighbours; hard case I1."""
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -203,13 +202,3 @@ def test_pulling_sequence_starts_with_the_published_counts():
     assert all(a is None or np.isfinite(a).all() for a in gaussians)
     u, v, z = project(sequence.cameras[0], gaussians.position.astype(np.float64))
     assert ((0 < u) & (u < sequence.width) & (0 < v) & (v < sequence.height) & (z > RasterConfig().near)).all()
-
-
-def test_settings_of_the_paper():
-    config = InitialisationConfig()
-    assert msgspec.to_builtins(config) == {
-        "first_frame_points": 35_000,
-        "other_frame_points": 5_000,
-        "motion_threshold": 40.0,
-        "motion": "none",
-    }
