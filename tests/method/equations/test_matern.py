@@ -1,12 +1,12 @@
 """Equation (4): the Matern weights and the motion penalty, hard cases M1 and M2."""
 
-import numba
 import numpy as np
 import pytest
 
 from endotsr.definition import matern as definition
 from endotsr.method.equations.dictionary import frequencies
 from endotsr.method.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
+from method.by_threads import assert_threads_change_no_bit
 from oracle import matern_oracle
 
 OMEGA = frequencies(8, 1.0, 16.0)
@@ -85,12 +85,9 @@ def test_hard_M2_quadratic_and_empty():
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_threads_agree(dtype):
     c, rho = coefficients(700, dtype), matern_weights(OMEGA, 0.2).astype(dtype)
-    found = []
-    try:
-        for threads in (1, numba.config.NUMBA_NUM_THREADS):
-            numba.set_num_threads(threads)
-            value, saved = matern_penalty_forward(c, rho)
-            found.append((value, matern_penalty_reverse(1.0, saved).tobytes()))
-    finally:
-        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    assert found[0] == found[1]
+
+    def compute():
+        value, saved = matern_penalty_forward(c, rho)
+        return value, matern_penalty_reverse(1.0, saved)
+
+    assert_threads_change_no_bit(compute)

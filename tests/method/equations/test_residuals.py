@@ -1,7 +1,6 @@
 """Equations (2) and (3): the colour and the translation residual, hard cases H3 and T1 to T4."""
 
 import mpmath
-import numba
 import numpy as np
 import pytest
 
@@ -11,6 +10,7 @@ from endotsr.method.equations import appearance, atom_sums
 from endotsr.method.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.method.equations.motion import motion_forward, motion_reverse
 from endotsr.method.kernels.constants import Y00
+from method.by_threads import assert_threads_change_no_bit
 
 BETA = 0.3
 DTYPES = [np.float32, np.float64]
@@ -137,16 +137,12 @@ def test_nan_is_not_hidden():
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_threads_and_interpreter_agree(dtype):
     coefficients, atoms, upstream = case(2500, dtype)
-    results = []
-    try:
-        for threads in (1, numba.config.NUMBA_NUM_THREADS):
-            numba.set_num_threads(threads)
-            residual, saved = appearance_forward(coefficients, atoms, BETA)
-            results.append((residual, *appearance_reverse(upstream, saved)))
-    finally:
-        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    for a, b in zip(*results):
-        assert a.tobytes() == b.tobytes()
+
+    def compute():
+        residual, saved = appearance_forward(coefficients, atoms, BETA)
+        return residual, *appearance_reverse(upstream, saved)
+
+    assert_threads_change_no_bit(compute)
 
 
 def test_kernels_equal_their_python_bodies(monkeypatch):

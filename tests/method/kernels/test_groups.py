@@ -6,7 +6,6 @@ from numba.core.errors import TypingError
 
 from endotsr.method.kernels.groups import GROUP, column, keep, keep_where, kept, write_group
 from endotsr.method.kernels.jit import jit, jit_formula
-from endotsr.method.kernels.sums import sum_columns
 from endotsr.method.kernels.vectors import local_array
 
 TWO, THREE = 2 * GROUP, 3 * GROUP
@@ -92,19 +91,3 @@ def _asked_size_of_kept(points, size):
 def test_the_size_of_a_tuple_must_be_a_constant(function):
     with pytest.raises(TypingError):
         jit(function)(np.zeros((2, 3)), 2)
-
-
-@DTYPES
-@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 64])
-def test_columns_are_added_in_blocks_in_their_order(count, dtype):
-    """Large and small numbers: any other order gives other sums."""
-    rng = np.random.default_rng(6)
-    rows = (rng.normal(size=(3, count)) * 10 ** rng.uniform(0, 6, (3, count))).astype(dtype)
-    wanted = np.zeros(3, dtype)
-    for start in range(0, count, 8):
-        block = np.zeros(3, dtype)
-        for i in range(start, min(start + 8, count)):
-            block = block + rows[:, i]
-        wanted = wanted + block
-    np.testing.assert_array_equal(sum_columns(rows, 8), wanted)
-    assert sum_columns(rows, 8).dtype == dtype

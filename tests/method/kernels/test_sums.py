@@ -16,21 +16,18 @@ def in_order(rows, length):
         for column in rows[:, first : first + length].T:
             total = total + column
         blocks.append(total)
-    return np.array(blocks)
+    return np.array(blocks, rows.dtype).reshape(-1, len(rows))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("count", [1, 6, 7, 8, 40, 41])
+@pytest.mark.parametrize("count", [0, 1, 6, 7, 8, 40, 41])
 def test_blocks_are_summed_in_the_order_of_their_columns(dtype, count):
     """Bit for bit: columns of very different size, so that another order gives another sum."""
     rng = np.random.default_rng(count)
     rows = (rng.standard_normal((3, count)) * 10.0 ** rng.integers(-6, 6, (3, count))).astype(dtype)
-    assert np.array_equal(sum_columns(rows, 7), in_order(rows, 7).sum(axis=0))
-
-
-def test_every_column_counts_once():
-    assert sum_columns(np.ones((2, 23)), 5).tolist() == [23.0, 23.0]
-    assert sum_columns(np.arange(12.0).reshape(1, 12), 5).tolist() == [66.0]
+    found = sum_columns(rows, 7)
+    assert found.dtype == dtype
+    assert np.array_equal(found, in_order(rows, 7).sum(axis=0))
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
@@ -43,7 +40,3 @@ def test_threads_change_no_bit(threads):
         assert np.array_equal(sum_columns(rows, 64), expected)
     finally:
         use_threads(before)
-
-
-def test_no_column_gives_zero():
-    assert sum_columns(np.empty((3, 0)), 8).tolist() == [0.0, 0.0, 0.0]

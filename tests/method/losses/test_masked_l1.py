@@ -1,10 +1,10 @@
 """Masked L1 (B6)."""
 
-import numba
 import numpy as np
 import pytest
 
 from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from method.by_threads import assert_threads_change_no_bit
 from method.losses.made_up_images import images, tool_mask
 
 U32 = 2.0**-24
@@ -39,14 +39,12 @@ def test_nan_on_tissue_is_not_hidden():
 
 def test_same_bits_for_one_and_two_threads():
     rendered, observed = (a.astype(np.float32) for a in images((3, 40, 33)))
-    mask = tool_mask((40, 33))
-    found = []
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        numba.set_num_threads(threads)
-        loss, saved = masked_l1_forward(rendered, observed, mask)
-        found.append((loss, masked_l1_reverse(1.0, saved)))
-    assert found[0][0] == found[1][0]
-    assert np.array_equal(found[0][1], found[1][1])
+
+    def compute():
+        loss, saved = masked_l1_forward(rendered, observed, tool_mask((40, 33)))
+        return loss, masked_l1_reverse(1.0, saved)
+
+    assert_threads_change_no_bit(compute)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,11 @@
 """Smoothness terms (B9)."""
 
-import numba
 import numpy as np
 import pytest
 
 from endotsr.definition import smoothness as definition
 from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
+from method.by_threads import assert_threads_change_no_bit
 from method.losses.made_up_images import images, tool_mask
 
 FACTOR = 30.0
@@ -96,16 +96,16 @@ def test_equal_neighbours_have_subgradient_zero():
 
 def test_float32_and_threads():
     depth, rendered, mask, edges = case((40, 33))
-    found = []
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        numba.set_num_threads(threads)
-        found.append(loss_and_gradients(depth.astype(np.float32), rendered.astype(np.float32), mask, edges))
-    assert found[0][0] == found[1][0]
-    assert all(np.array_equal(a, b) for a, b in zip(found[0][1], found[1][1]))
-    assert found[0][1].d_rendered.dtype == found[0][1].d_rendered_depth.dtype == np.float32
-    wide, wide_grads = loss_and_gradients(
-        depth.astype(np.float32).astype(float), rendered.astype(np.float32).astype(float), mask, edges
-    )
-    assert abs(found[0][0] - wide) <= 1e-6 * wide
-    for narrow, exact in zip(found[0][1], wide_grads):
+    depth, rendered = depth.astype(np.float32), rendered.astype(np.float32)
+    loss, grads = loss_and_gradients(depth, rendered, mask, edges)
+    assert grads.d_rendered.dtype == grads.d_rendered_depth.dtype == np.float32
+    wide, wide_grads = loss_and_gradients(depth.astype(float), rendered.astype(float), mask, edges)
+    assert abs(loss - wide) <= 1e-6 * wide
+    for narrow, exact in zip(grads, wide_grads):
         assert np.linalg.norm(narrow - exact) <= 1e-6 * np.linalg.norm(exact)
+
+    def compute():
+        found, both = loss_and_gradients(depth, rendered, mask, edges)
+        return found, *both
+
+    assert_threads_change_no_bit(compute)

@@ -78,33 +78,6 @@ def cotangents_of(images):
     return tuple(rng.normal(0, 1, images[name].shape) for name in ("colour", "depth", "opacity"))
 
 
-def test_inputs_are_left_as_they_are():
-    scene = random_scene(2, 50, CAMERA)
-    before = as_dtype(scene, np.float64)
-    copies = Scene(*(None if a is None else a.copy() for a in before))
-    run(scene, CAMERA, PAPER, background=BACKGROUND)
-    for one, two in zip(scene, copies):
-        np.testing.assert_array_equal(one, two)
-
-
-@pytest.mark.parametrize("preset, path", CASES)
-def test_linear_colour_identity(preset, path):
-    """For a loss linear in the image, <g_colour, colour> + <g_background, background> is the loss."""
-    scene = random_scene(3, 80, CAMERA)
-    scene = scene._replace(harmonics=scene.harmonics[:1].copy(), residual=None)
-    scene.harmonics[0] = np.abs(scene.harmonics[0])  # nothing clamped at zero
-    images, _ = run(scene, CAMERA, PRESETS[preset], path, background=BACKGROUND)
-    g = np.random.default_rng(3).normal(0, 1, images["colour"].shape)
-    nothing = np.zeros_like(images["depth"])
-    _, gradients = run(scene, CAMERA, PRESETS[preset], path, background=BACKGROUND, given=(g, nothing, nothing))
-    shown = 0.5 + Y00 * scene.harmonics[0]
-    total = np.sum(gradients["harmonics"][0] / Y00 * shown) + gradients["background"] @ BACKGROUND
-    np.testing.assert_allclose(total, np.sum(g * images["colour"]), rtol=1e-11)
-    np.testing.assert_allclose(
-        gradients["background"], np.sum(g * (1 - images["opacity"]), axis=(1, 2)), rtol=1e-10, atol=1e-10
-    )
-
-
 def test_gradients_that_nobody_asks_for_are_not_made():
     scene = random_scene(4, 30, CAMERA)._replace(residual=None)
     out, saved = render_forward(scene, CAMERA, PAPER)
