@@ -38,19 +38,13 @@ def test_the_changes_are_all_there():
     assert all(change in title for change, title in zip(CHANGES, IDS, strict=True))
 
 
-@pytest.mark.parametrize("title, body", SECTIONS, ids=IDS)
-def test_every_file_exists(title, body):
+@pytest.mark.parametrize("body, most", zip([body for _, body in SECTIONS], CHANGES.values()), ids=IDS)
+def test_every_file_exists_and_no_change_takes_more_files_of_code_than_it_did(body, most):
     code, proof = files_of(body, "Code"), files_of(body, "Proof")
-    assert code and proof
+    assert 0 < len(code) <= most and proof
+    assert all(path.strip("[]").startswith(CODE) for path in code)
     for path in (*code, *proof):
         new = path.startswith("[")
         path = path.strip("[]")
         assert (ROOT / path).is_file() != new, f"{path}: {'exists' if new else 'not found'}"
         assert (ROOT / path).parent.is_dir(), f"{path}: no such folder"
-
-
-@pytest.mark.parametrize("title, body, most", [(*s, m) for s, m in zip(SECTIONS, CHANGES.values())], ids=IDS)
-def test_no_change_takes_more_files_of_code_than_it_did(title, body, most):
-    code = files_of(body, "Code")
-    assert all(path.strip("[]").startswith(CODE) for path in code)
-    assert len(code) <= most
