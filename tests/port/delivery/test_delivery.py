@@ -5,10 +5,10 @@ import json
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
 
 import msgspec
 import pytest
+from made_up_ports import command, three_functions
 
 from endotsr.errors import InputError
 from endotsr.port.judge.archive import unpacked
@@ -17,7 +17,6 @@ from endotsr.port.judge.store import golden_folder, read_golden
 from makers import plain_msgspec
 from makers.delivery import pack, zipped
 
-THREE = Path(__file__).parent / "three_functions.py"
 ARCHIVE = f"endotsr-golden-{(golden_folder() / 'VERSION').read_text().strip()}.zip"
 READ_ALL = """
 import json, sys
@@ -48,13 +47,9 @@ def judged(dist, folder, *words):
     return done.returncode, done.stdout, done.stderr
 
 
-def port(script=THREE):
-    return f'"{sys.executable}" "{script}" {{requests}} {{outputs}}'
-
-
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_a_port_of_three_functions_is_judged_with_the_archive_beside_the_judge(dist, tmp_path, precision):
-    words = ["run", "--port", port(), "--precision", precision, "--level", "2", "--json", "report.json"]
+    words = ["run", "--port", command(), "--precision", precision, "--level", "2", "--json", "report.json"]
     code, out, err = judged(dist, tmp_path, *words)
     assert (code, err) == (0, "")
     assert f"level 2, {precision}, without " in out.splitlines()[-1]
@@ -62,9 +57,8 @@ def test_a_port_of_three_functions_is_judged_with_the_archive_beside_the_judge(d
 
 
 def test_a_mistake_is_refused_and_named_without_the_package(dist, tmp_path):
-    wrong = tmp_path / "wrong.py"
-    wrong.write_text(THREE.read_text().replace("(gain * d * inputs", "(d * inputs"))
-    code, out, _ = judged(dist, tmp_path, "run", "--port", port(wrong), "--precision", "float64", "--level", "2")
+    wrong = command(three_functions(tmp_path, "(gain * d * inputs", "(d * inputs"))
+    code, out, _ = judged(dist, tmp_path, "run", "--port", wrong, "--precision", "float64", "--level", "2")
     assert code == 1 and "first wrong: operation exposure, equation (B13), level 2" in out
     assert "endotsr golden" in out
 

@@ -4,19 +4,16 @@ All of them: python tests/port/injected/inject.py
 """
 
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 
+import inject
 import pytest
 
 from endotsr.port.judge.store import golden_folder, read_golden
 from makers.copies import changed_text
 from makers.registry import FAMILIES, all_wrong_ports
 from makers.wrong import wrong_ports
-
-sys.path.insert(0, str(Path(__file__).parent))
-import inject
 
 KNOWN = all_wrong_ports()
 MISTAKES = {port: inject.mistakes(port) for port in inject.PORTS}

@@ -4,31 +4,24 @@ import json
 
 import numpy as np
 import pytest
+from made_up_ports import case_of, cases_of, write_expected
 
 from endotsr.cli.golden import run
 from endotsr.port.judge.npy import npy_bytes, write_npy
 from endotsr.port.judge.recognise import MENTIONED
 from endotsr.port.judge.report import MOST_LINES, as_html, as_table
-from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import judge, without_claim
-
-
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
 
 
 @pytest.fixture
 def right(golden, tmp_path):
     """A folder with the expected values of all cases."""
-    for case in golden.cases:
-        for name, output in case.outputs.items():
-            write_npy(tmp_path / case.name / f"{name}.npy", golden.array(case, output.file))
+    write_expected(golden, golden.cases, tmp_path)
     return tmp_path
 
 
 def spoil(golden, folder, name, output, change):
-    case = next(case for case in golden.cases if case.name == name)
+    case = case_of(golden, name)
     write_npy(folder / name / f"{output}.npy", change(golden.array(case, case.outputs[output].file)))
 
 
@@ -49,12 +42,11 @@ def test_a_case_says_from_which_operation_it_follows(golden, right):
 
 
 def test_a_mistake_that_a_case_does_not_examine_is_said(golden, right):
-    case = next(c for c in golden.cases if c.name == "masked_l1/generic")
+    case = case_of(golden, "masked_l1/generic")
     assert "l1_over_all_pixels" in case.mistakes
-    report = judge(golden, right, "float64", level=3)
     spoil(golden, right, "exposure/generic", "exposed", lambda a: a**2 + 0.1)
     mask = golden.array(case, "inputs/mask.npy")
-    for one in (c for c in golden.cases if c.operation == "masked_l1"):
+    for one in cases_of(golden, "masked_l1"):
         share = golden.array(one, "inputs/mask.npy").mean()
         for name in one.outputs:
             spoil(golden, right, one.name, name, lambda a, share=share: a * share)
@@ -109,7 +101,7 @@ def test_weak_candidates_are_hidden(golden, right):
 
 
 def test_the_command_searches_and_can_be_told_not_to(golden, right, capsys):
-    for case in (case for case in golden.cases if case.operation == "matern"):
+    for case in cases_of(golden, "matern"):
         for name in case.outputs:
             if name != "rho":
                 spoil(golden, right, case.name, name, lambda a: 1.7 * a)

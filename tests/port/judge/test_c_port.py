@@ -8,7 +8,7 @@ import pytest
 from endotsr.cli.golden import run
 from endotsr.port.judge.certificate import read_certificate
 from endotsr.port.judge.command import run_port, write_requests
-from endotsr.port.judge.store import golden_folder, read_golden
+from endotsr.port.judge.store import golden_folder
 from endotsr.port.judge.verdict import declared, judge
 
 SOURCES = golden_folder() / "ports" / "c99"
@@ -35,21 +35,20 @@ def compiled(sources, folder, real, *, strict=True):
 
 
 @pytest.mark.parametrize(("precision", "real"), [("float64", "double"), ("float32", "float")])
-def test_the_port_passes_level_2(precision, real, tmp_path, capsys):
+def test_the_port_passes_level_2(precision, real, golden, tmp_path, capsys):
     port = compiled(SOURCES, tmp_path, real)
     words = ["--port", f"{port} {{requests}} {{outputs}}", "--precision", precision, "--keep", str(tmp_path / "run")]
     code = run(["run", *words, "--level", "2"])
     claim = capsys.readouterr().out.strip().splitlines()[-1]
     assert code == 0 and f", level 2, {precision}, without " in claim, claim
-    golden = read_golden(golden_folder())
     without, notes = declared(golden, tmp_path / "run" / "outputs")
     up_to_2 = {case.operation for case in golden.cases if case.level <= 2}
     assert up_to_2 - set(without) == PORTED and not notes
     assert all(name in claim for name in up_to_2 - PORTED)
 
 
-def test_requests_with_the_line_ends_of_windows_are_read_alike(tmp_path):
-    requests, outputs, golden = tmp_path / "requests", tmp_path / "outputs", read_golden(golden_folder())
+def test_requests_with_the_line_ends_of_windows_are_read_alike(golden, tmp_path):
+    requests, outputs = tmp_path / "requests", tmp_path / "outputs"
     write_requests(golden, requests, "float64", 2)
     for file in requests.rglob("*.json"):
         text = file.read_bytes()
@@ -59,14 +58,20 @@ def test_requests_with_the_line_ends_of_windows_are_read_alike(tmp_path):
     assert judge(golden, outputs, "float64", level=2).level == 2
 
 
-def test_a_mistake_in_its_source_is_named(tmp_path):
-    sources, requests, outputs = tmp_path / "c99", tmp_path / "requests", tmp_path / "outputs"
-    shutil.copytree(SOURCES, sources)
+def with_edits(folder, edits):
+    """The sources of the port with some text of composite.c taken out or replaced."""
+    sources = shutil.copytree(SOURCES, folder / "c99")
     file = sources / "composite.c"
+    for old, new in edits:
+        assert file.read_text().count(old) == 1
+        file.write_text(file.read_text().replace(old, new))
+    return sources
+
+
+def test_a_mistake_in_its_source_is_named(golden, tmp_path):
+    requests, outputs = tmp_path / "requests", tmp_path / "outputs"
     right, wrong = "dx = (real)x + (real)0.5 - s->u, dy = (real)y + (real)0.5 - s->v", "dx = x - s->u, dy = y - s->v"
-    assert right in file.read_text()
-    file.write_text(file.read_text().replace(right, wrong))
-    golden = read_golden(golden_folder())
+    sources = with_edits(tmp_path, [(right, wrong)])
     write_requests(golden, requests, "float64", 1)
     assert run_port(f"{compiled(sources, tmp_path, 'double')} {{requests}} {{outputs}}", requests, outputs, 60) == ""
     report = judge(golden, outputs, "float64", level=1)
@@ -76,17 +81,13 @@ def test_a_mistake_in_its_source_is_named(tmp_path):
 
 
 def part(folder, kept, edits=()):
-    """The port with these operations alone in its table, and some lines of composite.c taken out or replaced."""
-    sources = shutil.copytree(SOURCES, folder / "c99")
+    """The port with these operations alone in its table, and these edits."""
+    sources = with_edits(folder, edits)
     main = sources / "main.c"
     text, (head, rest) = main.read_text(), main.read_text().split("OPERATIONS[] = {\n")
     rows = "".join(f'    {{"{name}", {name}}},\n' for name in kept)
     main.write_text(f"{head}OPERATIONS[] = {{\n{rows}}};{rest.partition('};')[2]}")
     assert main.read_text() != text
-    file = sources / "composite.c"
-    for old, new in edits:
-        assert file.read_text().count(old) == 1
-        file.write_text(file.read_text().replace(old, new))
     return sources
 
 

@@ -7,27 +7,21 @@ import sys
 
 import numpy as np
 import pytest
+from made_up_ports import case_of
 
 from endotsr.cli.golden import run
 from endotsr.errors import InputError
 from endotsr.port.judge.command import words_of
 from endotsr.port.judge.npy import npy_bytes, read_plain
 from endotsr.port.judge.report import as_table
-from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import judge
-from endotsr.port.reference import answer_all
 
-
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
+REFERENCE = f"{sys.executable} -m endotsr.cli.main golden reference {{outputs}} --requests {{requests}}"
 
 
 @pytest.fixture(scope="module", params=["float64", "float32"])
-def answered(request, golden, tmp_path_factory):
-    folder = tmp_path_factory.mktemp(request.param)
-    answer_all(golden, folder, request.param)
-    return request.param, folder
+def answered(request, reference_answers):
+    return request.param, reference_answers(request.param)
 
 
 def test_the_reference_passes_every_level(golden, answered):
@@ -44,10 +38,9 @@ def test_single_precision_does_not_pass_as_double(golden, answered):
     assert report.passed == (precision == "float64")
 
 
-def test_the_claim_is_the_highest_complete_level(golden, answered, tmp_path):
+def test_the_claim_is_the_highest_complete_level(golden, answered):
     precision, folder = answered
-    name = "d_omega.npy"
-    path = folder / "dictionary" / "generic" / name
+    path = folder / "dictionary" / "generic" / "d_omega.npy"
     kept = path.read_bytes()
     try:
         path.write_bytes(npy_bytes(-read_plain(path)))
@@ -96,8 +89,7 @@ def test_exit_codes_and_report_files(golden, answered, tmp_path, capsys):
 
 
 def test_a_command_is_called_with_requests_alone(golden, tmp_path, capsys):
-    port = f"{sys.executable} -m endotsr.cli.main golden reference {{outputs}} --requests {{requests}}"
-    code = run(["run", "--port", port, "--level", "2", "--precision", "float32", "--keep", str(tmp_path)])
+    code = run(["run", "--port", REFERENCE, "--level", "2", "--precision", "float32", "--keep", str(tmp_path)])
     assert code == 0 and "level 2, float32" in capsys.readouterr().out
     assert not list((tmp_path / "requests").rglob("expected*"))
     request = (tmp_path / "requests" / "motion" / "generic" / "request.json").read_text()
@@ -115,8 +107,7 @@ def test_a_port_that_fails_gets_verdicts(tmp_path, capsys):
 
 def test_outputs_of_an_earlier_port_are_not_judged(tmp_path, capsys):
     words = ["run", "--level", "0", "--keep", str(tmp_path / "kept"), "--port"]
-    reference = f"{sys.executable} -m endotsr.cli.main golden reference {{outputs}} --requests {{requests}}"
-    assert run([*words, reference]) == 0 and "level 0, float32" in capsys.readouterr().out
+    assert run([*words, REFERENCE]) == 0 and "level 0, float32" in capsys.readouterr().out
     assert run([*words, f"{sys.executable} -c 0 {{requests}} {{outputs}}"]) == 1
     said = capsys.readouterr().out
     assert said.endswith("no level is complete\n") and " 0 of 18 outputs" in said
@@ -147,7 +138,7 @@ def test_foreign_files_in_the_kept_folder_stay(name, tmp_path):
 def test_a_refusal_like_no_known_mistake_says_so_and_shows_the_difference(golden, tmp_path):
     folder = tmp_path / "motion" / "generic"
     folder.mkdir(parents=True)
-    off = golden.array(next(c for c in golden.cases if c.name == "motion/generic"), "expected/translation.npy").copy()
+    off = golden.array(case_of(golden, "motion/generic"), "expected/translation.npy").copy()
     off[1, 2] += 5e-12
     (folder / "translation.npy").write_bytes(npy_bytes(off))
     lines = as_table(judge(golden, tmp_path, "float64", level=1, only="motion")).splitlines()
@@ -177,7 +168,7 @@ def test_level_5_requires_a_second_run(golden, answered):
     precision, folder = answered
     report = judge(golden, folder, precision)
     assert report.level == 4 and report.claim == f"golden {golden.short_version}, level 4, {precision}"
-    assert "second run: give it with --again" in as_table(report, everything=True) or "second run" in as_table(report)
+    assert "determinism/again: second run" in as_table(report)
 
 
 def test_one_family_or_case_is_judged_alone_and_without_a_claim(golden, answered, tmp_path, capsys):
@@ -189,8 +180,7 @@ def test_one_family_or_case_is_judged_alone_and_without_a_claim(golden, answered
     assert run([*words, "motion"]) == 0 and capsys.readouterr().out.endswith("no claim: only motion was judged\n")
     with pytest.raises(InputError, match="no such case; allowed: reading, "):
         run([*words, "no_family"])
-    port = f"{sys.executable} -m endotsr.cli.main golden reference {{outputs}} --requests {{requests}}"
-    assert run(["run", "--port", port, "--level", "2", "--only", "matern", "--keep", str(tmp_path / "kept")]) == 0
+    assert run(["run", "--port", REFERENCE, "--level", "2", "--only", "matern", "--keep", str(tmp_path / "kept")]) == 0
     assert [p.name for p in (tmp_path / "kept" / "requests").iterdir() if p.is_dir()] == ["matern"]
 
 
@@ -216,7 +206,7 @@ def test_failures_alone_are_listed_with_the_level_that_they_stop(golden, answere
 
 def test_a_trajectory_says_where_it_leaves_the_path(golden, answered, tmp_path):
     precision, folder = answered
-    case = next(c for c in golden.cases if c.name == "training/twenty_iterations")
+    case = case_of(golden, "training/twenty_iterations")
     target = tmp_path / case.name
     target.mkdir(parents=True)
     for name in case.outputs:

@@ -8,12 +8,12 @@ import inspect
 
 import numpy as np
 import pytest
+from made_up_ports import case_of
 
 from endotsr.definition import train, view
 from endotsr.definition.exposure import ExposureGrads, exposure_forward, exposure_reverse
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.profiles import of_profile
-from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import conclude, judge, judge_case
 from endotsr.port.reference import stored
 from endotsr.port.stages.definition import definition_stages
@@ -21,14 +21,9 @@ from endotsr.port.stages.definition import definition_stages
 CASES = {"objective": "objective/exposed", "training": "training/exposed"}
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
 def answered(golden, folder, operation):
     """The definition's answer to the exposed case of an operation, as it is now."""
-    case = next(case for case in golden.cases if case.name == CASES[operation])
+    case = case_of(golden, CASES[operation])
     found = definition_stages()[operation].compute(golden.inputs(case), dict(case.settings))
     for name in case.outputs:
         write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
@@ -75,30 +70,40 @@ def test_a_wrong_reverse_pass_in_the_objective_is_refused_and_named(golden, tmp_
     assert [one.flag for one in report.suspects if one.named][:1] == [wrong.__name__]
 
 
-def test_a_clamp_before_the_exposure_is_refused_and_named(golden, tmp_path, monkeypatch):
-    def forward(colour, log_gain, bias):
-        exposed, saved = exposure_forward(np.clip(colour, 0, 1), log_gain, bias)
-        return exposed, (saved, (colour >= 0) & (colour <= 1))
+def clamped_before(colour, log_gain, bias):
+    exposed, saved = exposure_forward(np.clip(colour, 0, 1), log_gain, bias)
+    return exposed, (saved, (colour >= 0) & (colour <= 1))
 
-    def reverse(d_exposed, saved):
-        grads = exposure_reverse(d_exposed, saved[0])
-        return grads._replace(d_colour=np.where(saved[1], grads.d_colour, 0))
 
+def clamped_before_reverse(d_exposed, saved):
+    grads = exposure_reverse(d_exposed, saved[0])
+    return grads._replace(d_colour=np.where(saved[1], grads.d_colour, 0))
+
+
+def clamped_after(colour, log_gain, bias):
+    exposed, saved = exposure_forward(colour, log_gain, bias)
+    return np.clip(exposed, 0, 1), (saved, (exposed >= 0) & (exposed <= 1))
+
+
+def clamped_after_reverse(d_exposed, saved):
+    return exposure_reverse(np.where(saved[1], d_exposed, 0), saved[0])
+
+
+@pytest.mark.parametrize(
+    ("forward", "reverse", "flag"),
+    [
+        (clamped_before, clamped_before_reverse, "render_clamped_before_exposure"),
+        (clamped_after, clamped_after_reverse, "exposure_clamped"),
+    ],
+    ids=["before", "after"],
+)
+def test_a_clamp_before_or_after_the_exposure_is_refused_and_named(
+    golden, tmp_path, monkeypatch, forward, reverse, flag
+):
     monkeypatch.setattr(view, "exposure_forward", forward)
     monkeypatch.setattr(view, "exposure_reverse", reverse)
     report = report_on(golden, tmp_path, "objective")
-    assert [one.flag for one in report.suspects if one.named][:1] == ["render_clamped_before_exposure"]
-
-
-def test_a_clamp_after_the_exposure_is_refused_and_named(golden, tmp_path, monkeypatch):
-    def forward(colour, log_gain, bias):
-        exposed, saved = exposure_forward(colour, log_gain, bias)
-        return np.clip(exposed, 0, 1), (saved, (exposed >= 0) & (exposed <= 1))
-
-    monkeypatch.setattr(view, "exposure_forward", forward)
-    monkeypatch.setattr(view, "exposure_reverse", lambda d, saved: exposure_reverse(np.where(saved[1], d, 0), saved[0]))
-    report = report_on(golden, tmp_path, "objective")
-    assert [one.flag for one in report.suspects if one.named][:1] == ["exposure_clamped"]
+    assert [one.flag for one in report.suspects if one.named][:1] == [flag]
 
 
 def test_the_exposure_of_another_frame_is_refused_at_level_4_and_named(golden, tmp_path, monkeypatch):

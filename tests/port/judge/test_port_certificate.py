@@ -1,11 +1,10 @@
 """A certificate: written for a complete level alone, confirmed by a second judgement, refused if it is changed."""
 
 import json
-import sys
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import pytest
+from made_up_ports import THREE, command, racing, three_functions
 
 from endotsr.cli.golden import run
 from endotsr.errors import InputError
@@ -13,29 +12,24 @@ from endotsr.port.judge.badge import badge
 from endotsr.port.judge.certificate import read_certificate
 from endotsr.port.judge.format import schema_text, to_json
 from endotsr.port.judge.schemas import SCHEMAS
-from endotsr.port.judge.store import golden_folder, read_golden
 
-THREE = Path(__file__).parents[1] / "delivery" / "three_functions.py"
-
-
-def port(script=THREE):
-    return f'"{sys.executable}" "{script}" {{requests}} {{outputs}}'
+ASKED = ("--precision", "float64", "--level", "2")
+WRONG_GRADIENT = ("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]")
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("certificate")
-    words = ["run", "--port", port(), "--precision", "float64", "--level", "2", "--name", "three <functions>"]
+    words = ["run", "--port", command(), *ASKED, "--name", "three <functions>"]
     assert run([*words, "--certificate", str(folder / "c.json"), "--badge", str(folder / "b.svg")]) == 0
     return folder
 
 
-def test_a_certificate_says_what_was_judged(written, capsys):
+def test_a_certificate_says_what_was_judged(golden, written):
     found = read_certificate(written / "c.json")
-    capsys.readouterr()
     assert found.claim.startswith("golden 4.") and ", level 2, float64, without " in found.claim
-    assert found.vectors == read_golden(golden_folder()).manifest.version and len(found.manifest) == 64
-    assert found.port.command == port() and found.port.name == "three <functions>" and found.port.commit
+    assert found.vectors == golden.manifest.version and len(found.manifest) == 64
+    assert found.port.command == command() and found.port.name == "three <functions>" and found.port.commit
     assert found.cases >= 6 and found.outputs >= 20 and 0 < found.seconds < 600
     assert 0 <= found.tolerances.used <= 1 and found.tolerances.smallest <= found.tolerances.largest
     assert "motion" not in found.without and "adam" in found.without
@@ -60,18 +54,15 @@ def test_the_badge_is_xml_with_the_claim_as_its_title(written):
     ET.fromstring(badge(hostile))
 
 
-def test_verify_judges_again(written, capsys):
+def test_verify_judges_again(written, tmp_path, capsys):
     words = ["verify", str(written / "c.json"), "--port"]
-    assert run([*words, port()]) == 0
+    assert run([*words, command()]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith("confirmed: golden 4.")
-    wrong = written / "wrong.py"
-    wrong.write_text(THREE.read_text().replace("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]"))
-    assert run([*words, port(wrong)]) == 1
+    assert run([*words, command(three_functions(tmp_path, *WRONG_GRADIENT))]) == 1
     said = capsys.readouterr().out
     assert "claim: the certificate says 'golden" in said and said.endswith("differs from the certificate\n")
-    less = written / "less.py"
-    less.write_text(THREE.read_text().replace("frequencies, motion, exposure)", "frequencies, motion)"))
-    assert run([*words, port(less)]) == 1
+    less = three_functions(tmp_path, "frequencies, motion, exposure)", "frequencies, motion)")
+    assert run([*words, command(less)]) == 1
     assert "without: " in capsys.readouterr().out
 
 
@@ -80,26 +71,12 @@ def test_a_command_out_of_a_file_is_shown_and_not_run(written):
         run(["verify", str(written / "c.json")])
 
 
-RACING = """
-import pathlib, runpy, sys
-import numpy as np
-count = pathlib.Path({count!r})
-run = int(count.read_text() or 0) if count.is_file() else 0
-count.write_text(str(run + 1))
-runpy.run_path({three!r}, run_name="__main__")
-for path in pathlib.Path(sys.argv[2]).glob("motion/*/translation.npy"):
-    np.save(path, np.load(path) * (1 + (0.5 if run == {wrong} else 0)))
-"""
-
-
 def test_the_runs_are_in_the_certificate_and_verified_again(tmp_path, capsys):
-    racing = tmp_path / "racing.py"
-    racing.write_text(RACING.format(count=str(tmp_path / "count"), three=str(THREE), wrong=-1))
-    words = ["run", "--port", port(racing), "--precision", "float64", "--level", "2", "--runs", "2"]
+    words = ["run", "--port", racing(tmp_path, [0.0]), *ASKED, "--runs", "2"]
     assert run([*words, "--certificate", str(tmp_path / "c.json")]) == 0
     assert read_certificate(tmp_path / "c.json").runs == 2 and (tmp_path / "count").read_text() == "2"
-    racing.write_text(racing.read_text().replace("run == -1", "run == 3"))  # the second run of the verification
-    assert run(["verify", str(tmp_path / "c.json"), "--port", port(racing)]) == 1
+    wrong = racing(tmp_path, [0.0, 0.0, 0.0, 0.5])  # the second run of the verification
+    assert run(["verify", str(tmp_path / "c.json"), "--port", wrong]) == 1
     assert (tmp_path / "count").read_text() == "4" and "differs from the certificate" in capsys.readouterr().out
 
 
@@ -114,16 +91,15 @@ def test_a_certificate_of_one_run_needs_no_number_and_no_other_is_taken(written,
 
 
 def test_an_incomplete_level_has_no_certificate(tmp_path, capsys):
-    wrong = tmp_path / "wrong.py"
-    wrong.write_text(THREE.read_text().replace("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]"))
-    words = ["run", "--port", port(wrong), "--precision", "float64", "--level", "2", "--search", "0"]
+    wrong = three_functions(tmp_path, *WRONG_GRADIENT)
+    words = ["run", "--port", command(wrong), *ASKED, "--search", "0"]
     assert run([*words, "--certificate", str(tmp_path / "c.json"), "--badge", str(tmp_path / "b.svg")]) == 1
     assert "no certificate" in capsys.readouterr().out
     assert not list(tmp_path.glob("c.json")) + list(tmp_path.glob("b.svg"))
 
 
 def test_a_part_has_no_certificate(tmp_path, capsys):
-    words = ["run", "--port", port(), "--precision", "float64", "--level", "2", "--only", "motion"]
+    words = ["run", "--port", command(), *ASKED, "--only", "motion"]
     assert run([*words, "--certificate", str(tmp_path / "c.json")]) == 1
     assert "no certificate: no claim: only motion was judged" in capsys.readouterr().out
     assert not (tmp_path / "c.json").exists()
@@ -132,9 +108,9 @@ def test_a_part_has_no_certificate(tmp_path, capsys):
 def test_a_part_is_refused_if_the_port_fails_after_right_outputs(tmp_path):
     failing = tmp_path / "failing.py"
     failing.write_text(f"import runpy, sys\nrunpy.run_path({str(THREE)!r}, run_name='__main__')\nsys.exit(3)\n")
-    words = ["--precision", "float64", "--level", "2", "--only", "motion"]
-    assert run(["run", "--port", port(), *words]) == 0
-    assert run(["run", "--port", port(failing), *words]) == 1
+    words = [*ASKED, "--only", "motion"]
+    assert run(["run", "--port", command(), *words]) == 0
+    assert run(["run", "--port", command(failing), *words]) == 1
 
 
 @pytest.mark.parametrize(
@@ -178,4 +154,4 @@ def test_a_certificate_of_other_vectors_is_not_compared(written, tmp_path):
     other = SCHEMAS["certificate"](**{**{n: getattr(found, n) for n in found.__struct_fields__}, "manifest": "0" * 64})
     (tmp_path / "c.json").write_text(to_json(other))
     with pytest.raises(InputError, match="at hand are"):
-        run(["verify", str(tmp_path / "c.json"), "--port", port()])
+        run(["verify", str(tmp_path / "c.json"), "--port", command()])

@@ -14,23 +14,14 @@ from endotsr.port.judge.command import write_requests
 from endotsr.port.judge.npy import npy_bytes, read_plain
 from endotsr.port.judge.profiles import PROFILES, complete_level, of_profile
 from endotsr.port.judge.report import as_table
-from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import asked_of, judge
-from endotsr.port.reference import answer_all
 
 CLAIMS = {name: max(profile.says) for name, profile in PROFILES.items()}
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
-@pytest.fixture(scope="module")
-def answered(golden, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("float32")
-    answer_all(golden, folder, "float32")
-    return folder
+@pytest.fixture
+def answered(reference_answers):
+    return reference_answers("float32")
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import textwrap
 
 import numpy as np
 import pytest
+from made_up_ports import case_of
 
 from endotsr.errors import InputError
 from endotsr.port.judge.pytest_cases import answered, explain, golden_test
-from endotsr.port.judge.store import golden_folder, read_golden
 
 
 def answer(operation, inputs, settings):
@@ -27,9 +27,8 @@ def half(operation, inputs, settings):
     return found and found | {"translation": found["translation"] / 2}
 
 
-def test_a_wrong_port_is_explained():
-    golden = read_golden(golden_folder())
-    case = next(c for c in golden.cases if c.name == "motion/generic")
+def test_a_wrong_port_is_explained(golden):
+    case = case_of(golden, "motion/generic")
     report = answered(golden, case, half, "float32", 1)
     assert report is not None and report.status == "refused" and "translation" in explain(report)
     assert answered(golden, golden.cases[0], half, "float32", 1) is None

@@ -5,7 +5,6 @@ import pytest
 from endotsr.port.judge.diagnose import ORDER, first_wrong
 from endotsr.port.judge.recognise import Evidence, Suspect, contradicted, pair_of
 from endotsr.port.judge.report import answer
-from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
 
 
@@ -65,8 +64,7 @@ def test_a_name_that_explains_everything_stands_above_a_line_of_the_search():
     assert lines.index("looks like:") > lines.index(report(False).causes[0])
 
 
-def test_the_first_wrong_operation_is_that_of_the_method():
-    golden = read_golden(golden_folder())
+def test_the_first_wrong_operation_is_that_of_the_method(golden):
     assert {case.operation for case in golden.cases} == set(ORDER)
     refused = [OutputReport(name="d_rendered", level=2, status="refused", reason="")]
     reports = [

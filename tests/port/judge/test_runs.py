@@ -1,41 +1,11 @@
 """Several runs of a port: each within tolerance, and what differs between them; a wrong run is found in any place."""
 
-import shlex
-import sys
-from pathlib import Path
-
 import pytest
+from made_up_ports import racing
 
 from endotsr.errors import InputError
 from endotsr.port.judge.__main__ import main
 from endotsr.port.judge.runs import RunDifference, called_often, lines
-from endotsr.port.judge.store import golden_folder, read_golden
-
-# The answer to `motion`, whose translation is off by SIZES[run] of itself; the run is counted in a file.
-RACING = """
-import pathlib, sys
-sys.path.insert(0, {folder!r})
-import numpy as np
-import three_functions  # answers when it is imported
-count = pathlib.Path({count!r})
-run = int(count.read_text() or 0) if count.is_file() else 0
-count.write_text(str(run + 1))
-for path in pathlib.Path(sys.argv[2]).glob("motion/*/translation.npy"):
-    np.save(path, np.load(path) * (1 + {sizes}[run % len({sizes})]))
-"""
-
-
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
-def racing(folder, sizes):
-    """The command of a port with these deviations of its runs."""
-    program = folder / "port.py"
-    there = str(Path(__file__).parents[1] / "delivery")
-    program.write_text(RACING.format(folder=there, count=str(folder / "count"), sizes=sizes))
-    return f"{shlex.quote(sys.executable)} {shlex.quote(str(program))} {{requests}} {{outputs}}"
 
 
 def called(golden, folder, sizes, runs=3, **more):

@@ -2,18 +2,15 @@
 
 import ast
 import json
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from made_up_ports import case_of
+from mutants import fuzz, ports, survey
+from mutants.kinds import Source, habits, wrong_versions
 
-sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[2])]
-from mutants import fuzz, ports, survey  # noqa: E402
-from mutants.kinds import Source, habits, wrong_versions  # noqa: E402
-
-from endotsr.port.judge.store import golden_folder, read_golden  # noqa: E402
-from mutation.mutator import in_place  # noqa: E402
+from mutation.mutator import in_place
 
 RECORD = json.loads((Path(__file__).parents[3] / "docs/results/golden_mutants.json").read_text("utf-8"))
 KINDS = {
@@ -50,11 +47,6 @@ def test_a_wrong_version_runs_in_place_of_the_right_one():
     assert space["half"](8, 3) == 4 and {16, 8, 1.5} <= answers
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
 def test_the_cases_refuse_what_the_record_says(golden):
     found = survey.surveyed(ports.by_hand(), golden, "hand_losses")
     results = {result: {n for n, (_, r, _) in found.items() if r == result} for _, result, _ in found.values()}
@@ -74,7 +66,7 @@ def test_a_survivor_that_the_cases_lose_is_seen(golden):
 
 
 def test_requests_are_repeatable_and_in_single_precision(golden):
-    case = next(case for case in golden.cases if case.name == "appearance/generic")
+    case = case_of(golden, "appearance/generic")
     inputs = golden.inputs(case)
     one, other = (fuzz.drawn(case, inputs, [case], 3) for _ in range(2))
     assert not fuzz.apart(one[0], other[0]) and one[1] == other[1]

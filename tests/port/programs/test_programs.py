@@ -6,14 +6,11 @@ ENDOTSR_TORCH_PYTHON names an interpreter that has them, by default this one.
 import json
 import os
 import sys
-from pathlib import Path
 
 import pytest
+import survey
 
 from endotsr.port.judge.store import golden_folder, read_golden
-
-sys.path.insert(0, str(Path(__file__).parent))
-import survey
 
 PYTHON = os.environ.get("ENDOTSR_TORCH_PYTHON", sys.executable)
 

@@ -3,20 +3,15 @@
 The mistakes are those of `habits.toml`; `python tests/port/search/habits.py` judges all of them.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from habits import EVERY, GOLDEN, MISTAKES, sentences_on
 
 from endotsr.port.search.conventions import Convention, prepared
 from endotsr.port.search.decisions import Interval, threshold
 from endotsr.port.search.images import OF_IMAGES
 from endotsr.port.search.screen import OF_THE_SCREEN
 from endotsr.port.stages.definition import definition_stages
-
-sys.path.insert(0, str(Path(__file__).parent))
-from habits import EVERY, GOLDEN, MISTAKES, sentences_on
 
 CONVENTIONS = (*OF_THE_SCREEN, *OF_IMAGES)
 FOUND = {

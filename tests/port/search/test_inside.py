@@ -1,22 +1,19 @@
 """Arrays inside an operation: a port is told the first wrong one, and one without any is no worse off."""
 
 import re
-import sys
 from pathlib import Path
 
+import hand_port
 import numpy as np
-import pytest
+from made_up_ports import cases_of
 
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.report import as_table
-from endotsr.port.judge.store import golden_folder, in_precision, read_golden
+from endotsr.port.judge.store import in_precision
 from endotsr.port.judge.verdict import judge
 from endotsr.port.search.find import explain
 from endotsr.port.search.inside import INSIDE, values
 from endotsr.port.stages.definition import definition_stages
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unseen" / "by_hand"))
-import hand_port
 
 ROOT = Path(__file__).parents[3]
 
@@ -25,16 +22,11 @@ RIGHT = 't = np.einsum("rjn,jln->rln", j, wr)'
 WRONG = [[RIGHT, "j = j * np.array([1.0, 1.25, 1.0])[None, :, None] + 0.01 * j**2\n    " + RIGHT]]
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
 def written(golden, folder, edits, inside=()):
     """The outputs of the projection of the port by hand, and some of its arrays inside."""
     port = hand_port.operations(edits)
     module = port["projection"].__globals__
-    for case in (case for case in golden.cases if case.operation == "projection"):
+    for case in cases_of(golden, "projection"):
         given = golden.inputs(case)
         found = hand_port.answer(port, "projection", given, case.settings)
         for name in case.outputs:
@@ -69,10 +61,10 @@ def test_arrays_that_are_right_put_the_mistake_behind_them(golden, tmp_path):
 
 def test_what_cannot_be_read_or_has_another_shape_is_said(golden, tmp_path):
     written(golden, tmp_path, WRONG)
-    for case in (case for case in golden.cases if case.operation == "projection"):
+    for case in cases_of(golden, "projection"):
         write_npy(tmp_path / case.name / "inside" / "point.npy", np.zeros(7))
     assert "first wrong array is point: shape (7,); expected (3, " in report(golden, tmp_path).inside[0]
-    for case in (case for case in golden.cases if case.operation == "projection"):
+    for case in cases_of(golden, "projection"):
         (tmp_path / case.name / "inside" / "point.npy").write_bytes(b"no array")
     assert "first wrong array is point: " in report(golden, tmp_path).inside[0]
 
@@ -98,7 +90,7 @@ def test_every_array_is_computed_in_some_case_and_stands_in_the_guide(golden):
     stages = definition_stages()
     for operation, names in INSIDE.items():
         found = set()
-        for case in (case for case in golden.cases if case.operation == operation):
+        for case in cases_of(golden, operation):
             one = _Given(in_precision(golden.inputs(case), "float64"), case.settings)
             found |= values(stages[operation], one).keys()
         assert found == names.keys(), operation

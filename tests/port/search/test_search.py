@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pytest
+from made_up_ports import cases_of
 
 from endotsr.definition import (
     appearance,
@@ -17,7 +18,7 @@ from endotsr.definition import (
 )
 from endotsr.port.judge.diagnose import PARTS, made_of
 from endotsr.port.judge.npy import write_npy
-from endotsr.port.judge.store import golden_folder, in_precision, read_golden
+from endotsr.port.judge.store import in_precision
 from endotsr.port.judge.verdict import judge
 from endotsr.port.reference import stored
 from endotsr.port.search.find import explained, sentences
@@ -25,14 +26,9 @@ from endotsr.port.search.places import executed
 from endotsr.port.stages.definition import definition_stages
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
 def causes(golden, folder, operation, *, inputs=lambda found: found, settings=lambda found: found, seconds=24.0):
     """What is said of the answers of the definition as it is patched now, for all cases of an operation."""
-    for case in (case for case in golden.cases if case.operation == operation):
+    for case in cases_of(golden, operation):
         given = inputs(in_precision(golden.inputs(case), "float64"))
         with np.errstate(all="ignore"):
             found = definition_stages()[operation].compute(given, settings(case.settings))
@@ -77,7 +73,7 @@ def line_of(module, text):
 
 def every_output(golden, operation):
     """What is said of a change that explains all cases of an operation."""
-    return f"every output of its {sum(case.operation == operation for case in golden.cases)} cases"
+    return f"every output of its {len(cases_of(golden, operation))} cases"
 
 
 def test_a_constant_of_another_value_is_found_with_its_value(golden, tmp_path, monkeypatch):
@@ -135,7 +131,7 @@ def test_a_setting_that_is_fixed_is_found(golden, tmp_path):
 def test_an_input_in_another_order_is_found(golden, tmp_path):
     order = [3, 0, 1, 2]
     folder = tmp_path / "turned"
-    for case in (case for case in golden.cases if case.operation == "covariance"):
+    for case in cases_of(golden, "covariance"):
         given = in_precision(golden.inputs(case), "float64")
         found = definition_stages()["covariance"].compute({**given, "quaternion": given["quaternion"][order]}, {})
         found["d_quaternion"] = found["d_quaternion"][np.argsort(order)]
@@ -210,7 +206,7 @@ def test_a_gradient_that_is_wrong_by_orders_of_magnitude_is_explained(golden, tm
 
 def test_a_number_that_fits_few_numbers_is_not_believed(golden, tmp_path):
     """Losses alone are wrong, by a factor that is no constant of the method, and their gradients in another way."""
-    for case in (case for case in golden.cases if case.operation == "masked_l1"):
+    for case in cases_of(golden, "masked_l1"):
         for name, output in case.outputs.items():
             value = golden.array(case, output.file)
             write_npy(tmp_path / case.name / f"{name}.npy", value * (1.0137 if name == "loss" else 1 + value**2))
@@ -219,7 +215,7 @@ def test_a_number_that_fits_few_numbers_is_not_believed(golden, tmp_path):
 
 def test_noise_is_not_explained_and_time_is_kept(golden, tmp_path, monkeypatch):
     random = np.random.default_rng(0)
-    for case in (case for case in golden.cases if case.operation == "projection"):
+    for case in cases_of(golden, "projection"):
         for name, output in case.outputs.items():
             value = golden.array(case, output.file)
             noise = 1 + random.uniform(0.1, 0.9, value.shape) if value.dtype.kind == "f" else 1
@@ -242,7 +238,7 @@ def test_the_parts_of_an_operation_are_those_that_the_definition_calls(golden):
     stages = definition_stages()
     parts = {}
     for name, stage in stages.items():
-        case = next(case for case in golden.cases if case.operation == name)
+        case = cases_of(golden, name)[0]
         given = in_precision(golden.inputs(case), "float64")
         with np.errstate(all="ignore"):
             places = executed({"forward": lambda g=given, s=stage, c=case: s.compute(g, c.settings)})

@@ -3,19 +3,14 @@
 They were written from the port and the specification alone, and none is in the independent set beside that port.
 """
 
-import sys
-from pathlib import Path
-
-import pytest
-
-from endotsr.port.judge.npy import write_npy
-from endotsr.port.judge.store import golden_folder, read_golden
-from endotsr.port.search import changes
-from endotsr.port.search.find import apart, explained, sentences
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unseen" / "by_hand"))
 import hand_port
 import measure
+import pytest
+from made_up_ports import cases_of
+
+from endotsr.port.judge.npy import write_npy
+from endotsr.port.search import changes
+from endotsr.port.search.find import apart, explained, sentences
 
 MISTAKES = {
     "two numbers of a line": (
@@ -68,15 +63,10 @@ MORE_MISTAKES = {
 SECONDS = 60.0  # the searches end by themselves before
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
 def search_on(golden, folder, stage, *edits):
     """The search on the answers of the port by hand with some edits."""
     port = hand_port.operations(edits)
-    for case in (case for case in golden.cases if case.operation == stage):
+    for case in cases_of(golden, stage):
         found = hand_port.answer(port, stage, golden.inputs(case), case.settings)
         for name in case.outputs:
             write_npy(folder / case.name / f"{name}.npy", found[name])

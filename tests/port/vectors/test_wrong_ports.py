@@ -3,10 +3,10 @@
 import sys
 
 import pytest
+from made_up_ports import case_of, write_expected
 
 import make
 from endotsr.port.contract import all_operations
-from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.judge.verdict import conclude, judge_case
 from makers.copies import Edit, changed_text
 from makers.registry import all_wrong_ports
@@ -16,20 +16,10 @@ WRONG_PORTS = all_wrong_ports()
 
 
 @pytest.fixture(scope="module")
-def golden():
-    return read_golden(golden_folder())
-
-
-@pytest.fixture(scope="module")
 def clean(golden, tmp_path_factory):
     """Verdicts on the expected values themselves, by precision."""
     folder = tmp_path_factory.mktemp("clean")
-    for case in golden.cases:
-        target = folder / case.name
-        target.mkdir(parents=True)
-        for name, output in case.outputs.items():
-            source = golden.folder / "cases" / case.name / output.file
-            (target / f"{name}.npy").write_bytes(source.read_bytes())
+    write_expected(golden, golden.cases, folder)
     return {p: {c.name: judge_case(golden, c, folder, p) for c in golden.cases} for p in ("float64", "float32")}
 
 
@@ -64,7 +54,7 @@ def test_a_copy_leaves_the_reference_as_it_is(golden):
     """Its modules, and its answer after the copy was used."""
     before = {name: module for name, module in sys.modules.items() if name.startswith("endotsr")}
     attributes = {name: _attribute(name) for name in before}
-    question = next(c for c in golden.cases if c.name == "masked_l1/generic")
+    question = case_of(golden, "masked_l1/generic")
     made = answers(WRONG_PORTS["l1_over_all_pixels"], [Question(question.name, question.operation,
                    golden.inputs(question), question.settings, question.flags)])  # fmt: skip
     assert {name: module for name, module in sys.modules.items() if name in before} == before

@@ -4,16 +4,12 @@ All of them: python tests/port/unseen/by_hand/measure.py --record now
 """
 
 import json
-import sys
 from collections import Counter
-from pathlib import Path
 
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 import constants
 import hand_port
 import measure
+import pytest
 
 ENTRIES = {entry["id"]: entry for entry in measure.mistakes()}
 RUNS = json.loads(measure.RECORD.read_text(encoding="utf-8"))
