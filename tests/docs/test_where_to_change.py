@@ -38,7 +38,7 @@ def test_the_changes_are_all_there():
     assert all(change in title for change, title in zip(CHANGES, IDS, strict=True))
 
 
-@pytest.mark.parametrize("body, most", zip([body for _, body in SECTIONS], CHANGES.values()), ids=IDS)
+@pytest.mark.parametrize("body, most", [(body, most) for (_, body), most in zip(SECTIONS, CHANGES.values())], ids=IDS)
 def test_every_file_exists_and_no_change_takes_more_files_of_code_than_it_did(body, most):
     code, proof = files_of(body, "Code"), files_of(body, "Proof")
     assert 0 < len(code) <= most and proof
