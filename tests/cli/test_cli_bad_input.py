@@ -87,6 +87,18 @@ def test_frames_of_a_simulated_sequence(tmp_path, capsys):
     assert_refused(capsys, words, "endotsr simulate SCENE --frames N")
 
 
+@pytest.mark.parametrize("kind", ["folder", "file"])
+def test_existing_output(kind, tmp_path, capsys):
+    out = tmp_path / "run"
+    if kind == "folder":
+        out.mkdir()
+        (out / "notes.txt").write_text("mine")
+    else:
+        out.write_text("mine")
+    assert_refused(capsys, train_words(out), str(out), "exists already")
+    assert (out / "notes.txt" if kind == "folder" else out).read_text() == "mine"
+
+
 @pytest.mark.parametrize("command", ["evaluate", "train --calibrate-only --out", "render"])
 def test_commands_on_no_run(command, tmp_path, capsys):
     more = ["--out", str(tmp_path / "out")] if command == "render" else []

@@ -44,6 +44,14 @@ def test_dictionary_against_oracle(t):
     assert np.all(np.abs(phi - expected) <= 2 * U + 2 * np.pi * U * np.tile(np.abs(omega * t), 2))
 
 
+def test_float32_is_the_rounded_float64():
+    omega = frequencies(8, 1.0, 16.0, np.float32)
+    phi, _ = dictionary_forward(0.37, omega)
+    wide, _ = dictionary_forward(0.37, omega.astype(np.float64))
+    assert phi.dtype == np.float32
+    assert np.array_equal(phi, wide.astype(np.float32))
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_hard_W1_phase_is_folded_before_the_sine(dtype):
     omega = np.array([16.0], dtype)
