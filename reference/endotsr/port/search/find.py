@@ -14,7 +14,7 @@ from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import INSIDE, Report, judge, left_out
 from endotsr.port.search.cases import Answered
 from endotsr.port.search.changes import SECONDS, search
-from endotsr.port.search.trial import WHOLE, Hit, Trial
+from endotsr.port.search.trial import Hit, Trial
 from endotsr.port.stages.definition import definition_stages
 
 START_UP = 60.0  # seconds of a process outside its search
@@ -103,7 +103,7 @@ def sentences(trial: Trial) -> list[str]:
     if not said:
         return []
     number = len(trial.cases)
-    whole = f"  ({WHOLE[trial.hits[0].whole]} of its {number} case{'s' * (number > 1)})"
+    whole = f"  ({trial.hits[0].extent} of its {number} case{'s' * (number > 1)})"
     return [f"your outputs are those of the definition with {said[0]}", *said[1:], whole]
 
 

@@ -28,7 +28,7 @@ WHOLE = {
     "derivative": "every forward output, of which the gradients of the port are the derivatives,",
     "refused": "every output of those that are refused; it would be wrong in others that pass,",
     "forward": "every forward output; the gradients of the port are wrong in another way,",
-    "most": "every output, except in one refused case,",
+    "most": "every output, except in {unlike},",
 }
 """Extents of an explanation."""
 Install = Callable[[], Any]  # applies a change and returns a function that undoes it
@@ -42,6 +42,12 @@ class Hit(NamedTuple):
     function: str  # of the line
     whole: str  # a key of WHOLE
     rank: tuple[int, ...]
+    unlike: str = ""  # for `most`, the case that stays unexplained
+
+    @property
+    def extent(self) -> str:
+        """How much is explained, in words."""
+        return WHOLE[self.whole].format(unlike=self.unlike)
 
 
 class Live(NamedTuple):
@@ -64,6 +70,7 @@ class Trial:
         self.live: list[Live] = []
         self.counter = Counter()
         self.tried = 0
+        self.unlike = ""  # the refused case that the last change does not explain, if it explains the others
         self.matched = False  # the last change reproduces the forward outputs of a case with a refused one
         for one in answered:
             one.begin(stage)
@@ -100,7 +107,7 @@ class Trial:
         self.matched = False
         gradients: list[bool | None] = []  # of cases with gradients that differ from the changed definition's
         spoils = False  # a case that passed
-        explained, unlike = 0, False  # cases with refused outputs; one of them where the port does something else
+        explained, self.unlike = 0, ""  # cases with refused outputs; one of them where the port does something else
         for one in self.cases:
             if spoils:
                 break
@@ -111,9 +118,9 @@ class Trial:
                     found, saved = one.forward(self.stage, inputs, settings)
             same = one.same(request.tell(found) if request else found, one.forward_names)
             if not same and one.refused:
-                if unlike or explained < MOST:
+                if self.unlike or explained < MOST:
                     return ""
-                unlike = True
+                self.unlike = one.case.name
                 continue
             explained += same and bool(one.refused)
             self.matched |= same and bool(one.refused.intersection(one.forward_names))
@@ -127,7 +134,7 @@ class Trial:
                     with _installed(install):
                         gradients.append(one.is_derivative(self.stage))
             spoils = spoils or (not same and not one.refused)
-        if unlike:
+        if self.unlike:
             return "" if gradients or spoils else "most"
         if gradients and spoils:
             return ""
@@ -138,7 +145,7 @@ class Trial:
     def best(self, install: Install, mode: str) -> tuple[str, str]:
         """As `fits`, with the best phases: a change of both may explain more without the reverse pass."""
         whole = self.fits(install, mode)
-        if mode == "both" and whole != "all" and self.matched:
+        if mode == "both" and whole not in ("all", "most") and self.matched:
             alone, order = self.fits(install, "forward"), list(WHOLE)
             if alone and (not whole or order.index(alone) < order.index(whole)):
                 return alone, "forward"
@@ -184,9 +191,8 @@ class Trial:
             if spot and not self.forward_refused and spot.place.phases == {"forward"}:
                 rank = (rank[0] + 1, *rank[1:])  # the refused outputs are computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
-            self.hits.append(
-                Hit(text, where, function, whole, (int(whole in enough) + (whole == "most"), *rank, len(self.hits)))
-            )
+            extent = int(whole in enough) + (whole == "most")
+            self.hits.append(Hit(text, where, function, whole, (extent, *rank, len(self.hits)), self.unlike))
 
     def modes(self, place: Statement) -> list[str]:
         """The phases in which a change of a place can affect the refused outputs."""
