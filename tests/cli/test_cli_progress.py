@@ -42,20 +42,23 @@ class Told:
     """A training on a made-up machine, what it says, and the time left that it shows at every iteration.
 
     One thread makes the targets of a gap at its first visit, a second one makes one gap in each iteration beside it.
-    The kernels compile for three minutes in the first iteration, and for 40 s in the ninth.
+    The kernels compile for three minutes in the first iteration, and for 40 s in the ninth. A coarse start lasts to
+    `ends`, by default to the end of density control; from iteration 50 on, it is expected to end an eighth later.
     """
 
-    def __init__(self, monkeypatch, plan):
+    def __init__(self, monkeypatch, plan, ends=None):
         clock, stderr, self.out, self.left = Clock(), io.StringIO(), [], {}
         monkeypatch.setattr(progress, "time", clock)
         monkeypatch.setattr(progress.sys, "stderr", stderr)
         shown, config, rng = Progress(plan), plan.config, np.random.default_rng(0)
         monkeypatch.setattr(shown, "say", self.out.append)
-        state = SimpleNamespace(iteration=0, coarse=config.training.coarse_start, making=Making())
+        state = SimpleNamespace(iteration=0, coarse=config.training.coarse_start, coarse_until=0, making=Making())
         shown.begin(state)
         total, made = config.training.iterations, set()
         for iteration in range(1, total + 1):
-            if state.coarse and iteration > config.density.until:
+            if ends and iteration == 50:
+                state.coarse_until = ends * 9 // 8
+            if state.coarse and iteration > (ends or config.density.until):
                 state.coarse, state.making, made = False, Making(), set()
             size = 0.25 if state.coarse else 1.0
             count = self.gaussians(plan, iteration)
@@ -70,7 +73,7 @@ class Told:
                 alone = plan.threads == 1
                 state.making = Making(gaps + 1, waited + GAP * size * alone, beside + GAP * size * (not alone))
             shown.update({"iteration": iteration, "loss": 0.5, "psnr": None, "gaussians": count})
-            left = shown.time_left.seconds(progress.Standing(iteration, count, state.coarse))
+            left = shown.time_left.seconds(progress.Standing(iteration, count, state.coarse, state.coarse_until))
             if left is not None and iteration > 9:
                 self.left[clock.now] = left
         self.lines, self.end = stderr.getvalue().splitlines(), clock.now
@@ -96,7 +99,7 @@ def test_compilation_is_no_part_of_the_time_left(told):
     assert seconds(told.lines[1].rsplit(", ", 1)[1]) == pytest.approx(told.end - 220, rel=0.15)
 
 
-def test_the_forecast_after_thirty_iterations_holds(told):
+def test_the_forecast_holds(told):
     assert len(told.out) == 1
     left = seconds(told.out[0].removeprefix("forecast: ").split(" of ")[0])
     at = min(told.left, key=lambda now: abs(told.left[now] - left))
@@ -111,6 +114,16 @@ def test_the_time_left_is_right_within_a_seventh_and_never_rises_by_a_tenth(told
         assert left == pytest.approx(told.end - now, rel=0.15), now
         assert left <= 1.1 * least, now
         least = min(least, left)
+
+
+def test_the_forecast_holds_if_the_coarse_start_ends_early(monkeypatch):
+    told = Told(monkeypatch, plan_of("quick", 300, 1), ends=350)
+    left = seconds(told.out[0].removeprefix("forecast: ").split(" of ")[0])
+    at = min(told.left, key=lambda now: abs(told.left[now] - left))
+    assert left == pytest.approx(told.end - at, rel=0.15)
+    assert all(
+        told.left[now] == pytest.approx(told.end - now, rel=0.15) for now in told.left if at < now < told.end - 5
+    )
 
 
 def seconds(shown):

@@ -82,13 +82,14 @@ class Heard:
         with self.watch.excluded():
             state, plan = shown._training, shown._plan
             assert state is not None
-            standing, now = Standing(entry["iteration"], entry["gaussians"], state.coarse), self.watch.now()
+            at = Standing(entry["iteration"], entry["gaussians"], state.coarse, state.coarse_until)
+            now = self.watch.now()
             self.trained = now
-            left, unit = shown.time_left.seconds(standing), shown.time_left.unit
+            left, unit = shown.time_left.seconds(at), shown.time_left.unit
             if left is not None and unit is not None and shown._done >= progress.FORECAST_AFTER:
                 self._hear(now, left, estimated_seconds(plan, unit).evaluation)
             if entry["iteration"] * MARKS // plan.config.training.iterations > len(self.curve):
-                self.curve.append(self._point(shown, now, standing))
+                self.curve.append(self._point(shown, now, at))
 
     def _hear(self, now: float, left: float, evaluation: float) -> None:
         self._least = min(self._least, left)
@@ -137,7 +138,8 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "size": f"{about['input']['width']}x{about['input']['height']}", "preset": about["settings"]["preset"],
         "seed": about["seed"], "threads": about["threads"], "clock": "wall" if wall else "processor",
         "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
-        "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise, "curve": spoken.curve,
+        "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise,
+        "forecast_after": progress.FORECAST_AFTER, "curve": spoken.curve,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
         "machine": machine(), "date": now()[:10],

@@ -12,6 +12,7 @@ PICTURE = RESULTS / "waiting.svg"
 QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
 CLOCKS = {"processor": "processor time of one thread", "wall": "time on the wall"}
+FORMERLY = 30  # iterations before the forecast of rows that do not state it
 
 
 def told(row: dict[str, Any], when: str) -> str:
@@ -31,7 +32,7 @@ def named(row: dict[str, Any]) -> str:
 def said(result: dict[str, Any]) -> str:
     """One row per command."""
     rows = result["rows"]
-    heads = ["Training", "Frames", "First line: said, left", "After 30 iterations", "After a minute",
+    heads = ["Training", "Frames", "First line: said, left", "Forecast", "After a minute",
              "Largest rise", "Evaluation", "Whole command"]  # fmt: skip
     cells = []
     for row in rows:
@@ -48,9 +49,11 @@ def about(rows: list[dict[str, Any]]) -> str:
     """Sizes, clocks, machines and the last day."""
     sizes, clocks = sorted({row["size"] for row in rows}), sorted({CLOCKS[row["clock"]] for row in rows})
     machines = sorted({row["machine"]["processor"] for row in rows})
+    after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
-        f"{max(row['date'] for row in rows)}. The largest rise is that of the time left over its smallest value before."
+        f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "
+        "that of the time left over its smallest value before."
     )
 
 

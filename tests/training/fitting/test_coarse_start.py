@@ -12,7 +12,7 @@ from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import DEMO, Config
 from endotsr.training.fitting import coarse_start
 from endotsr.training.fitting.checkpoint import load_checkpoint
-from endotsr.training.fitting.coarse_start import CHECK_EVERY, coarse_ends, lacking
+from endotsr.training.fitting.coarse_start import CHECK_EVERY, coarse_ends, expected_end, lacking
 from endotsr.training.fitting.state import new_training, save_state, state_from_checkpoint
 from endotsr.training.fitting.trainer import train
 from endotsr.training.scene.gaussians import arrays
@@ -92,6 +92,11 @@ def test_a_check_changes_nothing_and_a_better_fit_has_less_error(sequence):
     state.iteration = CHECK_EVERY
     poor = coarse_start.fit_error(state, constants, frames)
     assert not coarse_ends(state, start)
+    latest = start.constants.config.density.until
+    assert state.coarse_until == min(int(CHECK_EVERY * (poor / start.lacking) ** 2), latest) > CHECK_EVERY
+    assert expected_end(100, 2 * start.lacking, start) == min(400, latest)
+    assert expected_end(100, 0.5 * start.lacking, start) == min(100, latest)
+    assert expected_end(100, 0.5, start._replace(lacking=0.0)) == latest
     assert all(np.array_equal(a, before[name]) for name, a in arrays(state.gaussians).items())
     assert state.rng.bit_generator.state == generator
     state.iteration = 0

@@ -53,7 +53,19 @@ def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
         return True
     if state.iteration == 0 or state.iteration % CHECK_EVERY:
         return False
-    return fit_error(state, coarse.constants, coarse.frames) < coarse.lacking  # (20.5)
+    error = fit_error(state, coarse.constants, coarse.frames)
+    state.coarse_until = expected_end(state.iteration, error, coarse)
+    return error < coarse.lacking  # (20.5)
+
+
+def expected_end(iteration: int, error: float, coarse: CoarseStart) -> int:
+    """The iteration at which the fit error will have fallen to d, as a forecast of time needs it.
+
+    The error is taken to fall with the root of the iterations, as it did on the three clips that were tried.
+    """
+    latest = coarse.constants.config.density.until
+    ratio = error / coarse.lacking if coarse.lacking > 0 else np.inf
+    return int(min(iteration * max(ratio, 1.0) ** 2, latest))
 
 
 def fit_error(state: TrainingState, constants: TrainingConstants, frames: NDArray[np.intp]) -> float:

@@ -50,6 +50,7 @@ class TrainingState:
     frames: FrameParameters | None = None  # frame parameters; None if the model has none
     ahead: OffsetsAhead | None = None  # computed with the update of the FDM; not part of a checkpoint
     coarse: bool = False  # the next iteration is compared with frames of half size
+    coarse_until: int = 0  # the expected last iteration of that; 0 = unknown; not stored
     drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint stores the generator before the draw
     making: Making = NOTHING_MADE  # the work on targets at this size of the frames; not part of a checkpoint
 

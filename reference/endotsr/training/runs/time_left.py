@@ -66,7 +66,7 @@ class TimeLeft:
         if made.gaps:
             each = (made.waited + made.beside) / made.gaps
         end = config.training.iterations
-        until = min(config.density.until, end) if standing.coarse else end
+        until = min(standing.coarse_until or config.density.until, end) if standing.coarse else end
         missing = max(frames.gaps - made.gaps, 0) * visited(config, frames.gaps, until - standing.iteration)
         if standing.coarse:
             missing += 4 * frames.gaps * visited(config, frames.gaps, end - until)

@@ -58,6 +58,7 @@ class Standing(NamedTuple):
     iteration: int  # completed
     gaussians: int
     coarse: bool = False  # the next iteration uses frames of half size
+    coarse_until: int = 0  # and later ones, to this iteration; 0: to `density.until`
 
 
 def at_start(config: Config) -> Standing:
@@ -89,10 +90,10 @@ def work_left(config: Config, pixels: int, at: Standing) -> float:
 
     pixels   of a frame of full size
 
-    A coarse start is assumed to last until `density.until`.
+    Without a forecast of its end, a coarse start is assumed to last until `density.until`.
     """
     later = np.arange(at.iteration + 1, config.training.iterations + 1)
-    seen = np.where(at.coarse & (later <= max(config.density.until, 1)), pixels / 4, pixels)
+    seen = np.where(at.coarse & (later <= (at.coarse_until or max(config.density.until, 1))), pixels / 4, pixels)
     counts = expected_gaussians(config, at, later)
     return float(np.sum(iteration_work(counts, seen, later / config.training.iterations)))
 
