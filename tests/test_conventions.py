@@ -22,7 +22,9 @@ CONTRACTING = {  # the fast compositing, and the peak of the machine beside it
     *("method/splatting/fast/blocks.py", "method/splatting/fast/tiles.py"),
     "studies/bench/peaks.py",
 }
-PEERS = [ROOT / "docs" / "pages" / "bench" / name for name in ("gsplat.py", "peers.py")]  # another program beside ours
+PEERS = [  # another program beside ours
+    ROOT / "docs" / "pages" / name for name in ("bench/gsplat.py", "bench/peers.py", "full_size/network.py")
+]
 
 # Pieces of the method that tests reach beside its public functions: compiled code that no argument selects.
 PIECES = {

