@@ -177,7 +177,9 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 #         return True
 #     if state.iteration == 0 or state.iteration % CHECK_EVERY:
 #         return False
-#     return fit_error(state, coarse.constants, coarse.frames) < coarse.lacking  # (20.5)
+#     error = fit_error(state, coarse.constants, coarse.frames)
+#     state.coarse_until = expected_end(state.iteration, error, coarse)
+#     return error < coarse.lacking  # (20.5)
 # ```
 #
 # <!-- definition: endotsr.training.fitting.coarse_start.fit_error -->
