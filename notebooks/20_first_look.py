@@ -172,7 +172,7 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # <!-- definition: endotsr.training.fitting.coarse_start.coarse_ends -->
 # ```python
 # def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
-#     """Whether the coarse start ends before the next iteration; checked every CHECK_EVERY iterations."""
+#     """Whether the coarse start ends before the next iteration; a check also sets `state.coarse_until`."""
 #     if state.iteration >= coarse.constants.config.density.until:
 #         return True
 #     if state.iteration == 0 or state.iteration % CHECK_EVERY:

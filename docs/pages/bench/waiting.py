@@ -4,8 +4,8 @@
 
 `endotsr train` runs on each clip in this process, with its evaluation. The first clip is forecast at the assumed speed
 of a machine, the next ones at the speed of the training before. Without --wall every time is processor time of one
-thread, which other work on the machine hardly changes; set OPENBLAS_NUM_THREADS=1 for it. The renders for the curve are
-no part of any time.
+thread, which other work on the machine changes less than the time on the wall; set OPENBLAS_NUM_THREADS=1 for it. The
+renders for the curve are no part of any time.
 """
 
 import argparse
@@ -82,8 +82,7 @@ class Heard:
         with self.watch.excluded():
             state, plan = shown._training, shown._plan
             assert state is not None
-            at = Standing(entry["iteration"], entry["gaussians"], state.coarse, state.coarse_until)
-            now = self.watch.now()
+            at, now = shown.standing(entry), self.watch.now()
             self.trained = now
             left, unit = shown.time_left.seconds(at), shown.time_left.unit
             if left is not None and unit is not None and shown._done >= progress.FORECAST_AFTER:

@@ -10,11 +10,13 @@ The table is in docs/results/README.md between its marks, and the headline of RE
 # pyright: reportTypedDictNotRequiredAccess=false
 
 import argparse
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import endotsr
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.results.evaluation.baselines import RenderFrame
 from endotsr.results.evaluation.evaluate import EVERY_BASELINE, evaluate_frames
 from endotsr.results.evaluation.lpips import load_lpips_weights
@@ -36,12 +38,18 @@ COLUMNS = (("psnr_full", 2), ("psnr_tissue", 2), ("ssim_full", 4), ("lpips", 4))
 HEADS = ("PSNR full, dB", "PSNR tissue, dB", "SSIM full", "LPIPS [0,1]")
 
 
-def of_split(folder: str, split: str, weights: Any) -> dict[str, Any]:
-    """Baseline -> metric -> value of every held-out frame of a split."""
+def plain_renders(sequence: Sequence) -> dict[str, RenderFrame]:
+    """The predictions without a model."""
+    return {name: EVERY_BASELINE[name][1](sequence) for name in NAMES}
+
+
+def of_split(
+    folder: str, split: str, weights: Any, renders: Callable[[Sequence], dict[str, RenderFrame]]
+) -> dict[str, Any]:
+    """Prediction -> metric -> value of every held-out frame of a split."""
     sequence = endotsr.load_sequence(folder, **SPLITS[split])
     rows = {}
-    for name in NAMES:
-        render: RenderFrame = EVERY_BASELINE[name][1](sequence)
+    for name, render in renders(sequence).items():
         frames = evaluate_frames(sequence, sequence.test_index, render, weights)["per_frame"]
         rows[name] = {key: [row[key] for row in frames] for key, _ in COLUMNS}
     return {"frames": [int(i) for i in sequence.test_index], "baselines": rows}
@@ -74,16 +82,19 @@ def frames_text(frames: tuple[int, ...]) -> str:
     return f"frame{'s' * (len(frames) > 1)} {' and '.join(map(str, frames))}"
 
 
+def held_out_text(clip: str, split: str, part: dict[str, Any], without: tuple[int, ...]) -> str:
+    """The first head of a table: clip, split and number of frames."""
+    brackets = f"; in brackets without {frames_text(without)}" if without else ""
+    return f"{clip}, {split} held out ({len(part['frames'])} frames{brackets})"
+
+
 def table(result: dict[str, Any]) -> str:
     """One table for each clip and split."""
     parts = []
     for clip, splits in result["clips"].items():
         for split, part in splits.items():
             without = tuple(k for k in LEFT_OUT.get(clip, ()) if k in part["frames"])
-            frames = f"{len(part['frames'])} frames" + (
-                f"; in brackets without {frames_text(without)}" if without else ""
-            )
-            head = (f"{clip}, {split} held out ({frames})", *HEADS)
+            head = (held_out_text(clip, split, part, without), *HEADS)
             parts.append(markdown(head, [row(part, name, without) for name in NAMES]))
     note = "± is a 95 % interval over the frames, as if they were independent. "
     note += "The first three rows read every pixel of the other frames, instruments included."
@@ -92,15 +103,15 @@ def table(result: dict[str, Any]) -> str:
     return "\n\n".join([*parts, f"{where(result)}. {note}"])
 
 
-def measured(options: argparse.Namespace) -> dict[str, Any]:
+def measured(
+    options: argparse.Namespace, renders: Callable[[Sequence], dict[str, RenderFrame]] = plain_renders
+) -> dict[str, Any]:
     """The record with the splits of one clip measured."""
     weights = load_lpips_weights(options.lpips)
     clips = loaded(options.record)["clips"] if options.record.exists() else {}
-    made = {split: of_split(str(options.clip), split, weights) for split in options.splits}
+    made = {split: of_split(str(options.clip), split, weights, renders) for split in options.splits}
     return {"clips": clips | {options.clip.name: clips.get(options.clip.name, {}) | made}}
 
 
-PROGRAM = Program(
-    __name__, "results/README.md", {"table": table}, "interpolation.json", measured,
-    {"clip": CLIP, "--lpips": LPIPS, "--splits": {"nargs": "+", "choices": SPLITS, "default": list(SPLITS)}},
-)  # fmt: skip
+OPTIONS = {"clip": CLIP, "--lpips": LPIPS, "--splits": {"nargs": "+", "choices": SPLITS, "default": list(SPLITS)}}
+PROGRAM = Program(__name__, "results/README.md", {"table": table}, "interpolation.json", measured, OPTIONS)

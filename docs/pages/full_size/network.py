@@ -20,22 +20,15 @@ import types
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-import endotsr
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
-from endotsr.results.evaluation.baselines import RenderFrame, neighbours, unit_image
-from endotsr.results.evaluation.evaluate import evaluate_frames
-from endotsr.results.evaluation.lpips import load_lpips_weights
+from endotsr.results.evaluation.baselines import RenderFrame, neighbours, unit, unit_image
 from endotsr.results.evaluation.tissue_baselines import filled_picture
 from endotsr.results.report.tables import markdown
 from pages.full_size import interpolation
-from pages.full_size.interpolation import LEFT_OUT, SPLITS, frames_text, mean
-from pages.store.commands import loaded
+from pages.full_size.interpolation import LEFT_OUT, SPLITS, held_out_text, mean
 from pages.store.intervals import interval
-from pages.store.program import CLIP, LPIPS, Program
+from pages.store.program import Program
 from pages.store.tables import where
 
 WEIGHTS = "b234ad8d0acfcb6d9eaf2791eb7ddebdaab58bd862b229c703f8073e56d99c29"  # SHA-256 of flownet.pkl
@@ -79,11 +72,6 @@ class Network:
         return merged[3][0, :, :height, :width].numpy()
 
 
-def unit(picture: NDArray[np.uint8]) -> FloatArray:
-    """A picture as float32 in [0, 1]."""
-    return picture.astype(np.float32) / np.float32(255)
-
-
 def renders(network: Network, sequence: Sequence) -> dict[str, RenderFrame]:
     """The two predictions of a frame: from whole pictures, and from filled ones."""
 
@@ -94,16 +82,6 @@ def renders(network: Network, sequence: Sequence) -> dict[str, RenderFrame]:
         return network.between(pair[0], pair[1], near.fraction)
 
     return {"network": lambda i: render(i, False), "network_tissue": lambda i: render(i, True)}
-
-
-def of_split(network: Network, folder: str, split: str, weights: Any) -> dict[str, Any]:
-    """Baseline -> metric -> value of every held-out frame of a split."""
-    sequence = endotsr.load_sequence(folder, **SPLITS[split])
-    rows = {}
-    for name, render in renders(network, sequence).items():
-        frames = evaluate_frames(sequence, sequence.test_index, render, weights)["per_frame"]
-        rows[name] = {key: [row[key] for row in frames] for key, _ in interpolation.COLUMNS}
-    return {"frames": [int(i) for i in sequence.test_index], "baselines": rows}
 
 
 def row(label: str, part: dict[str, Any], other: dict[str, Any], name: str, without: tuple[int, ...]) -> list[str]:
@@ -127,9 +105,7 @@ def table(result: dict[str, Any]) -> str:
             part, other = splits[split], beside[clip][split]
             assert part["frames"] == other["frames"], f"{clip}, {split}: the records hold different frames"
             without = tuple(k for k in LEFT_OUT.get(clip, ()) if k in part["frames"])
-            count = f"{len(part['frames'])} frames"
-            count += f"; in brackets without {frames_text(without)}" if without else ""
-            head = (f"{clip}, {split} held out ({count})", *COLUMNS)
+            head = (held_out_text(clip, split, part, without), *COLUMNS)
             rows = [row(BESIDE[name], other, other, name, without) for name in BESIDE]
             rows += [row(NAMES[name], part, other, name, without) for name in NAMES]
             parts.append(markdown(head, rows))
@@ -144,14 +120,9 @@ def table(result: dict[str, Any]) -> str:
 
 def measured(options: argparse.Namespace) -> dict[str, Any]:
     """The record with the splits of one clip measured."""
-    network, weights = Network(), load_lpips_weights(options.lpips)
-    clips = loaded(options.record)["clips"] if options.record.exists() else {}
-    made = {split: of_split(network, str(options.clip), split, weights) for split in options.splits}
-    clips |= {options.clip.name: clips.get(options.clip.name, {}) | made}
-    return {"clips": clips, "torch": network.torch.__version__}
+    network = Network()
+    made = interpolation.measured(options, lambda sequence: renders(network, sequence))
+    return made | {"torch": network.torch.__version__}
 
 
-PROGRAM = Program(
-    __name__, "results/README.md", {"table": table}, "network.json", measured,
-    {"clip": CLIP, "--lpips": LPIPS, "--splits": {"nargs": "+", "choices": SPLITS, "default": list(SPLITS)}},
-)  # fmt: skip
+PROGRAM = Program(__name__, "results/README.md", {"table": table}, "network.json", measured, interpolation.OPTIONS)

@@ -101,11 +101,7 @@ class Program:
     def _parser(self, about: str) -> argparse.ArgumentParser:
         parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
         for name, value in self.options.items():
-            usual = (
-                {"default": value, "type": type(value)}
-                if not isinstance(value, Path)
-                else {"default": value, "type": Path}
-            )
+            usual = {"default": value, "type": Path if isinstance(value, Path) else type(value)}
             parser.add_argument(name, **(value if isinstance(value, dict) else usual))
         if self.record:
             parser.add_argument("--record", type=Path, default=self.file, metavar="FILE", help="in place of the record")

@@ -16,6 +16,7 @@ KINDS = {
     "0 and 1 as float32": TOOL.astype(np.float32),
     "int64": TOOL.astype(np.int64),
     "a channel axis": TOOL[:, None],
+    "0 and 40": TOOL.astype(np.uint8) * 40,
     "16 bits": TOOL.astype(np.uint16) * 65535,
 }
 
@@ -67,12 +68,13 @@ def test_one_file_a_frame_and_one_for_all(tmp_path, capsys):
     [
         (TOOL * 0.7, "holds 0.7; allowed: whole numbers from 0 to 65535, or True and False; a threshold makes a mask"),
         (TOOL * -1, "holds -1; allowed"),
+        (TOOL * 70_000, "holds 70000; allowed"),
         (np.where(TOOL, np.nan, 0), "holds nan; allowed"),
         (TOOL[:, :, :20], "20x24"),
         (TOOL[:4], "1 of 5 frames have no mask"),
         (TOOL[..., None].repeat(4, axis=3), "allowed: one array of real numbers, (frames, height, width)"),
     ],
-    ids=["probabilities", "negative", "NaN", "another shape", "too few frames", "colours"],
+    ids=["probabilities", "negative", "too large", "NaN", "another shape", "too few frames", "colours"],
 )
 def test_what_is_no_mask_of_this_clip_is_refused(tmp_path, capsys, array, said):
     np.save(tmp_path / "m.npy", array)

@@ -33,6 +33,14 @@ def test_masks_that_exclude_nothing_give_no_evidence():
     assert empty.note("white") == "masks: white = excluded: 100.0% of the pixels are tissue"
 
 
+def test_the_printed_share_of_tissue_counts_every_pixel():
+    tissue = np.ones((8, 8), bool)
+    tissue[1::4] = False  # rows that the evidence does not sample
+    masks = MaskEvidence()
+    masks.add(np.zeros((8, 8, 3), np.uint8), tissue, None)
+    assert masks.note("white") == "masks: white = excluded: 75.0% of the pixels are tissue"
+
+
 def sampled(clip, masks, count):
     """Pictures, tissue masks and depth of some frames."""
     folder = data_folder(clip)

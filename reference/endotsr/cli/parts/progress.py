@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 QUIET_SECONDS = 30.0  # between lines if standard error is no terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the postfix contains the time left
-FORECAST_AFTER = 60  # iterations of this process; the first check of a coarse start, after 50, tells when it ends
+FORECAST_AFTER = 60  # iterations of this process; a coarse start is first checked after 50
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR: every tenth iteration)
 
 
@@ -65,7 +65,7 @@ class Progress:
                 self._means[name] = value if mean is None else memory * mean + (1 - memory) * value
         now, state = time.monotonic(), self._training
         assert state is not None
-        standing = Standing(entry["iteration"], entry.get("gaussians", 0), state.coarse, state.coarse_until)
+        standing = self.standing(entry)
         self.time_left.add(standing, now - self._ended, state.making)
         self._ended, self._done = now, self._done + 1
         if self._page is not None:
@@ -83,6 +83,12 @@ class Progress:
                 file=sys.stderr,
                 flush=True,
             )
+
+    def standing(self, entry: LogEntry) -> Standing:
+        """The progress of the training after the iteration of a log entry."""
+        state = self._training
+        assert state is not None
+        return Standing(entry["iteration"], entry.get("gaussians", 0), state.coarse, state.coarse_until)
 
     def remember_speed(self) -> None:
         """Store the speed of this machine for later forecasts, if the training was long enough to tell."""

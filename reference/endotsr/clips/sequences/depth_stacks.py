@@ -21,11 +21,14 @@ MATLAB = ".mat"  # one frame: MATLAB stores frames last, and others first
 ONE = "allowed: one array of real numbers, (frames, height, width) for a clip or (height, width) for a frame"
 
 
-def stack_planes(path: Path) -> list[Path] | None:
-    """The names of the planes of a file that holds those of a clip; None for any other path. Raises InputError."""
+def stack_planes(path: Path, kinds: str = "fiu") -> list[Path] | None:
+    """The names of the planes of a file that holds those of a clip; None for any other path. Raises InputError.
+
+    kinds    as in `array_of`
+    """
     if path.suffix.lower() not in ENDINGS or not path.is_file():
         return None
-    array = array_of(path)
+    array = array_of(path, kinds)
     return [path / f"{k:06d}" for k in range(len(array))] if array.ndim == 3 else None
 
 

@@ -11,20 +11,12 @@ from numpy.typing import NDArray
 from endotsr.clips.sequences.depth_stacks import ENDINGS, array_of
 from endotsr.errors import InputError
 
-KINDS = "biuf"
+KINDS = "biuf"  # of numbers, as NumPy names them: truth values are masks too
 LARGEST = np.iinfo(np.uint16).max
 
 
-def mask_stack(path: Path) -> list[Path] | None:
-    """The names of the planes of a file that holds those of a clip; None for any other path. Raises InputError."""
-    if path.suffix.lower() not in ENDINGS or not path.is_file():
-        return None
-    array = array_of(path, KINDS)
-    return [path / f"{k:06d}" for k in range(len(array))] if array.ndim == 3 else None
-
-
 def in_array(path: Path) -> bool:
-    """Whether this is a NumPy file, or a name of `mask_stack`."""
+    """Whether this is a NumPy file, or a name of `stack_planes`."""
     return path.suffix.lower() in ENDINGS or (path.parent.suffix.lower() in ENDINGS and path.parent.is_file())
 
 
@@ -44,4 +36,4 @@ def array_plane(path: Path) -> NDArray:
             f"{path}: holds {plane[wrong][0]:g}; allowed: whole numbers from 0 to {LARGEST}, or True and False;"
             f' a threshold makes a mask: numpy.save("{file.stem}.npy", array > 0.5)'
         )
-    return plane.astype(np.uint16 if array.dtype.itemsize > 1 and array.max() > 255 else np.uint8)
+    return plane.astype(np.uint8 if array.dtype.itemsize == 1 else np.uint16)

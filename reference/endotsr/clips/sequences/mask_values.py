@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.depth_stacks import ENDINGS
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 
@@ -86,7 +87,7 @@ def levels_of(values: Iterable[int], where: object, coded: bool = False) -> Mask
 
 def is_coded(file: Path) -> bool:
     """Whether a mask is stored with loss: a JPEG, or a picture of a video (`FILE/000003`)."""
-    in_array = file.parent.suffix.lower() in (".npy", ".npz")
+    in_array = file.parent.suffix.lower() in ENDINGS
     return file.suffix.lower() in (".jpg", ".jpeg") or not (file.suffix or in_array)
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.clip import grey_plane
-from endotsr.clips.sequences.depth_stacks import ENDINGS
-from endotsr.clips.sequences.mask_arrays import array_plane, in_array, mask_stack
+from endotsr.clips.sequences.depth_stacks import ENDINGS, stack_planes
+from endotsr.clips.sequences.mask_arrays import KINDS, array_plane, in_array
 from endotsr.clips.sequences.mask_values import LEAST_WHITE, OBJECTS
 from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
@@ -24,7 +24,7 @@ MOST_BYTES = 1 << 31  # of the planes of a video that are held
 def mask_files(path: Path) -> list[Path] | None:
     """The names of the planes of a video or an array of masks; None for any other path. Raises InputError."""
     if path.suffix.lower() in ENDINGS:
-        return mask_stack(path)
+        return stack_planes(path, KINDS)
     if (path.is_file() and path.suffix.lower() in (".png", ".webp")) or not is_video(path):
         return None
     facts = video_facts(path)

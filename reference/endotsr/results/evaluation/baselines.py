@@ -19,6 +19,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
@@ -60,9 +61,14 @@ def neighbours(sequence: Sequence, index: int) -> Neighbours:
     return Neighbours(before, after, fraction)
 
 
+def unit(picture: NDArray[np.uint8]) -> FloatArray:
+    """A picture as float32 in display units [0, 1]."""
+    return picture.astype(np.float32) / np.float32(255)
+
+
 def unit_image(sequence: Sequence, index: int) -> FloatArray:
     """Frame `index` as float32, (3, H, W), display units [0, 1], no mask applied."""
-    return sequence.images[index].astype(np.float32) / np.float32(255)
+    return unit(sequence.images[index])
 
 
 def temporal_mean(sequence: Sequence) -> FloatArray:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
-from endotsr.results.evaluation.baselines import MakeRenderer, neighbours, unit_image
+from endotsr.results.evaluation.baselines import MakeRenderer, neighbours, unit, unit_image
 
 WHOLE = 0.999  # bilinear weight of tissue above which all four pixels are tissue, as in `between`
 
@@ -78,7 +78,7 @@ def flow_tissue(sequence: Sequence, index: int) -> FloatArray:
     a, b = filled_picture(sequence, near.before), filled_picture(sequence, near.after)
     places = (dense_flow(a, b) * np.float32(-near.fraction), dense_flow(b, a) * np.float32(near.fraction - 1.0))
     # The filled pictures are warped: in the given ones, a bilinear weight below 1 - WHOLE would read an excluded pixel.
-    pair = np.stack([warp_bilinear(_unit(picture), place) for picture, place in zip((a, b), places)])
+    pair = np.stack([warp_bilinear(unit(picture), place) for picture, place in zip((a, b), places)])
     masks = (sequence.masks[k].astype(np.float32) for k in (near.before, near.after))
     tissue = [warp_bilinear(mask, place) for mask, place in zip(masks, places)]
     return _blended(pair, np.stack(tissue) > WHOLE, near.fraction, _rest(sequence, index))
@@ -86,11 +86,7 @@ def flow_tissue(sequence: Sequence, index: int) -> FloatArray:
 
 def _rest(sequence: Sequence, index: int) -> FloatArray:
     """`nearest_tissue` at the time of a frame, (3, H, W) float32 in [0, 1]."""
-    return _unit(nearest_tissue(sequence, float(sequence.times[index])))
-
-
-def _unit(picture: NDArray[np.uint8]) -> FloatArray:
-    return picture.astype(np.float32) / np.float32(255)
+    return unit(nearest_tissue(sequence, float(sequence.times[index])))
 
 
 def _blended(pair: FloatArray, usable: BoolArray, fraction: float, rest: FloatArray) -> FloatArray:

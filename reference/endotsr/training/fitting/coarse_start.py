@@ -48,7 +48,7 @@ def coarse_config(config: Config) -> Config:
 
 
 def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
-    """Whether the coarse start ends before the next iteration; checked every CHECK_EVERY iterations."""
+    """Whether the coarse start ends before the next iteration; a check also sets `state.coarse_until`."""
     if state.iteration >= coarse.constants.config.density.until:
         return True
     if state.iteration == 0 or state.iteration % CHECK_EVERY:
@@ -61,7 +61,7 @@ def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
 def expected_end(iteration: int, error: float, coarse: CoarseStart) -> int:
     """The iteration at which the fit error will have fallen to d, as a forecast of time needs it.
 
-    The error is taken to fall with the root of the iterations, as it did on the three clips that were tried.
+    A rule of thumb: the error is taken to fall with the root of the iterations.
     """
     latest = coarse.constants.config.density.until
     ratio = error / coarse.lacking if coarse.lacking > 0 else np.inf

@@ -12,6 +12,7 @@ from endotsr.clips.sequences.checks.duration import (
     PIXELS,
     Standing,
     TimedCommand,
+    coarse_end,
     gap_units,
     iteration_work,
     visited,
@@ -66,7 +67,7 @@ class TimeLeft:
         if made.gaps:
             each = (made.waited + made.beside) / made.gaps
         end = config.training.iterations
-        until = min(standing.coarse_until or config.density.until, end) if standing.coarse else end
+        until = min(coarse_end(config, standing), end) if standing.coarse else end
         missing = max(frames.gaps - made.gaps, 0) * visited(config, frames.gaps, until - standing.iteration)
         if standing.coarse:
             missing += 4 * frames.gaps * visited(config, frames.gaps, end - until)

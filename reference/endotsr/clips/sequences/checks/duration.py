@@ -67,6 +67,11 @@ def at_start(config: Config) -> Standing:
     return Standing(0, points, config.training.coarse_start)
 
 
+def coarse_end(config: Config, at: Standing) -> int:
+    """The iteration to which a coarse start is expected to last: by its forecast, or `density.until` without one."""
+    return at.coarse_until or config.density.until
+
+
 def iteration_work(gaussians: float | NDArray, pixels: float | NDArray, progress: float | NDArray) -> float | NDArray:
     """Work of one iteration; `progress` is the completed fraction of the run."""
     early = EARLY + (1 - EARLY) * np.minimum(progress / LATE_FROM, 1.0)
@@ -90,10 +95,10 @@ def work_left(config: Config, pixels: int, at: Standing) -> float:
 
     pixels   of a frame of full size
 
-    Without a forecast of its end, a coarse start is assumed to last until `density.until`.
+    A coarse start is assumed to last until `coarse_end`.
     """
     later = np.arange(at.iteration + 1, config.training.iterations + 1)
-    seen = np.where(at.coarse & (later <= (at.coarse_until or max(config.density.until, 1))), pixels / 4, pixels)
+    seen = np.where(at.coarse & (later <= max(coarse_end(config, at), 1)), pixels / 4, pixels)
     counts = expected_gaussians(config, at, later)
     return float(np.sum(iteration_work(counts, seen, later / config.training.iterations)))
 
