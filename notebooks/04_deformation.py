@@ -41,7 +41,7 @@ B, N = 17, 4
 # %% [markdown]
 # ## The equation
 #
-# $t$ is the time, normalised to $[0,1)$ over the clip. The indices are the channel $c$ (0 to 9), the basis $j$ (1 to
+# The time $t$ is normalised to $[0,1)$ over the clip. The indices are the channel $c$ (0 to 9), the basis $j$ (1 to
 # $B$) and the Gaussian $i$ (1 to $N$). For each of these $10BN$ bells there are a weight $w$, a centre $\theta$ and a
 # width $\sigma$. With $\Delta=t-\theta$ and $\Sigma=\sigma^2+10^{-4}$, element by element:
 #
@@ -61,9 +61,9 @@ B, N = 17, 4
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-# $\Delta\mu$ is the translation of component S, if it is active ({doc}`05_motion_and_prior`).
+# The term $\Delta\mu$ is the translation of component S, if it is active ({doc}`05_motion_and_prior`).
 #
-# `gaussian` is the textbook form of a bell. `quartic` is the form that the released code of Deform3DGS computes
+# The form `gaussian` is the textbook bell. The form `quartic` is what the released code of Deform3DGS computes
 # ({doc}`/references`): it squares $\Delta^2/\Sigma$ where a Gaussian would halve it. The code gives no reason. The
 # preset `paper` follows it.
 #
@@ -177,10 +177,10 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# $g_x$ is the gradient of the loss with respect to $x$ and has the shape of $x$. The stages after this one give
+# We write $g_x$ for the gradient of the loss with respect to $x$; it has the shape of $x$. The stages after this one give
 # $g_\psi$ for each channel and Gaussian. We need the gradients with respect to weight, centre, width and time.
 #
-# **(4.1) The sum.** $\psi=\sum_jw_je_j$ is linear in the weights and in the values of the bases. So $g_w=e\,g_\psi$ and
+# **(4.1) The sum.** The sum $\psi=\sum_jw_je_j$ is linear in the weights and in the values of the bases. So $g_w=e\,g_\psi$ and
 # $g_e=w\,g_\psi$.
 #
 # **(4.2) The exponential.** Let $E$ be the exponent, $e=\exp(-E)$. Then $\mathrm de=-e\,\mathrm dE$, and
@@ -190,16 +190,16 @@ plt.show()
 # fixed, $\mathrm dE=2u\,\mathrm du=2u\cdot2\Delta/\Sigma\,\mathrm d\Delta$, so $\partial E/\partial\Delta=4\Delta^3/\Sigma^2$. For
 # `gaussian`, $E=\Delta^2/(2\Sigma)$ and $\partial E/\partial\Delta=\Delta/\Sigma$.
 #
-# **(4.4) The exponent as a function of $\sigma$.** $\Sigma=\sigma^2+10^{-4}$ gives $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. With
-# $\Delta$ held fixed, $\mathrm du=-u/\Sigma\,\mathrm d\Sigma$. For `quartic`,
+# **(4.4) The exponent as a function of $\sigma$.** From $\Sigma=\sigma^2+10^{-4}$ follows
+# $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. With $\Delta$ held fixed, $\mathrm du=-u/\Sigma\,\mathrm d\Sigma$. For `quartic`,
 # $\partial E/\partial\sigma=2u\cdot(-u/\Sigma)\cdot2\sigma=-4\Delta^4\sigma/\Sigma^3$. For `gaussian`,
 # $\partial E/\partial\sigma=-\Delta^2\sigma/\Sigma^2$.
 #
-# **(4.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. This sign cancels the sign of (4.2), so
+# **(4.5) Centre and width.** From $\Delta=t-\theta$ follows $\mathrm d\Delta=-\mathrm d\theta$. This sign cancels the sign of (4.2), so
 # $g_\theta=-g_E\,\partial E/\partial\Delta$ has the sign of $w\,g_\psi$ for a basis with its centre before $t$, and the
 # opposite sign for one with its centre after $t$. The signs of (4.2) and (4.4) cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
 #
-# **(4.6) Time.** $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases
+# **(4.6) Time.** The time $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases
 # and Gaussians.
 #
 # $$

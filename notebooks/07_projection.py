@@ -73,10 +73,10 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 # The symbols, in the order of the lines:
 #
 # - The rotation $W$ and the translation $\mathbf d$ take a point from the world to the camera, which looks along its $z$
-#   axis. $f_x,f_y$ are the focal lengths in pixels and $(c_x,c_y)$ is the principal point. $W_{px}$ and $H_{px}$ are the
-#   width and height of the image.
+#   axis. The focal lengths in pixels are $f_x,f_y$, the principal point is $(c_x,c_y)$, and the image is $W_{px}$ wide
+#   and $H_{px}$ high.
 # - $J$ is the derivative of $(u,v)$ with respect to $(x,y,z)$: how far the pixel moves when the point moves a little. It
-#   contains the slopes $x/z$ and $y/z$. $x',y'$ are the coordinates with the slopes clamped to $\pm L_x$ and $\pm L_y$.
+#   contains the slopes $x/z$ and $y/z$. In $x',y'$ the slopes are clamped to $\pm L_x$ and $\pm L_y$.
 # - A small displacement of the world moves the pixel by $JW$ times that displacement, and the covariance of the Gaussian
 #   is $R\,\mathrm{diag}(S)^2R^\top$. The covariance on the screen is therefore $JW\,R\,\mathrm{diag}(S)^2R^\top\,(JW)^\top$,
 #   the last line with $T=JWR$.
@@ -259,17 +259,17 @@ plt.show()
 # last line of the equation upward.
 #
 # **(7.1) The three numbers as a matrix.** A matrix of gradients $G_2$ must give the same change of the loss as the three
-# numbers, $g_a\,\mathrm da+g_b\,\mathrm db+g_c\,\mathrm dc=\langle G_2,\mathrm d\Sigma_2\rangle$. $b$ stands in two entries
+# numbers, $g_a\,\mathrm da+g_b\,\mathrm db+g_c\,\mathrm dc=\langle G_2,\mathrm d\Sigma_2\rangle$. The number $b$ stands in two entries
 # of the symmetric matrix $\Sigma_2$, so each of the two takes half of its gradient:
 # $G_2=\begin{bmatrix}g_a&g_b/2\\g_b/2&g_c\end{bmatrix}$.
 #
 # **(7.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (6.1), and
 # because $G_2$ is symmetric, $g_M=2\,G_2M$. The low-pass is a constant and drops out.
 #
-# **(7.3) Its factors.** $M_{rk}=T_{rk}S_k$ gives $g_{S_k}=\sum_rT_{rk}\,g_{M_{rk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
+# **(7.3) Its factors.** The product $M_{rk}=T_{rk}S_k$ gives $g_{S_k}=\sum_rT_{rk}\,g_{M_{rk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
 # (6.2). The definition goes through $\Sigma$ and reaches the same $g_S$ and $g_R$.
 #
-# **(7.4) The three matrices.** $T=JWR$ gives $\mathrm dT=\mathrm dJ\,WR+J\,\mathrm dW\,R+JW\,\mathrm dR$. A factor to the
+# **(7.4) The three matrices.** The product $T=JWR$ gives $\mathrm dT=\mathrm dJ\,WR+J\,\mathrm dW\,R+JW\,\mathrm dR$. A factor to the
 # left of the differential moves to the left of $g_T$, transposed; a factor to the right moves to the right:
 # $g_J=g_T(WR)^\top$, $g_R=(JW)^\top g_T$, and $g_W$ receives $J^\top g_TR^\top$.
 #
@@ -280,7 +280,7 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(7.5) The footprint.** $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer of {doc}`09_compositing`
+# **(7.5) The footprint.** The gradients $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer of {doc}`09_compositing`
 # does not use $a,b,c$ but three other numbers, the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$, and returns their
 # gradients $g_A,g_m,g_r$. From them one can go directly to $S$ and $T$, without $g_a,g_b,g_c$ as numbers. This takes
 # four steps. (A first reading can skip them: (7.2) and (7.3) give the same gradients in float64.)
@@ -302,7 +302,7 @@ plt.show()
 # $g_bt_{0k}+2g_ct_{1k}=2A^2m\,g_A\,e_k+r\,g_m\,(t_{0k}-2m\,t_{1k})-2r^2g_r\,t_{1k}$, where
 # $t_{0k}-2m\,t_{1k}=e_k-m\,t_{1k}$.
 #
-# *$e_k$ itself.* $t_{0k}-m\,t_{1k}$ is a difference too. With $m=b/c$ it is $r\,(c\,t_{0k}-b\,t_{1k})$. Insert $b$ and
+# *$e_k$ itself.* The expression $t_{0k}-m\,t_{1k}$ is a difference too. With $m=b/c$ it is $r\,(c\,t_{0k}-b\,t_{1k})$. Insert $b$ and
 # $c$ as sums over $l$: the low-pass contributes $\varepsilon t_{0k}$, and each $l$ contributes
 # $S_l^2\,(t_{1l}^2t_{0k}-t_{0l}t_{1l}t_{1k})=S_l^2\,t_{1l}\,(t_{0k}t_{1l}-t_{1k}t_{0l})$. The term $l=k$ is exactly 0.
 # The brackets are the minors of the determinant above.
@@ -323,14 +323,14 @@ plt.show()
 # **(7.7) The clamp.** $x'=z\,\mathrm{clip}(x/z)$. Where the clip is not active, $x'=x$ and $g_{x'}$ goes to $x$. Where
 # it is active, $x'=\pm zL_x$ does not depend on $x$ but does depend on $z$: $\partial x'/\partial z=\pm L_x=x'/z$.
 #
-# **(7.8) Screen position.** $u=f_xx/z+c_x$ gives $\mathrm du=\frac{f_x}z\mathrm dx-\frac{f_xx}{z^2}\mathrm dz$, and in the
+# **(7.8) Screen position.** The pixel $u=f_xx/z+c_x$ gives $\mathrm du=\frac{f_x}z\mathrm dx-\frac{f_xx}{z^2}\mathrm dz$, and in the
 # same way for $v$.
 #
 # **(7.9) The depth in $J$.** With $x'$ held fixed, $\partial J_{00}/\partial z=-f_x/z^2$ and
 # $\partial J_{02}/\partial z=2f_xx'/z^3$. The definition keeps the slope $x'/z$ fixed instead: $J_{02}=-f_x(x'/z)/z$ then
 # has a single $1/z$, and the rest is the term of (7.7).
 #
-# **(7.10) Into the world.** $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
+# **(7.10) Into the world.** The point $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
 #
 #
 # $$
@@ -343,9 +343,9 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(7.11) The pose.** $(x,y,z)^\top=W\mu+\mathbf d$ also gives the gradient with respect to $\mathbf d$, and the
+# **(7.11) The pose.** The same point also gives the gradient with respect to $\mathbf d$, and the
 # second part of the one with respect to $W$; the first part is that of (7.4). Both are sums over all Gaussians.
-# $\mathbf o=-W^\top\mathbf d$ is the centre of the camera. Its gradient $g_{\mathbf o}$ comes from the viewing
+# The centre of the camera is $\mathbf o=-W^\top\mathbf d$. Its gradient $g_{\mathbf o}$ comes from the viewing
 # directions of {doc}`08_harmonics` and is added there.
 #
 # $$
@@ -469,11 +469,11 @@ for name in ("position", "rotation", "scale"):
 #
 # A pose that was measured or estimated has small errors, and training can correct them. The correction of one view has
 # six numbers: a rotation vector $\boldsymbol\omega$, whose direction is the axis and whose length $r$ is the angle,
-# and an offset $\boldsymbol\tau$. $[\boldsymbol\omega]_\times$ is the matrix with $[\boldsymbol\omega]_\times\mathbf
+# and an offset $\boldsymbol\tau$. The matrix $[\boldsymbol\omega]_\times$ is the one with $[\boldsymbol\omega]_\times\mathbf
 # p=\boldsymbol\omega\times\mathbf p$, and $E$ is its exponential, a rotation. The view is rendered with $W'$ and
 # $\mathbf d'$, and the projection above returns the gradients with respect to them.
 #
-# **(7.12) The two products.** $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
+# **(7.12) The two products.** The products $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
 # $g_{\mathbf d}=E^\top g_{\mathbf d'}$, $g_{\boldsymbol\tau}=g_{\mathbf d'}$ and
 # $G=g_E=g_{W'}W^\top+g_{\mathbf d'}\mathbf d^\top$.
 #

@@ -3,7 +3,7 @@
     python docs/make.py bench measure [WHAT ...] [--scenes FILE ...] [--out FOLDER]
 
 on an otherwise idle machine: start, stages, peers and scaling, or the named measurements; `effects` belongs to
-docs/effects.md. They run one after the other, each in separate processes. The command `endotsr bench` only times the
+docs/effects.md. The stages of a machine without AVX-512 are a file of their own. They run one after the other, each in separate processes. The command `endotsr bench` only times the
 stages on this machine.
 """
 
@@ -14,6 +14,7 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.method.kernels.threads import use_threads
+from endotsr.method.kernels.vectors import REGISTER
 from endotsr.results.export.npz import read_arrays
 from endotsr.studies.bench import stages
 from endotsr.studies.bench.case import BenchCase, Precision, apart
@@ -30,6 +31,7 @@ FILES = {
     "start": "bench_start.json", "stages": "bench_stages.json", "peers": "bench_peers.json",
     "scaling": "scaling.json", "effects": "bench_effects.json",
 }  # fmt: skip
+AVX2 = "bench_stages_avx2.json"  # the stages of a machine without AVX-512
 USUAL = ("stages", "scaling", "peers", "start")  # of the page docs/bench.md; `effects` belongs to docs/effects.md
 SIZES, THREADS, REPEATS = (20_000, 60_000, 150_000), (1, 2), 11
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
@@ -80,12 +82,14 @@ def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Sa
                 raise
             say(f"peers not measured: {error}")
             continue
-        write_json(out / FILES[name], dated(result))
+        narrow = name == "stages" and REGISTER < 64
+        write_json(out / (AVX2 if narrow else FILES[name]), dated(result))
 
 
 def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
-    """The four measurements by name. Raises: InputError if a file is missing or cannot be read."""
-    return {name: read_json(folder / FILES[name], "python docs/make.py bench measure") for name in USUAL}
+    """The measurements by name. Raises: InputError if a file is missing or cannot be read."""
+    files = {name: FILES[name] for name in USUAL} | {"avx2": AVX2}
+    return {name: read_json(folder / file, "python docs/make.py bench measure") for name, file in files.items()}
 
 
 def read_runs() -> dict[str, dict[str, Any]]:
@@ -94,11 +98,12 @@ def read_runs() -> dict[str, dict[str, Any]]:
 
 
 def fragments(found: Mapping[str, dict[str, Any]], runs: Mapping[str, dict[str, Any]]) -> dict[str, str]:
-    """Every generated part by name, from the four measurements and the records of whole runs."""
+    """Every generated part by name, from the measurements and the records of whole runs."""
     return {
         "machine": parts.machine(found["stages"]),
         "targets": parts.targets(found["stages"], found["scaling"], found["peers"], found["start"], runs),
         "stages": parts.stages(found["stages"]),
+        "avx2": f"{parts.machine(found['avx2'])}\n\n{parts.stage_table(found['avx2'])}",
         "gain": parts.gain(found["stages"]),
         "cases": parts.cases(found["stages"]),
         "scaling": parts.scaling(found["scaling"]),

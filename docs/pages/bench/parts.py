@@ -82,7 +82,13 @@ def _target(target: Target) -> list[str]:
 
 
 def stages(found: Result) -> str:
-    """The picture, then every stage of the main case with its limit."""
+    """The picture, then the table of the stages."""
+    picture = "![Stacked bars: time of each stage of one training iteration](results/bench_stages.png)"
+    return f"{picture}\n\n{stage_table(found)}"
+
+
+def stage_table(found: Result) -> str:
+    """Every stage of the main case with its limit."""
     case = main_case(found)
     total, rows = case["iteration"]["median_ms"], []
     for name, spread in case["stages"].items():
@@ -95,8 +101,7 @@ def stages(found: Result) -> str:
         f"{dense['per_iteration_ms']:.2f} ms per iteration."
     )
     head = ["stage", "median, ms", "quartiles, ms", "fraction", "limit, ms", "of the limit", "bound by"]
-    picture = "![Stacked bars: time of each stage of one training iteration](results/bench_stages.png)"
-    return f"{picture}\n\n{markdown(head, rows)}\n\n{after}"
+    return f"{markdown(head, rows)}\n\n{after}"
 
 
 def _times(spread: Result) -> list[str]:

@@ -5,7 +5,7 @@
 `endotsr train` runs on each clip in this process, with its evaluation. The first clip is forecast at the assumed speed
 of a machine, the next ones at the speed of the training before. Without --wall every time is processor time of one
 thread, which other work on the machine changes less than the time on the wall; set OPENBLAS_NUM_THREADS=1 for it. The
-renders for the curve are no part of any time.
+renders for the curve are no part of any time. With an empty folder as NUMBA_CACHE_DIR the first training is a cold one.
 """
 
 import argparse
@@ -20,6 +20,7 @@ from unittest import mock
 
 from endotsr.cli.parts import progress, waiting
 from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
+from endotsr.method.kernels.vectors import REGISTER
 from endotsr.results.evaluation.metrics import psnr
 from endotsr.results.report import live_page
 from endotsr.results.report.live_page import LivePage
@@ -37,6 +38,7 @@ from pages.store.program import CLIPS, LPIPS, Program
 MARKS = 10  # renders of every held-out frame, evenly over the iterations
 MINUTE = 60.0
 KEYS = ("psnr_full", "psnr_tissue", "lpips")
+SAME = ("clip", "preset", "iterations", "seed", "clock", "cold", "register_bytes")  # a row replaces such a row
 
 
 class Watch:
@@ -136,6 +138,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "clip": clip.resolve().name, "frames": about["input"]["frames"],
         "size": f"{about['input']['width']}x{about['input']['height']}", "preset": about["settings"]["preset"],
         "seed": about["seed"], "threads": about["threads"], "clock": "wall" if wall else "processor",
+        "cold": not spoken.said["start"]["compiled"], "register_bytes": REGISTER,
         "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
         "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise,
         "forecast_after": progress.FORECAST_AFTER, "curve": spoken.curve,
@@ -154,7 +157,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as root:
         for clip in options.clips:
             row = heard(clip, words, options.wall, Path(root) / "speed.json")
-            found = with_row(options.record, row, ("clip", "preset", "iterations", "seed", "clock"))
+            found = with_row(options.record, row, SAME)
             write_json(options.record, found)
     return found
 

@@ -11,8 +11,9 @@ from pages.store.tables import noted, numbers
 PICTURE = RESULTS / "waiting.svg"
 QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
-CLOCKS = {"processor": "processor time of one thread", "wall": "time on the wall"}
+CLOCKS = {"processor": "processor time of one thread", "wall": "time of two threads on the clock"}
 FORMERLY = 30  # iterations before the forecast of rows that do not state it
+VECTORS = {64: "AVX-512", 32: "AVX2"}  # by the bytes of a register
 
 
 def told(row: dict[str, Any], when: str) -> str:
@@ -25,8 +26,10 @@ def told(row: dict[str, Any], when: str) -> str:
 
 
 def named(row: dict[str, Any]) -> str:
-    """Clip, preset and seed."""
-    return f"{row['clip']}, `{row['preset']}`, {row['iterations']} iterations, seed {row['seed']}"
+    """Clip, preset, seed, vectors of the processor, clock, and whether the kernels were compiled first."""
+    about = [row["clip"], f"`{row['preset']}`", f"{row['iterations']} iterations", f"seed {row['seed']}"]
+    about += [VECTORS[row["register_bytes"]]] + ["on the clock"] * (row["clock"] == "wall")
+    return ", ".join(about + ["with compilation"] * row["cold"])
 
 
 def said(result: dict[str, Any]) -> str:
@@ -69,8 +72,8 @@ def quality(result: dict[str, Any]) -> str:
 
 
 def draw(result: dict[str, Any]) -> None:
-    """Held-out PSNR against seconds of training, a panel for each clip, with the level of the blend."""
-    rows = result["rows"]
+    """Held-out PSNR against processor seconds of training, a panel for each clip, with the level of the blend."""
+    rows = [row for row in result["rows"] if row["clock"] == "processor"]
     clips = list(dict.fromkeys(row["clip"] for row in rows))
     figure = new_figure(3.7 * len(clips), 3.2)
     for axes, clip in zip(figure.subplots(1, len(clips), squeeze=False)[0], clips, strict=True):

@@ -1,8 +1,7 @@
 """The tables of the presets in README.md and docs/guides/which_preset.md: time, memory and quality.
 
-The records are docs/results/minutes.json (`bench.minutes`), for whole commands waiting.json (`bench.waiting`), for the
-compilation bench_start.json (`bench measure start`), and for the simulated clip those of `book.running_clip` and of
-`full_size`.
+The records are docs/results/minutes.json (`bench.minutes`), for whole commands waiting.json (`bench.waiting`), and
+for the simulated clip those of `book.running_clip` and of `full_size`.
 """
 
 from statistics import mean
@@ -12,6 +11,7 @@ import numpy as np
 
 from endotsr.config import PRESETS
 from endotsr.results.report.tables import duration, markdown
+from pages.bench.waiting_text import VECTORS
 from pages.book import running_clip
 from pages.full_size import page as full_size
 from pages.full_size.text import LABELS, PREDICTIONS, mean_psnr
@@ -20,6 +20,7 @@ from pages.store.program import RESULTS, Program
 from pages.store.tables import noted
 
 MEASURED = (("PSNR full, dB", "psnr_full", 1.0, 2), ("LPIPS [0,1]", "lpips", 1.0, 4))  # head, key, unit, digits
+CLOCKED = {"wall": "on the clock", "processor": "processor time of one thread"}
 SIZES = (("GB", "peak_memory_bytes", 1e9, 1), ("Gaussians", "gaussians", 1.0, 0))
 
 
@@ -48,19 +49,28 @@ def table(columns: tuple[tuple[str, str, float, int], ...] = MEASURED) -> str:
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 
 
+# vectors, clock and compilation of the columns of `whole`, which are left out if nothing is measured
+WHOLE = {(bytes_each, clock, cold): f"{name}, {CLOCKED[clock]}{', first training' if cold else ''}"
+         for bytes_each, name in VECTORS.items() for clock in CLOCKED for cold in (True, False)}  # fmt: skip
+
+
 def whole() -> str:
-    """The time of whole commands, warm, and what a cold start adds."""
-    start, rows = loaded(RESULTS / "bench_start.json"), loaded(RESULTS / "waiting.json")["rows"]
-    rows = [row for row in rows if row["clock"] == "processor" and row["seed"] == 0]
-    named = ", ".join(f"`{r['preset']}` on {r['clip']} ({r['frames']} frames) {duration(r['whole'])}" for r in rows)
-    threads, machines = sorted({row["threads"] for row in rows}), sorted({row["machine"]["processor"] for row in rows})
-    added = start["cold"]["first iteration"] - start["warm"]["first iteration"]
-    return (
-        "Whole commands, from reading the clip to its report, with LPIPS, in processor time of "
-        f"{' or '.join(map(str, threads))} thread of {', '.join(machines)}, in minutes: {named}. With two threads the "
-        f"iterations take less time on the clock. The first training on a machine compiles, which takes {added:.0f} s "
-        "there on two cores."
+    """The time of whole commands by clip and preset, on machines with AVX-512 and without, cold and warm."""
+    found: dict[tuple[str, str], dict[tuple[int, str, bool], str]] = {}
+    rows = [row for row in loaded(RESULTS / "waiting.json")["rows"] if row["seed"] == 0]
+    for row in rows:
+        name = f"`{row['preset']}`", f"{row['clip']}, {row['frames']} frames"
+        kind = row["register_bytes"], row["clock"], row["cold"]
+        found.setdefault(name, {})[kind] = duration(row["whole"])
+    kinds = [kind for kind in WHOLE if any(kind in of for of in found.values())]
+    cells = [[*name, *(of.get(kind, "-") for kind in kinds)] for name, of in sorted(found.items())]
+    machines, sizes = (sorted({get(row) for row in rows}) for get in (lambda r: r["machine"]["processor"], lambda r: r["size"]))
+    about = (
+        "Whole commands in minutes, from reading the clip to its report, with LPIPS. *On the clock* is with two threads; "
+        f"*first training* includes the compilation of the kernels, once on a machine. Frames of {', '.join(sizes)}; "
+        f"{', '.join(machines)}; {max(row['date'] for row in rows)}."
     )
+    return noted(("Preset", "Clip", *(WHOLE[kind] for kind in kinds)), cells, about)
 
 
 def recorded() -> str:

@@ -3,10 +3,14 @@
 import tempfile
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import with_settings
 from pages.store.commands import said
+
+if TYPE_CHECKING:
+    from endotsr.clips.simulator.simulate import SimulatedSequence
 
 SMALL, LARGE = (320, 256), (640, 512)
 FRAMES, SHIFT, CYCLES = 48, 8.0, 2.0  # largest sideways shift in mm, and the rate of the path of the hand
@@ -25,13 +29,20 @@ def simulated(
     kind: str, size: tuple[int, int], seed: int, frames: int = FRAMES, shift: float = SHIFT, cycles: float = CYCLES
 ) -> Sequence:
     """A simulated hand-held clip with true poses."""
+    return with_truth(kind, size, seed, frames, shift, cycles).sequence
+
+
+def with_truth(
+    kind: str, size: tuple[int, int], seed: int, frames: int = FRAMES, shift: float = SHIFT, cycles: float = CYCLES
+) -> "SimulatedSequence":
+    """The same clip with the true motion of its tissue."""
     from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
     from endotsr.clips.simulator.simulate import simulate
 
     plain = SimulatorSettings(width=size[0], height=size[1], frames=frames, seed=seed)
     settings = with_effects(plain, *SEEN, *KINDS[kind])
     path = {"path": "hand", "amplitude": shift, "cycles": cycles}
-    return simulate(with_settings(settings, camera_motion=path)).sequence
+    return simulate(with_settings(settings, camera_motion=path))
 
 
 @lru_cache(maxsize=1)

@@ -26,6 +26,9 @@ PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
 BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
+# Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.13 s were measured on one
+# machine. The parts beside the iterations took no longer there.
+WITHOUT_AVX512 = 1.5
 # Assumed growth for `density.growth = "threshold"`, whose final number is not known in advance: a larger weight of the
 # similarity gives larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
 # at half size and twice the threshold the growth was 1.5, 1.8 and 2.1 with the weights 0.2, 0.35 and 0.5.
@@ -49,7 +52,14 @@ COMPILATION = 30.0  # seconds for the kernels of a training, once per machine
 
 def assumed_unit(threads: int) -> float:
     """Seconds per unit of work of a machine whose speed is unknown."""
-    return SECONDS * (1.0 if threads > 1 else SERIAL)
+    return SECONDS * (1.0 if threads > 1 else SERIAL) * vector_factor()
+
+
+def vector_factor() -> float:
+    """The time of an iteration on this processor over that on one with AVX-512."""
+    from endotsr.method.kernels.vectors import REGISTER
+
+    return 1.0 if REGISTER >= 64 else WITHOUT_AVX512
 
 
 class Standing(NamedTuple):
@@ -165,8 +175,11 @@ class TimedCommand(NamedTuple):
     perceived: bool | None = True  # whether the evaluation computes LPIPS; None = no evaluation
 
     def alone(self, unit: float) -> float:
-        """Seconds per unit of work on one thread, from those with the threads of the plan."""
-        return unit * (SERIAL if self.threads > 1 else 1.0)
+        """Seconds per unit of the parts beside the iterations, which use one thread and gain nothing from AVX-512.
+
+        unit   seconds per unit of the iterations, with the threads of the plan
+        """
+        return unit * (SERIAL if self.threads > 1 else 1.0) / vector_factor()
 
 
 class PartSeconds(NamedTuple):
