@@ -44,6 +44,25 @@ def test_tissue_and_its_highlights_are_no_instrument(name):
     assert not proposal.found and "no grey region" in proposal.reason
 
 
+def with_patch(picture, width, rise):
+    """The picture with a grey patch at its left border, of which `rise` columns fade into the tissue."""
+    share = np.clip((width - np.arange(picture.shape[1])) / rise, 0.0, 1.0)[None, :, None]
+    share = np.where(np.arange(picture.shape[0])[:, None, None] < picture.shape[0] // 2, share, 0.0)
+    return (share * 190 + (1 - share) * picture).astype(np.uint8)
+
+
+def test_a_pale_region_that_fades_is_no_instrument_unless_it_continues_one():
+    """Overexposed tissue fades into its surroundings; so does smoke around an instrument, which is still there."""
+    pictures = scene("still")[0]
+    tissue = np.broadcast_to(np.median(pictures[0].reshape(-1, 3), axis=0), pictures[0].shape).astype(np.uint8)
+    sharp, faded = with_patch(tissue, 40, 1), with_patch(tissue, 90, 80)
+    assert all(plane.any() for plane in propose_masks([sharp] * 3).excluded)
+    proposal = propose_masks([faded] * 3)
+    assert not proposal.found and "no grey region with an edge" in proposal.reason
+    found = propose_masks([sharp, faded, faded]).excluded
+    assert [plane.any() for plane in found] == [True, True, True]
+
+
 def test_without_colour_there_is_no_proposal():
     pictures = [np.repeat(picture[..., :1], 3, axis=2) for picture in scene("pulling")[0]]
     assert "is not distinguishable" in propose_masks(pictures).reason

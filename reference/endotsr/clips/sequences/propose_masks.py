@@ -6,9 +6,11 @@ Tissue is red, orange or mauve, and metal is grey. With the redness of a pixel,
 
 and the usual redness m of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m join them.
 Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. Such a
-region is an instrument if it is large and enters from the border of the picture, if it moves relative to the
-surrounding tissue, or if it overlaps an instrument of the previous or next frame. Other regions, such as highlights,
-remain tissue. Tissue-coloured and blood-covered instruments are not found.
+region is an instrument if it has an edge, and enters from the border of the picture, moves relative to the surrounding
+tissue, or overlaps an instrument of the previous or next frame. It has an edge if the redness rises there by EDGE m or
+more within some pixels: pale and overexposed tissue fades instead. A region without an edge counts only where it covers
+most of the instrument of the previous or next frame, as smoke does. Other regions, such as highlights, remain tissue.
+Tissue-coloured and blood-covered instruments are not found.
 
 The dark border outside the field of view (`field_of_view`) is found first, from all frames together. It is excluded in
 every frame and from the search.
@@ -35,6 +37,8 @@ LEAST_AREA = 0.003  # of the picture
 ENTERING_AREA = 0.008  # of the picture, for a region accepted only because it touches the border
 CLOSING, MARGIN = 0.012, 0.02  # of the longer side: closed gaps, and margin added to a region
 RING = 0.05  # of the longer side: ring around a region whose motion counts as tissue motion
+EDGE = 0.5  # of the usual redness, its least rise from the inside of a region to the outside
+EDGE_FROM, EDGE_TO = 2, 5  # px at the working size: the two bands along the edge whose redness is compared
 UNLIKE = 1.5  # px at the working size: motion relative to the tissue
 OVERLAP = 0.5  # fraction of a region that overlaps the instruments of a neighbouring frame
 LITTLE_TISSUE = 0.05  # of the field of view; a frame with less has almost no tissue
@@ -63,6 +67,7 @@ class _Region(NamedTuple):
 
     pixels: BoolArray  # (h, w)
     enters: bool  # large, and touches the border of the picture
+    edge: bool  # whether the redness rises at its edge
 
 
 def propose_masks(pictures: Iterable[Picture]) -> Proposal:
@@ -108,7 +113,7 @@ def _instruments(small: list[Picture], outside: BoolArray) -> tuple[list[BoolArr
     chosen = _chosen(small, regions)
     frames = sum(plane.any() for plane in chosen)
     if not frames:
-        return [], "no grey region enters from the border or moves relative to the tissue"
+        return [], "no grey region with an edge enters from the border or moves relative to the tissue"
     return chosen, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}"
 
 
@@ -136,18 +141,34 @@ def _regions(redness: FloatArray, usual: float, outside: BoolArray) -> list[_Reg
     for label in range(1, count + 1):
         pixels = labels == label
         if pixels.mean() >= LEAST_AREA:
-            edge = pixels[[0, -1]].any() or pixels[:, [0, -1]].any() or (pixels & near_border).any()
-            found.append(_Region(pixels, bool(edge) and pixels.mean() >= ENTERING_AREA))
+            touches = pixels[[0, -1]].any() or pixels[:, [0, -1]].any() or (pixels & near_border).any()
+            enters, rise = bool(touches) and pixels.mean() >= ENTERING_AREA, _rise(pixels, redness, border)
+            found.append(_Region(pixels, enters, rise >= EDGE * usual))
     return found
+
+
+def _rise(pixels: BoolArray, redness: FloatArray, border: BoolArray) -> float:
+    """The median redness just outside of a region minus that just inside; 0 without pixels outside.
+
+    A region that is too thin for the inner band counts whole.
+    """
+    from scipy.ndimage import binary_dilation, binary_erosion
+
+    near, far = (np.asarray(binary_dilation(pixels, iterations=width), bool) for width in (EDGE_FROM, EDGE_TO))
+    thick, core = (np.asarray(binary_erosion(pixels, iterations=w, border_value=1), bool) for w in (EDGE_FROM, EDGE_TO))
+    inside, outside = thick & ~core, far & ~near & ~border
+    if not outside.any():
+        return 0.0
+    return float(np.median(redness[outside]) - np.median(redness[inside if inside.any() else pixels]))
 
 
 def _chosen(pictures: list[Picture], regions: list[list[_Region]]) -> list[BoolArray]:
     """The union of the instruments, per frame."""
     chosen, left = [], []
     for i, found in enumerate(regions):
-        flow = _flow(pictures, i) if any(not region.enters for region in found) else None
+        flow = _flow(pictures, i) if any(region.edge and not region.enters for region in found) else None
         plane, rest = np.zeros(pictures[i].shape[:2], bool), []
-        for region in found:
+        for region in (region for region in found if region.edge):
             if region.enters or (flow is not None and _moves_alone(region.pixels, flow)):
                 plane |= region.pixels
             else:
@@ -160,7 +181,19 @@ def _chosen(pictures: list[Picture], regions: list[list[_Region]]) -> list[BoolA
         for pixels in rest:
             if any((pixels & other).sum() >= OVERLAP * pixels.sum() for other in beside):
                 chosen[i] = chosen[i] | pixels
+    _continue(chosen, [[region.pixels for region in found if not region.edge] for found in regions])
     return chosen
+
+
+def _continue(chosen: list[BoolArray], faded: list[list[BoolArray]]) -> None:
+    """Add the regions without an edge that cover most of the instrument of a neighbour, from frame to frame."""
+    n = len(chosen)
+    for i, k in [(i, i - 1) for i in range(1, n)] + [(i, i + 1) for i in range(n - 2, -1, -1)]:
+        beside = chosen[k]
+        if beside.any() and beside.shape == chosen[i].shape:
+            for pixels in faded[i]:
+                if (pixels & beside).sum() >= OVERLAP * beside.sum():
+                    chosen[i] = chosen[i] | pixels
 
 
 def _flow(pictures: list[Picture], i: int) -> NDArray[np.float32] | None:
