@@ -11,6 +11,7 @@ from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.waiting import in_words, waiting_line
 from endotsr.clips.sequences.checks.duration import (
     TimedCommand,
+    assumed_unit,
     estimated_seconds,
     frames_of,
     iteration_work,
@@ -164,4 +165,15 @@ def test_the_evaluation_of_a_simulated_clip_is_forecast_with_its_known_motion(co
     known = plan._replace(frames=plan.frames.with_true_motion())
     assert known.frames.compared == pairs
     more = estimated_seconds(known, 0.1).evaluation - estimated_seconds(plan, 0.1).evaluation
-    assert more == pytest.approx(1.6 * 0.1 * pairs)
+    assert more == pytest.approx(1.6 * known.evaluating(0.1) * pairs)
+
+
+def test_only_the_iterations_gain_from_avx512(monkeypatch):
+    """The time of an iteration depends on the vectors; reading, motion and evaluation of the same machine do not."""
+    plan, seconds = plan_of("quick", 63, 2)._replace(perceived=True), {}
+    for register, unit in ((64, 0.08), (32, 0.12)):
+        monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", register)
+        assert assumed_unit(2) == pytest.approx(unit)
+        seconds[register] = estimated_seconds(plan, unit)
+    assert seconds[32].iterations == pytest.approx(1.5 * seconds[64].iterations)
+    assert seconds[32]._replace(iterations=0.0) == pytest.approx(seconds[64]._replace(iterations=0.0))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endotsr.cli.parts.options import base_settings
-from endotsr.clips.sequences.checks.duration import at_start, work_left
+from endotsr.clips.sequences.checks.duration import at_start, vector_factor, work_left
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PRESETS, QUICK, lengthened, with_settings
@@ -39,7 +39,8 @@ def test_the_planned_time_is_the_wish(still, minutes):
     planned = 0.12 * work_left(config, still.width * still.height, at_start(config))
     gaps, times, size = 8, 12, 64 * 48 / (640 * 512)  # of training frames; two gaps have a frame between
     assert np.diff(still.train_index).tolist() == [2, 1, 1, 1, 1, 1, 1, 2]
-    planned += 0.12 * size * (0.5 * gaps + 0.8 * times) * (1.25 if config.training.coarse_start else 1.0)
+    sizes = 1.25 if config.training.coarse_start else 1.0
+    planned += 0.12 / vector_factor() * size * (0.5 * gaps + 0.8 * times) * sizes
     assert 0.97 * 60 * minutes < planned <= 60 * minutes
 
 

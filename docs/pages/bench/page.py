@@ -3,8 +3,8 @@
     python docs/make.py bench measure [WHAT ...] [--scenes FILE ...] [--out FOLDER]
 
 on an otherwise idle machine: start, stages, peers and scaling, or the named measurements; `effects` belongs to
-docs/effects.md. The stages of a machine without AVX-512 are a file of their own. They run one after the other, each in separate processes. The command `endotsr bench` only times the
-stages on this machine.
+docs/effects.md. They run one after the other, each in separate processes. The stages of a machine without AVX-512 have
+a file of their own. The command `endotsr bench` only times the stages on this machine.
 """
 
 import argparse

@@ -13,7 +13,7 @@ QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
 CLOCKS = {"processor": "processor time of one thread", "wall": "time of two threads on the clock"}
 FORMERLY = 30  # iterations before the forecast of rows that do not state it
-VECTORS = {64: "AVX-512", 32: "AVX2"}  # by the bytes of a register
+VECTORS = {64: "AVX-512", 32: "AVX2", 0: ""}  # by the bytes of a register; 0: not recorded
 
 
 def told(row: dict[str, Any], when: str) -> str:
@@ -28,8 +28,8 @@ def told(row: dict[str, Any], when: str) -> str:
 def named(row: dict[str, Any]) -> str:
     """Clip, preset, seed, vectors of the processor, clock, and whether the kernels were compiled first."""
     about = [row["clip"], f"`{row['preset']}`", f"{row['iterations']} iterations", f"seed {row['seed']}"]
-    about += [VECTORS[row["register_bytes"]]] + ["on the clock"] * (row["clock"] == "wall")
-    return ", ".join(about + ["with compilation"] * row["cold"])
+    about += [VECTORS[row["register_bytes"]], "on the clock" * (row["clock"] == "wall")]
+    return ", ".join(filter(None, (*about, "with compilation" * row["cold"])))
 
 
 def said(result: dict[str, Any]) -> str:

@@ -49,9 +49,13 @@ def table(columns: tuple[tuple[str, str, float, int], ...] = MEASURED) -> str:
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 
 
-# vectors, clock and compilation of the columns of `whole`, which are left out if nothing is measured
-WHOLE = {(bytes_each, clock, cold): f"{name}, {CLOCKED[clock]}{', first training' if cold else ''}"
-         for bytes_each, name in VECTORS.items() for clock in CLOCKED for cold in (True, False)}  # fmt: skip
+# register bytes, clock and compilation of the columns of `whole`, which are left out if nothing is measured
+WHOLE = {
+    (size, clock, cold): ", ".join(filter(None, (name, CLOCKED[clock], "first training" * cold)))
+    for size, name in VECTORS.items()
+    for clock in CLOCKED
+    for cold in (True, False)
+}
 
 
 def whole() -> str:
@@ -64,11 +68,11 @@ def whole() -> str:
         found.setdefault(name, {})[kind] = duration(row["whole"])
     kinds = [kind for kind in WHOLE if any(kind in of for of in found.values())]
     cells = [[*name, *(of.get(kind, "-") for kind in kinds)] for name, of in sorted(found.items())]
-    machines, sizes = (sorted({get(row) for row in rows}) for get in (lambda r: r["machine"]["processor"], lambda r: r["size"]))
+    machines, sizes = sorted({row["machine"]["processor"] for row in rows}), sorted({row["size"] for row in rows})
     about = (
-        "Whole commands in minutes, from reading the clip to its report, with LPIPS. *On the clock* is with two threads; "
-        f"*first training* includes the compilation of the kernels, once on a machine. Frames of {', '.join(sizes)}; "
-        f"{', '.join(machines)}; {max(row['date'] for row in rows)}."
+        "Whole commands in minutes, from reading the clip to its report, with LPIPS. *On the clock* is with two "
+        "threads, and *first training* includes the compilation of the kernels, once on a machine. "
+        f"Frames of {', '.join(sizes)}; {', '.join(machines)}; {max(row['date'] for row in rows)}."
     )
     return noted(("Preset", "Clip", *(WHOLE[kind] for kind in kinds)), cells, about)
 

@@ -95,11 +95,8 @@ def missing(clip: str, records: dict[str, dict]) -> str:
     found = [metrics["run"]["settings"]["preset"] for metrics in runs]
     lacking = [f"`{name}` {found.count(name)} of {count} seeds"
                for name, count in PLANNED[clip].items() if found.count(name) < count]  # fmt: skip
-    return (
-        f"This table lacks runs on {clip}: {', '.join(lacking)}. The seeds of the ablation are in [the claims](../claims.md)."
-        if lacking
-        else ""
-    )
+    more = "The seeds of the ablation are in [the claims](../claims.md)."
+    return f"This table lacks runs on {clip}: {', '.join(lacking)}. {more}" if lacking else ""
 
 
 def counted(runs: list[dict]) -> str:

@@ -59,8 +59,8 @@ def table(result: dict[str, Any]) -> str:
         runs = [row for row in result["rows"] if row["tissue"] == kind]
         moved, error, left = means(runs, (("moved", 2), ("error", 3), ("left", 2)))
         rows.append([kind, moved, error, f"{shown([100 * run['of_path'] for run in runs], 2)} %", left])
-    about = f"{FRAMES} frames of {SMALL[0]}x{SMALL[1]}; mean ± 95 % interval over {result['seeds']} seeds of the simulator."
-    return noted(HEADS, rows, f"{about} {result['date'][:10]}.")
+    about = f"{FRAMES} frames of {SMALL[0]}x{SMALL[1]}; mean ± 95 % interval over {result['seeds']} seeds"
+    return noted(HEADS, rows, f"{about} of the simulator. {result['date'][:10]}.")
 
 
 def measured(options: argparse.Namespace) -> dict[str, Any]:

@@ -41,7 +41,7 @@ TRACKED, TRACKED_POINTS = 0.8, 7.5e-6  # units per training frame for the initia
 FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
 MEASURED, PERCEIVED = 1.2, 2.7  # units per picture for its metrics, and for LPIPS
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
-PAGES = 80.0  # units for the viewer, the report and the renders
+PAGES = 0.0038  # units per Gaussian for the viewer, the report and the renders
 EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
 # Frames whose motion is compared with a known truth. The number of pairs would grow with the square of the clip: 300
 # frames would have 44 * 299.
@@ -181,6 +181,13 @@ class TimedCommand(NamedTuple):
         """
         return unit * (SERIAL if self.threads > 1 else 1.0) / vector_factor()
 
+    def evaluating(self, unit: float) -> float:
+        """Seconds per unit of the evaluation: the geometric mean of `alone` and of its value for an assumed machine.
+
+        Libraries do most of this work, and their speed follows that of the iterations in part. The mean is a guess.
+        """
+        return float(np.sqrt(self.alone(unit) * SECONDS * SERIAL))
+
 
 class PartSeconds(NamedTuple):
     """Seconds of the parts of one command, in order."""
@@ -226,7 +233,7 @@ def estimated_seconds(plan: TimedCommand, unit: float = SECONDS) -> PartSeconds:
         alone * size * tracked * frames.training,
         alone * size * targets / plan.threads,
         unit * work_left(config, plan.pixels, first),
-        0.0 if plan.perceived is None else alone * (PAGES + size * pictures),
+        0.0 if plan.perceived is None else plan.evaluating(unit) * (PAGES * gaussians_at_end(config) + size * pictures),
     )
 
 
