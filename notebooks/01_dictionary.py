@@ -193,10 +193,10 @@ np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
 # ### Figure: a Gaussian of the running clip
 #
 # The running clip of this book has 63 frames, of which every eighth is held out. The left panel shows the colour
-# residual of one Gaussian that was trained on this clip: in the stored extract, it is the Gaussian whose colour
-# changes most. Its residual is $\beta\tanh(A\bar\phi(t))$ with its coefficients $A$ and $\beta=0.3$
-# ({doc}`02_colour_residual`). If the same coefficients multiplied the raw atoms $\phi(t)$, the mean of $A\phi(t)$ over
-# the training stamps would not be 0. By how many of 255 levels would the mean colour of a Gaussian then shift?
+# residual of one Gaussian that was trained on this clip, the one in the stored extract whose colour changes most. Its
+# residual is $\beta\tanh(A\bar\phi(t))$ with its coefficients $A$ and $\beta=0.3$ ({doc}`02_colour_residual`). If the
+# same coefficients multiplied the raw atoms $\phi(t)$, the mean of $A\phi(t)$ over the training stamps would not be 0.
+# By how many of the 255 levels would the mean colour of a Gaussian then shift?
 
 # %% tags=["hide-input"]
 clip = load()
