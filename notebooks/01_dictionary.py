@@ -285,12 +285,12 @@ for panel, values, title in (
         on_frames = np.interp(stamps, fine, values[:, k]).mean()
         panel.axhline(on_frames, color=colour, ls=":", lw=1)
     panel.set(title=title, xlabel="t")
-    panel.set_ylim(-1.7, 1.7)
-axes[0].legend(loc="lower left", fontsize=9, ncols=3, columnspacing=0.8)
+    panel.set_ylim(-2.8, 1.7)
+axes[0].legend(loc="lower left", fontsize=8)
 axes[1].text(
     0.02,
     0.03,
-    "dots: training stamps; dotted: their mean",
+    "dots: training stamps\ndotted: their mean",
     transform=axes[1].transAxes,
     fontsize=9,
 )
