@@ -193,10 +193,10 @@ np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
 # ### Figure: a Gaussian of the running clip
 #
 # The running clip of this book has 63 frames, of which every eighth is held out. The left panel shows the colour
-# residual of one Gaussian that was trained on this clip: in the stored extract, it is the Gaussian whose colour
-# changes most. Its residual is $\beta\tanh(A\bar\phi(t))$ with its coefficients $A$ and $\beta=0.3$
-# ({doc}`02_colour_residual`). If the same coefficients multiplied the raw atoms $\phi(t)$, the mean of $A\phi(t)$ over
-# the training stamps would not be 0. By how many of 255 levels would the mean colour of a Gaussian then shift?
+# residual of one Gaussian that was trained on this clip, the one in the stored extract whose colour changes most. Its
+# residual is $\beta\tanh(A\bar\phi(t))$ with its coefficients $A$ and $\beta=0.3$ ({doc}`02_colour_residual`). If the
+# same coefficients multiplied the raw atoms $\phi(t)$, the mean of $A\phi(t)$ over the training stamps would not be 0.
+# By how many of the 255 levels would the mean colour of a Gaussian then shift?
 
 # %% tags=["hide-input"]
 clip = load()
@@ -285,12 +285,12 @@ for panel, values, title in (
         on_frames = np.interp(stamps, fine, values[:, k]).mean()
         panel.axhline(on_frames, color=colour, ls=":", lw=1)
     panel.set(title=title, xlabel="t")
-    panel.set_ylim(-1.7, 1.7)
-axes[0].legend(loc="lower left", fontsize=9, ncols=3, columnspacing=0.8)
+    panel.set_ylim(-2.8, 1.7)
+axes[0].legend(loc="lower left", fontsize=8)
 axes[1].text(
     0.02,
     0.03,
-    "dots: training stamps; dotted: their mean",
+    "dots: training stamps\ndotted: their mean",
     transform=axes[1].transAxes,
     fontsize=9,
 )

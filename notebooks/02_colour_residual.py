@@ -113,9 +113,9 @@ assert contrast > 0.2 and moved > 0.2 and np.abs(frames).max() < beta
 # A patch of tissue becomes paler and recovers, without moving. The left panel shows how component A represents the
 # event: the colour changes over time. A model without A has constant colours. It can make a pixel brighter at one time
 # by moving, turning or scaling Gaussians. The middle panel shows an example: a bright neighbour four pixels away is
-# shifted so that the pixel has the same brightness at each time. How far do you expect it to move? In both cases the
-# image at this pixel is right, but in the second case the geometry is wrong. The paper gives colour and motion
-# separate components. (The right panel belongs to step (2.4).)
+# shifted so that the pixel has the brightness of the patch at each time. How far do you expect it to move? In both
+# cases the image at this pixel is right, but in the second case the geometry is wrong. The paper gives colour and
+# motion separate components. (The right panel belongs to step (2.4).)
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 0.98, 197)

@@ -67,7 +67,7 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # Here $\mu_i$ is the stored position, and $\psi$ is the offset of the deformation model of {doc}`04_deformation`.
 # Unlike the colour residual, the translation uses the **raw** atoms. A shift in time changes the phase of a raw pair
 # of sine and cosine, and the penalty below does not depend on this phase. In a normalised pair the sine and the cosine
-# have different scales, and the penalty would depend on it.
+# have different scales, and the penalty would depend on the phase.
 #
 # <!-- definition: endotsr.definition.motion.motion_forward -->
 # ```python
@@ -344,9 +344,9 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # %% [markdown]
 # ## Interactive figure: correlation length and penalty
 #
-# The curve is a trajectory fitted to noisy frames: for it, the mean squared error plus
-# $\lambda_{\mathrm{msp}}\mathcal L_{\mathrm{msp}}$ of {eq}`eq-4` is minimal. Before you move a slider, predict what is
-# left of the curve at the largest weight: a straight line, the slow wave, or the beat?
+# The curve is a trajectory fitted to noisy frames. It minimises the mean squared error plus
+# $\lambda_{\mathrm{msp}}\mathcal L_{\mathrm{msp}}$ of {eq}`eq-4`. Before you move a slider, predict what is left of the
+# curve at the largest weight: a straight line, the slow wave, or the beat?
 #
 # <div class="widget" data-widget="matern">The figure is live in the built book.</div>
 

@@ -132,7 +132,7 @@ for band in range(4):
 #
 # Each function is drawn over the whole sphere, with the longitude to the right and the latitude upwards. Red is
 # positive and blue is negative. The values are those of the compiled function, for one Gaussian per direction and one
-# coefficient that is not 0. Before you look, let the camera move to the opposite side of a Gaussian, so that
+# coefficient that is not 0. Before you look, imagine that the camera moves to the opposite side of a Gaussian, so that
 # $\mathbf n$ becomes $-\mathbf n$. In which rows of the figure does every function change its sign?
 
 # %% tags=["hide-input"]
@@ -175,7 +175,7 @@ opposite = definition.basis(-around, 16)
 np.testing.assert_allclose(opposite, sign * definition.basis(around, 16), atol=1e-14)
 
 # %% [markdown]
-# All functions of the second and of the fourth row do: their polynomials have the odd degrees 1 and 3.
+# In the second and in the fourth row, whose polynomials have the odd degrees 1 and 3.
 
 # %% [markdown]
 # ## The reverse pass, line by line

@@ -217,7 +217,7 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
 # part is the fraction $\alpha_kT_k$ that the Gaussian absorbs. The other panels show one Gaussian under the three
 # presets. The support of `exact` is the whole image. The support of `paper` ends on the ellipse at which $\alpha$ has
 # fallen to 1/255. The preset `legacy` uses the tiles within three standard deviations. Here this removes a few pixels
-# of the ellipse at the bottom, too faint to be seen; the cell below the figure counts them.
+# of the ellipse at the bottom, too faint to be seen; the line below the figure counts them.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(
@@ -510,7 +510,7 @@ assert all(report.passed for report in reports)
 # 1. A pixel has two contributors, both with $\alpha=\frac12$ and the same colour $c$. Use (9.3) to show that both
 #    opacities have the same gradient, and that it is 0 where $c$ equals the background.
 # 2. Write the pair of {eq}`eq-b5` from (9.1) to (9.8) and let the golden cases judge it: `--only composite`
-#    ({doc}`index`). The case `opaque_exact` refuses a division by $1-\alpha$.
+#    ({doc}`index`). A port that divides by $1-\alpha$ fails the case `opaque_exact`.
 # 3. The cell below answers this one. At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to
 #    back. Which of the three opacities and of the three colours have a gradient? Many programs recover $T_k$ in the
 #    reverse pass by dividing the final $T_n$ by $1-\alpha$. What would such a program compute here?

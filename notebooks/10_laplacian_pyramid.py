@@ -260,7 +260,7 @@ for panel in axes.flat:
 plt.show()
 
 # %% [markdown]
-# It is at the edge of the instrument, and the loss would make the render reproduce this edge.
+# The strongest detail is the edge of the instrument, and a loss on these bands would make the render reproduce it.
 
 # %% [markdown]
 # ## The reverse pass, line by line

@@ -16,8 +16,8 @@
 # A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
 # compare it with. The base model has one loss for each of these cases. L1 compares the colour of each pixel, SSIM the
 # structure of the colours, and the depth loss the rendered depth with the prior depth. Smoothness constrains the
-# render under the instrument, and the depth on tissue. The two colour losses use no value under the instrument. There,
-# the depth loss uses only its two maxima, and smoothness only the render.
+# render under the instrument, and the depth on tissue. The two colour losses use no value under the instrument. In the
+# depth loss such values enter the two maxima alone, and smoothness reads the render there but not the frame.
 #
 # | Symbol | Meaning |
 # |---|---|
@@ -299,8 +299,8 @@ np.testing.assert_allclose(L_smooth, smooth_text, rtol=1e-12)
 # ## Figure: why SSIM is used in addition to L1
 #
 # The figure shows a window of the running clip: the held-out frame, and the render of the trained scene
-# ({doc}`14_full_sequence`). Beside the render are three other changes of the frame, which have the **same** masked L1
-# as the render. Which one has the lowest SSIM? L1 does not distinguish the four pictures; SSIM does. (The maps show
+# ({doc}`14_full_sequence`). Beside the render are three altered copies of the frame, with the **same** masked L1 as the
+# render. Which of the four pictures has the lowest SSIM? L1 does not distinguish them; SSIM does. (The maps show
 # $1-s$, averaged over the channels.)
 
 # %% tags=["hide-input"]

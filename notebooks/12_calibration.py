@@ -216,7 +216,7 @@ axes[3].legend()
 plt.show()
 
 # %% [markdown]
-# It is 0 near the instrument, where no band value is valid.
+# The gradient is 0 near the instrument, where no band value is valid.
 
 # %% [markdown]
 # ## The reverse pass

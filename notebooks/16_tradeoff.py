@@ -264,7 +264,7 @@ axis.loglog(
 )
 axis.axhline(0.5, color="0.5", ls="--", lw=1)
 axis.annotate(
-    "half a step of 8 bit",
+    "half a step of 8 bits",
     (1, 0.5),
     xycoords=("axes fraction", "data"),
     ha="right",

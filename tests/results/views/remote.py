@@ -144,6 +144,7 @@ class Remote:
                 self._send("Input.dispatchKeyEvent", type=kind, key=key, modifiers=MODIFIERS.get(held, 0), **more)
 
     def picture(self, file: Path) -> None:
-        """Save the whole page as PNG."""
+        """Save the whole page as PNG, without a scroll bar, which would cut the right side off."""
+        self._send("Emulation.setScrollbarsHidden", hidden=True)
         shot = self._send("Page.captureScreenshot", captureBeyondViewport=True)["data"]
         file.write_bytes(base64.b64decode(shot))
