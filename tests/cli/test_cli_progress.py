@@ -15,6 +15,7 @@ from endotsr.clips.sequences.checks.duration import (
     estimated_seconds,
     frames_of,
     iteration_work,
+    vector_factor,
 )
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened
@@ -174,6 +175,6 @@ def test_only_the_iterations_gain_from_avx512(monkeypatch):
     for register, unit in ((64, 0.08), (32, 0.12)):
         monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", register)
         assert assumed_unit(2) == pytest.approx(unit)
-        seconds[register] = estimated_seconds(plan, unit)
+        seconds[register] = estimated_seconds(plan._replace(vectors=vector_factor()), unit)
     assert seconds[32].iterations == pytest.approx(1.5 * seconds[64].iterations)
     assert seconds[32]._replace(iterations=0.0) == pytest.approx(seconds[64]._replace(iterations=0.0))

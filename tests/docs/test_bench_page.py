@@ -18,7 +18,7 @@ def found():
 
 def test_pictures_are_drawn_beside_their_measurements(found, tmp_path):
     for name, measured in found.items():
-        (tmp_path / bench.FILES[name]).write_text(json.dumps(measured), encoding="utf-8")
+        (tmp_path / bench.READ[name]).write_text(json.dumps(measured), encoding="utf-8")
     bench.draw(tmp_path)
     assert {path.name for path in tmp_path.glob("*.png")} == {"bench_stages.png", "scaling.png"}
 

@@ -33,6 +33,7 @@ FILES = {
 }  # fmt: skip
 AVX2 = "bench_stages_avx2.json"  # the stages of a machine without AVX-512
 USUAL = ("stages", "scaling", "peers", "start")  # of the page docs/bench.md; `effects` belongs to docs/effects.md
+READ = {name: FILES[name] for name in USUAL} | {"avx2": AVX2}  # measurements of the page by name
 SIZES, THREADS, REPEATS = (20_000, 60_000, 150_000), (1, 2), 11
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 LARGEST = 1_000_000  # Gaussians; takes about 10 GB
@@ -88,8 +89,7 @@ def run_all(out: Path, names: tuple[str, ...], scenes: tuple[Path, ...], say: Sa
 
 def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
     """The measurements by name. Raises: InputError if a file is missing or cannot be read."""
-    files = {name: FILES[name] for name in USUAL} | {"avx2": AVX2}
-    return {name: read_json(folder / file, "python docs/make.py bench measure") for name, file in files.items()}
+    return {name: read_json(folder / file, "python docs/make.py bench measure") for name, file in READ.items()}
 
 
 def read_runs() -> dict[str, dict[str, Any]]:

@@ -64,10 +64,10 @@ def run(words: list[str]) -> int:
 
 def _speed(settings: Config) -> "Speed":
     """The speed of the last training on this machine with the threads of the settings, else the assumed one."""
-    from endotsr.clips.sequences.checks.duration import Speed, assumed_unit
+    from endotsr.clips.sequences.checks.duration import Speed, assumed_unit, vector_factor
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.training.runs.speed import remembered_unit
 
     threads = use_threads(settings.training.threads)
-    return Speed(remembered_unit(threads) or assumed_unit(threads), threads, lpips_file() is not None)
+    return Speed(remembered_unit(threads) or assumed_unit(threads), threads, lpips_file() is not None, vector_factor())

@@ -236,7 +236,7 @@ def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Conf
     import numba
 
     from endotsr.cli.parts.waiting import waiting_line
-    from endotsr.clips.sequences.checks.duration import TimedCommand, frames_of
+    from endotsr.clips.sequences.checks.duration import TimedCommand, frames_of, vector_factor
     from endotsr.clips.sequences.files import has_truth
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
@@ -248,7 +248,7 @@ def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Conf
     if source == SIMULATED or has_truth(Path(source)):
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
-    plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived)
+    plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived, vector_factor())
     print(waiting_line(plan, remembered_unit(threads), done_before(config).exists()))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))

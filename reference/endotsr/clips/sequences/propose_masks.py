@@ -8,8 +8,8 @@ and the usual redness m of the clip, pixels with s < SEED m are seeds, and conne
 Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. Such a
 region is an instrument if it has an edge, and enters from the border of the picture, moves relative to the surrounding
 tissue, or overlaps an instrument of the previous or next frame. It has an edge if the redness rises there by EDGE m or
-more within some pixels: pale and overexposed tissue fades instead. A region without an edge counts only where it covers
-most of the instrument of the previous or next frame, as smoke does. Other regions, such as highlights, remain tissue.
+more within some pixels: pale and overexposed tissue fades instead. A region without an edge counts where it covers most
+of the instrument of the previous or next frame, as smoke does. Other regions, such as highlights, remain tissue.
 Tissue-coloured and blood-covered instruments are not found.
 
 The dark border outside the field of view (`field_of_view`) is found first, from all frames together. It is excluded in

@@ -8,7 +8,13 @@ of a model without motion.
 import statistics
 import time
 
-from endotsr.clips.sequences.checks.duration import TimedCommand, estimated_seconds, frames_of, iteration_work
+from endotsr.clips.sequences.checks.duration import (
+    TimedCommand,
+    estimated_seconds,
+    frames_of,
+    iteration_work,
+    vector_factor,
+)
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError
@@ -49,7 +55,8 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float, t
     frames, pixels = frames_of(sequence.train_index, sequence.test_index), sequence.width * sequence.height
 
     def seconds(x: float) -> float:
-        return estimated_seconds(TimedCommand(paced(config, x), frames, pixels, threads), unit).training
+        plan = TimedCommand(paced(config, x), frames, pixels, threads, vectors=vector_factor())
+        return estimated_seconds(plan, unit).training
 
     low, high = SHORTEST, LONGEST
     if seconds(low) > 60 * minutes:

@@ -160,6 +160,7 @@ class Speed(NamedTuple):
     unit: float = SECONDS  # seconds per unit of work with these threads
     threads: int = 2
     perceived: bool = True  # whether it has LPIPS weights for the evaluation
+    vectors: float = 1.0  # `vector_factor` of its processor
 
 
 ASSUMED = Speed()
@@ -173,13 +174,14 @@ class TimedCommand(NamedTuple):
     pixels: int  # of a frame of full size
     threads: int = 2  # with more than one, a second thread makes the targets between the frames
     perceived: bool | None = True  # whether the evaluation computes LPIPS; None = no evaluation
+    vectors: float = 1.0  # `vector_factor` of the processor
 
     def alone(self, unit: float) -> float:
         """Seconds per unit of the parts beside the iterations, which use one thread and gain nothing from AVX-512.
 
         unit   seconds per unit of the iterations, with the threads of the plan
         """
-        return unit * (SERIAL if self.threads > 1 else 1.0) / vector_factor()
+        return unit * (SERIAL if self.threads > 1 else 1.0) / self.vectors
 
     def evaluating(self, unit: float) -> float:
         """Seconds per unit of the evaluation: the geometric mean of `alone` and of its value for an assumed machine.
