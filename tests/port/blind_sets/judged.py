@@ -54,7 +54,11 @@ def main(words: list[str]) -> int:
     entries = [*table.get("by_hand", []), *table.get("reference", [])]
     for entry in entries:
         if not options.numbers or entry["number"] in options.numbers:
-            began, lines = time.monotonic(), answer_to(entry, options.search)
+            began = time.monotonic()
+            try:
+                lines = answer_to(entry, options.search)
+            except Exception as error:  # of the mistaken port, before it has an answer
+                lines = [f"the port ends with an error: {error!r}"]
             answers[str(entry["number"])] = lines
             print(f"{entry['number']} {entry['operation']}: {entry['text']} ({time.monotonic() - began:.0f} s)")
             print(*(f"    {line}" for line in lines), sep="\n", flush=True)

@@ -5,10 +5,12 @@ import xml.etree.ElementTree as ET
 
 import pytest
 from made_up_ports import THREE, command, racing, three_functions
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 
 from endotsr.cli.golden import run
 from endotsr.errors import InputError
-from endotsr.port.judge.badge import badge
+from endotsr.port.judge.badge import badge, width
 from endotsr.port.judge.certificate import read_certificate
 from endotsr.port.judge.format import schema_text, to_json
 from endotsr.port.judge.schemas import SCHEMAS
@@ -52,6 +54,12 @@ def test_the_badge_is_xml_with_the_claim_as_its_title(written):
         **{**{n: getattr(found, n) for n in found.__struct_fields__}, "vectors": "<b>.1.0"}
     )
     ET.fromstring(badge(hostile))
+
+
+@pytest.mark.parametrize("text", ["endotsr golden", "4.5, level 2, float32, in part", "4.5, method, level 3, float64"])
+def test_the_letters_of_a_badge_are_not_spread(text):
+    drawn = TextPath((0, 0), text, size=11, prop=FontProperties(family="DejaVu Sans")).get_extents().width
+    assert width(text) == pytest.approx(drawn, rel=0.08)
 
 
 def test_verify_judges_again(written, tmp_path, capsys):

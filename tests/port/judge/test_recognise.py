@@ -21,6 +21,7 @@ def suspect(evidence):
         (Evidence(agrees=["composite/a/x", "composite/b/x"], passes=["composite/c/x"]), True),
         (Evidence(agrees=["composite/a/x"], passes=["composite/a/y"]), True),  # one pass of the two alone
         (Evidence(agrees=["masked_l1/equal/x"], passes=["laplacian/equal/x"]), True),  # two operations share a rule
+        (Evidence(fits=["calibration/a/x"], passes=["calibration/b/x"]), False),  # no output has a fingerprint
     ],
 )
 def test_one_case_that_others_contradict_gives_no_name(evidence, named):

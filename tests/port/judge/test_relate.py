@@ -85,6 +85,8 @@ def test_the_size_of_rounding_errors_is_told(kind, name):
     assert name in texts[-1]
     assert "precision" not in relations(right * (1 + 1e-4), right, "max", 1e-12, {})[-1].text
     assert "precision" not in relations(right + 3e-8 * np.abs(np.sin(right)), right, "max", 1e-12, {})[-1].text
+    many_sizes = right * (1 + 1e-4 * np.sin(7 * right) * np.logspace(-3, 3, len(right)))
+    assert "precision" not in relations(many_sizes, right, "max", 1e-12, {})[-1].text, "of very different sizes"
 
 
 def test_long_lists_of_indices_are_counted():

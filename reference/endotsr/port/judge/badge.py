@@ -9,7 +9,8 @@ from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report
 
 LEFT = "endotsr golden"
-LETTER = 6.6  # width of a letter at 11 px, px
+NARROW, WIDE = " ,.()fijlrt", "mw"  # letters; widths at 11 px, px:
+LETTER, NARROW_LETTER, WIDE_LETTER = 6.8, 4.0, 10.0
 MARGIN = 12  # of a text, both sides together, px
 COLOURS = {0: "#5a6675", 1: "#2f6f9f", 2: "#2f6f9f", 3: "#23794a", 4: "#23794a", 5: "#23794a"}  # white text on them
 _BADGE = """<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="20" role="img" aria-label="{title}">
@@ -32,10 +33,16 @@ def badge_text(certificate: Certificate) -> str:
     return f"{short}, {part}level {certificate.level}, {certificate.precision}{less}"
 
 
+def width(text: str) -> int:
+    """The width of a text in px, as Verdana and DejaVu Sans set it at 11 px, to a few percent."""
+    own = (NARROW_LETTER if one in NARROW else WIDE_LETTER if one in WIDE else LETTER for one in text)
+    return round(sum(own))
+
+
 def badge(certificate: Certificate) -> str:
     """The picture as text; its title is the whole claim."""
     right = badge_text(certificate)
-    left_text, right_text = round(LETTER * len(LEFT)), round(LETTER * len(right))
+    left_text, right_text = width(LEFT), width(right)
     left_width, right_width = left_text + MARGIN, right_text + MARGIN
     return _BADGE.format(
         width=left_width + right_width, left_width=left_width, right_width=right_width, left_text=left_text,

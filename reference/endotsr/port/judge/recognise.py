@@ -96,9 +96,10 @@ def related(names: Iterable[str], agreeing: Iterable[str]) -> list[str]:
 def contradicted(evidence: Evidence) -> bool:
     """Whether a single case has the values of a mistake, and another case of the same family has not.
 
+    Where no output has a fingerprint, the single case is that of the outputs that are refused as expected.
     Other families say nothing here: a port may make a mistake in one of two operations that share a rule.
     """
-    agreeing = {name.rpartition("/")[0] for name in evidence.agrees}
+    agreeing = {name.rpartition("/")[0] for name in evidence.agrees or evidence.fits}
     family = {case.partition("/")[0] for case in agreeing}
     against = {name.rpartition("/")[0] for name in (*evidence.differs, *evidence.passes, *evidence.unexplained)}
     return len(agreeing) == 1 and any(case.partition("/")[0] in family for case in against - agreeing)

@@ -20,6 +20,7 @@ DIFFERS = 3.0  # smallest difference, in multiples of FITS; below it, relations 
 SMALLEST_BOARD = 4  # smallest number of rows and columns for a significant alternation
 CLOSE_TO_ONE = 1e-3  # smaller differences of a factor from 1 are printed as such
 FEWEST_ROUNDED = 8  # entries from which the size of rounding errors is told
+SPREAD = 64.0  # largest ratio of the quartiles of rounding errors; it is 3 for errors that are spread evenly
 MOST_INDICES = 8  # indices of an axis that are listed
 LARGEST_PERMUTED = 16  # longest axis that is searched for a permutation
 KNOWN = {
@@ -344,12 +345,14 @@ ROUNDED = {"single precision (2^-24)": 2.0**-24, "half precision (2^-11)": 2.0**
 
 
 def _rounded(pair: OutputPair) -> str:
-    """The precision whose rounding errors the relative errors look like: of both signs, and none much larger."""
+    """The precision whose rounding errors the relative errors look like: of both signs, and of about one size."""
     where = pair.wrong & (pair.expected != 0)
     if where.sum() < FEWEST_ROUNDED:
         return ""
     off = (pair.got[where] - pair.expected[where]) / np.abs(pair.expected[where])
-    typical = float(np.median(np.abs(off)))
+    small, typical, large = (float(q) for q in np.quantile(np.abs(off), (0.25, 0.5, 0.75)))
+    if large > SPREAD * small:
+        return ""
     mixed = 4 * min((off > 0).sum(), (off < 0).sum()) > len(off) / 2
     for name, unit in ROUNDED.items():
         if mixed and unit / 16 < typical < 4 * unit:
