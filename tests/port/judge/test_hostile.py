@@ -79,6 +79,8 @@ def test_a_bad_file_is_one_refused_output(name, golden, tmp_path, monkeypatch):
 def test_an_empty_folder_is_missing_everywhere(golden, tmp_path):
     report = judge(golden, tmp_path, "float64")
     assert {c.status for c in report.cases} == {"missing"} and report.claim == "no level is complete"
+    assert max(map(len, as_table(report).splitlines())) < 500, "cases with hundreds of outputs are cut"
+    assert "1 more" not in as_table(report, everything=True)
 
 
 def test_links_pipes_and_folders_are_not_opened(golden, tmp_path):

@@ -20,6 +20,7 @@ from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
 
 MOST_LINES = 60  # refused outputs in the table
+MOST_MISSING = 12  # names of missing outputs of a case
 MOST_NAMED = 3  # named mistakes
 MOST_PICTURES = 40
 MORE = "--all prints"  # printed if something is omitted
@@ -48,7 +49,7 @@ def as_table(report: Report, *, everything: bool = False) -> str:
         lines += [f"{count} of {len(report.cases)} cases {status}"] if count else []
     refused = [f"{c.name}/{o.name}: {_line(o)}" for c, o in _outputs(report, "refused")]
     lines += _listed("refused outputs:", refused, most)
-    lines += _listed("missing outputs:", _missing(report), most)
+    lines += _listed("missing outputs:", _missing(report, most if everything else MOST_MISSING), most)
     lines += [""] + [
         f"level {k} ({LEVELS[k]}): {good} of {asked} outputs" for k, (good, asked) in report.levels.items()
     ]
@@ -83,15 +84,18 @@ def _outputs(report: Report, status: str) -> list[tuple[CaseReport, OutputReport
     return [(case, o) for case in report.cases for o in case.outputs if o.status == status]
 
 
-def _missing(report: Report) -> list[str]:
-    """The names of missing outputs, one line per case, followed by files with similar names."""
+def _missing(report: Report, most: int) -> list[str]:
+    """The names of missing outputs, `most` of a case in one line, followed by files with similar names."""
     lines: dict[str, list[str]] = {}
     more: dict[str, list[str]] = {}
     for case, output in _outputs(report, "missing"):
         lines.setdefault(case.name, []).append(output.name)
         found = output.reason.partition("; ")[2]
         more.setdefault(case.name, []).extend([f"  {output.name}: {found}"] if found else [])
-    return [line for case, names in lines.items() for line in (f"{case}: {', '.join(names)}", *more[case])]
+    shown = {
+        case: [*names[:most], *([f"{len(names) - most} more"] * (len(names) > most))] for case, names in lines.items()
+    }
+    return [line for case, names in shown.items() for line in (f"{case}: {', '.join(names)}", *more[case])]
 
 
 def _listed(title: str, lines: list[str], most: int) -> list[str]:
