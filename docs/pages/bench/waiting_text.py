@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, name_axes, new_figure, plain_axes, save
+from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import duration, markdown
 from pages.store import figures
 from pages.store.program import RESULTS
@@ -81,11 +81,11 @@ def draw(result: dict[str, Any]) -> None:
         for row, colour in zip(shown, COLOURS * len(shown)):
             start = row["said"]["start"]["at"] + row["said"]["start"]["initial"]
             points = [(point["seconds"] - start, point["psnr_full"]) for point in row["curve"]]
-            axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=3)
-            label = f"{row['preset']}, {row['iterations']}"
-            axes.annotate(label, points[-1], xytext=(-4, -12), textcoords="offset points", ha="right", fontsize=8)
+            label = f"{row['preset']}, {row['iterations']} iterations"
+            axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=3, label=label)
         figures.level(axes, shown[0]["blend"]["psnr_full"], "blend")
         axes.set_title(clip, fontsize=9)
         name_axes(axes, "seconds of training", "held-out PSNR, dB")
         plain_axes(axes)
+        legend(axes, loc="lower right")
     save(figure, PICTURE)

@@ -1,11 +1,12 @@
 """Train on simulated hand-held clips with true, estimated and no poses, over seeds, and write the table.
 
-    python docs/make.py recordings.hand_held_training measure [--seeds 3] [--jobs 1]
+    python docs/make.py recordings.hand_held_training measure [--seeds 3] [--jobs 1] [--poses NAME]
 
-The clips are those of `recordings.hand_held` with rigid and with breathing tissue. Estimated poses come from
-`endotsr poses`, which sees the held-out pictures too, as any program that estimates a trajectory does. *None* is a
-static camera. The preset is `quick` at its full length; a seed sets scene and training. Finished runs are kept, and a
-stopped command continues.
+The clips are those of `recordings.hand_held` with rigid and with breathing tissue. Estimated poses come from `endotsr
+poses`, which sees the held-out pictures too, as any program that estimates a trajectory does. *None* is a static
+camera. The preset is `quick` at its full length; a seed sets scene and training. `FURTHER` starts with more points
+where later frames show what the first one does not. Finished runs are kept, and a stopped command continues; --poses
+measures one kind and keeps the other rows of the record.
 """
 
 import argparse
@@ -13,14 +14,17 @@ from dataclasses import replace
 from typing import Any
 
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.config import PRESETS
 from pages.recordings.hand_held_clips import CYCLES, FRAMES, SEEN, SHIFT, SMALL, simulated
 from pages.store import kept
+from pages.store.commands import loaded
 from pages.store.intervals import shown
 from pages.store.program import Program
 from pages.store.tables import means, noted, where
 
 SCENES, PRESET = ("rigid", "breathing"), "quick"
-POSES = ("true", "estimated", "none", "estimated and corrected")
+FURTHER = "true, four times as many points from later frames"
+POSES = ("true", "estimated", "none", "estimated and corrected", FURTHER)
 BASELINES = {"nearest_frame": "copy of the nearest frame", "flow_interpolation": "flow between two frames"}
 COLUMNS = (("psnr_tissue", 2), ("ssim_full", 4))
 
@@ -29,7 +33,7 @@ def with_poses(sequence: Sequence, poses: str) -> Sequence:
     """The clip with one of `POSES`."""
     import endotsr
 
-    if poses == "true":
+    if poses in ("true", FURTHER):
         return sequence
     if poses == "none":
         return replace(sequence, cameras=[sequence.cameras[0]] * sequence.count, static_camera=True)
@@ -41,8 +45,10 @@ def of_run(scene: str, poses: str, seed: int) -> dict[str, Any]:
     import endotsr
 
     shown_clip = with_poses(simulated(scene, SMALL, seed), poses)
-    corrected: dict[str, Any] = {"model": {"pose_correction": True}} if poses == POSES[3] else {}
-    run = endotsr.train(shown_clip, endotsr.make_config(PRESET, training={"seed": seed}, **corrected))
+    more: dict[str, Any] = {"model": {"pose_correction": True}} if poses == POSES[3] else {}
+    if poses == FURTHER:
+        more = {"initialisation": {"other_frame_points": 4 * PRESETS[PRESET].initialisation.other_frame_points}}
+    run = endotsr.train(shown_clip, endotsr.make_config(PRESET, training={"seed": seed}, **more))
     result = run.evaluate()
     row = result["held_out"]["mean"]
     baselines = {name: found["mean"]["psnr_tissue"] for name, found in result["baselines"].items()}
@@ -72,15 +78,18 @@ def table(result: dict[str, Any]) -> str:
 def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Every run, those with corrected poses last."""
     seeds = range(options.seeds)
-    runs = [(scene, poses, seed) for of in (POSES[:3], POSES[3:]) for seed in seeds for scene in SCENES for poses in of]
+    kinds = ((options.poses,),) if options.poses else (POSES[:3], POSES[3:])
+    runs = [(scene, poses, seed) for of in kinds for seed in seeds for scene in SCENES for poses in of]
     about = {
         "sources": kept.sources("training", "clips/poses"), "preset": PRESET, "frames": FRAMES, "size": SMALL,
         "shift": SHIFT, "cycles": CYCLES, "seen": SEEN,
     }  # fmt: skip
     answers = kept.measured(options.record, about, runs, of_run, options.jobs)
-    return {"seeds": options.seeds, "answers": {kept.key_of(run): answer for run, answer in answers.items()}}
+    known = loaded(options.record)["answers"] if options.poses else {}
+    return {"seeds": options.seeds, "answers": known | {kept.key_of(run): answer for run, answer in answers.items()}}
 
 
 PROGRAM = Program(
-    __name__, "guides/prepare.md", {"training": table}, "hand_held_training.json", measured, {"--seeds": 3, "--jobs": 1}
-)
+    __name__, "guides/prepare.md", {"training": table}, "hand_held_training.json", measured,
+    {"--seeds": 3, "--jobs": 1, "--poses": {"choices": POSES, "help": "one kind (default: all)"}},
+)  # fmt: skip
