@@ -10,6 +10,7 @@ from endotsr.cli.parts import progress
 from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.waiting import in_words, waiting_line
 from endotsr.clips.sequences.checks.duration import (
+    PAGES,
     TimedCommand,
     assumed_unit,
     estimated_seconds,
@@ -178,3 +179,13 @@ def test_only_the_iterations_gain_from_avx512(monkeypatch):
         seconds[register] = estimated_seconds(plan._replace(vectors=vector_factor()), unit)
     assert seconds[32].iterations == pytest.approx(1.5 * seconds[64].iterations)
     assert seconds[32]._replace(iterations=0.0) == pytest.approx(seconds[64]._replace(iterations=0.0))
+
+
+def test_the_evaluation_follows_the_speed_of_the_iterations_in_part_and_the_gaussians():
+    """Libraries do most of it; the viewer and the report are written for every Gaussian."""
+    few, many = (plan_of(preset, 63, 1)._replace(perceived=True) for preset in ("quick", "sharp"))
+    slow, assumed = (estimated_seconds(few, unit).evaluation for unit in (4 * assumed_unit(1), assumed_unit(1)))
+    assert few.vectors == 1.0 and slow == pytest.approx(2 * assumed)
+    more = many.config.density.maximum - few.config.density.maximum
+    found = estimated_seconds(many, 0.1).evaluation - estimated_seconds(few, 0.1).evaluation
+    assert more > 0 and found == pytest.approx(few.evaluating(0.1) * PAGES * more)
