@@ -170,8 +170,8 @@ def test_the_evaluation_of_a_simulated_clip_is_forecast_with_its_known_motion(co
     assert more == pytest.approx(1.6 * known.evaluating(0.1) * pairs)
 
 
-def test_only_the_iterations_gain_from_avx512(monkeypatch):
-    """The time of an iteration depends on the vectors; reading, motion and evaluation of the same machine do not."""
+def test_the_vectors_change_the_forecast_of_the_iterations_alone(monkeypatch):
+    """Reading, motion and evaluation are assumed to take as long without AVX-512."""
     plan, seconds = plan_of("quick", 63, 2)._replace(perceived=True), {}
     for register, unit in ((64, 0.08), (32, 0.12)):
         monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", register)

@@ -11,7 +11,7 @@ from pages.store.tables import noted, numbers
 PICTURE = RESULTS / "waiting.svg"
 QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
-CLOCKS = {"processor": "processor time of one thread", "wall": "time of two threads on the clock"}
+CLOCKS = {"processor": "processor time of one thread", "wall": "two threads on the clock"}
 FORMERLY = 30  # iterations before the forecast of rows that do not state it
 VECTORS = {64: "AVX-512", 32: "AVX2", 0: ""}  # by the bytes of a register; 0: not recorded
 
@@ -28,7 +28,7 @@ def told(row: dict[str, Any], when: str) -> str:
 def named(row: dict[str, Any]) -> str:
     """Clip, preset, seed, vectors of the processor, clock, and whether the kernels were compiled first."""
     about = [row["clip"], f"`{row['preset']}`", f"{row['iterations']} iterations", f"seed {row['seed']}"]
-    about += [VECTORS[row["register_bytes"]], "on the clock" * (row["clock"] == "wall")]
+    about += [VECTORS[row["register_bytes"]], CLOCKS["wall"] * (row["clock"] == "wall")]
     return ", ".join(filter(None, (*about, "with compilation" * row["cold"])))
 
 

@@ -4,6 +4,7 @@ The records are docs/results/minutes.json (`bench.minutes`), for whole commands 
 for the simulated clip those of `book.running_clip` and of `full_size`.
 """
 
+from collections.abc import Mapping, Sequence
 from statistics import mean
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from endotsr.config import PRESETS
 from endotsr.results.report.tables import duration, markdown
-from pages.bench.waiting_text import VECTORS
+from pages.bench.waiting_text import CLOCKS, VECTORS
 from pages.book import running_clip
 from pages.full_size import page as full_size
 from pages.full_size import record
@@ -20,14 +21,24 @@ from pages.store.commands import loaded
 from pages.store.program import RESULTS, Program
 from pages.store.tables import noted
 
-MEASURED = (("PSNR full, dB", "psnr_full", 1.0, 2), ("LPIPS [0,1]", "lpips", 1.0, 4))  # head, key, unit, digits
-CLOCKED = {"wall": "on the clock", "processor": "processor time of one thread"}
-OF_RUN = ("seconds", "peak_memory_bytes", "gaussians")
-BASELINES = {"copy": "nearest_frame", "blend": "two_neighbours", "flow": "flow_interpolation"}
-SIZES = (("GB", "peak_memory_bytes", 1e9, 1), ("Gaussians", "gaussians", 1.0, 0))
+Columns = tuple[tuple[str, str, float, int], ...]
+MEASURED: Columns = (
+    ("PSNR full, dB", "psnr_full", 1.0, 2),
+    ("LPIPS [0,1]", "lpips", 1.0, 4),
+)  # head, key, unit, digits
+OF_RUN = ("seconds", "threads", "peak_memory_bytes", "gaussians")
+SIZES: Columns = (("GB", "peak_memory_bytes", 1e9, 1), ("Gaussians", "gaussians", 1.0, 0))
 
 
-def table(columns: tuple[tuple[str, str, float, int], ...] = MEASURED) -> str:
+def values(runs: Sequence[Mapping[str, Any]], columns: Columns) -> list[str]:
+    """Means over runs, "-" for what they do not have."""
+    return [
+        f"{mean(run[key] for run in runs) / unit:.{digits}f}" if key in runs[0] else "-"
+        for _, key, unit, digits in columns
+    ]
+
+
+def table(columns: Columns = MEASURED) -> str:
     """One row per preset, the fastest first, means over the seeds; then the clip and the machine."""
     found = loaded(RESULTS / "minutes.json")
     presets = {name: runs for name, runs in found["rows"].items() if name in PRESETS}
@@ -36,7 +47,7 @@ def table(columns: tuple[tuple[str, str, float, int], ...] = MEASURED) -> str:
         [
             f"`{name}`",
             f"{seconds / 60:.1f}",
-            *(f"{mean(run[key] for run in of) / unit:.{digits}f}" for _, key, unit, digits in columns),
+            *values(of, columns),
             str(len(of)),
         ]
         for seconds, name, of in rows
@@ -54,9 +65,9 @@ def table(columns: tuple[tuple[str, str, float, int], ...] = MEASURED) -> str:
 
 # register bytes, clock and compilation of the columns of `whole`, which are left out if nothing is measured
 WHOLE = {
-    (size, clock, cold): ", ".join(filter(None, (name, CLOCKED[clock], "first training" * cold)))
+    (size, clock, cold): ", ".join(filter(None, (name, CLOCKS[clock], "first training" * cold)))
     for size, name in VECTORS.items()
-    for clock in CLOCKED
+    for clock in CLOCKS
     for cold in (True, False)
 }
 
@@ -73,8 +84,8 @@ def whole() -> str:
     cells = [[*name, *(of.get(kind, "-") for kind in kinds)] for name, of in sorted(found.items())]
     machines, sizes = sorted({row["machine"]["processor"] for row in rows}), sorted({row["size"] for row in rows})
     about = (
-        "Whole commands in minutes, from reading the clip to its report, with LPIPS. *On the clock* is with two "
-        "threads, and *first training* includes the compilation of the kernels, once on a machine. "
+        "Whole commands in minutes, from reading the clip to its report, with LPIPS; "
+        "*first training* includes the compilation of the kernels, once on a machine. "
         f"Frames of {', '.join(sizes)}; {', '.join(machines)}; {max(row['date'] for row in rows)}."
     )
     return noted(("Preset", "Clip", *(WHOLE[kind] for kind in kinds)), cells, about)
@@ -96,23 +107,22 @@ def cutting() -> str:
     rows["paper"] = [
         row for row in loaded(RESULTS / "ablation_cutting.json")["rows"] if row["configuration"] == "A+S+L"
     ]
+    columns = (*SIZES, *MEASURED)
     cells = [
-        [f"`{name}`", f"{mean(row['seconds'] for row in of) / 60:.0f}",
-         *(f"{mean(row[key] for row in of) / unit:.{digits}f}" if key in of[0] else "-"
-           for _, key, unit, digits in (*SIZES, *MEASURED)), str(len(of))]
+        [f"`{name}`", f"{mean(row['seconds'] for row in of) / 60:.0f}", str(of[0]["threads"]), *values(of, columns),
+         str(len(of))]
         for name, of in rows.items()
     ]  # fmt: skip
     first = runs["quick"][0]
-    for label, key in BASELINES.items():
-        known = first["baselines"][key]["mean"]
-        cells.append([label, "-", "-", "-", *(f"{known[value]:.{digits}f}" for _, value, _, digits in MEASURED), "-"])
+    for key in PREDICTIONS[1:]:
+        cells.append([LABELS[key], "-", "-", *values([first["baselines"][key]["mean"]], columns), "-"])
     source = first["run"]["input"]
     size = f"{source['width']}x{source['height']}"
     about = (
         f"{source['source']}, {source['frames']} frames of {size}, every eighth held out. "
-        "The minutes are of machines that did other work, `paper` on one thread and the others on two."
+        "The minutes are of machines that did other work."
     )
-    return noted(("Preset", "Minutes", *(head for head, *_ in (*SIZES, *MEASURED)), "Seeds"), cells, about)
+    return noted(("Preset", "Minutes", "Threads", *(head for head, *_ in columns), "Seeds"), cells, about)
 
 
 def simulated() -> str:

@@ -27,7 +27,7 @@ BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
 # Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.13 s were measured on one
-# machine. The parts beside the iterations took no longer there.
+# machine. The parts beside the iterations are assumed to take as long on both.
 WITHOUT_AVX512 = 1.5
 # Assumed growth for `density.growth = "threshold"`, whose final number is not known in advance: a larger weight of the
 # similarity gives larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
@@ -177,7 +177,7 @@ class TimedCommand(NamedTuple):
     vectors: float = 1.0  # `vector_factor` of the processor
 
     def alone(self, unit: float) -> float:
-        """Seconds per unit of the parts beside the iterations, which use one thread and gain nothing from AVX-512.
+        """Seconds per unit of the parts beside the iterations, on one thread; AVX-512 is assumed to be no gain there.
 
         unit   seconds per unit of the iterations, with the threads of the plan
         """
