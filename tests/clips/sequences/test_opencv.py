@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import area_resize, canny_edges, dense_flow, read_png, warp_bilinear, write_png
+from endotsr.clips.opencv import area_resize, canny_edges, dense_flow, grown, read_png, warp_bilinear, write_png
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.errors import InputError
 
@@ -130,3 +130,14 @@ def test_the_bound_on_pixels_holds_for_a_tiff(tmp_path):
         [sys.executable, "-c", TOO_LARGE, str(tmp_path / "a.tiff")], check=False, capture_output=True, text=True
     )
     assert (process.returncode, process.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("pixels", [0, 0.5, 1, 1.5, 2, 6, 11.9, 12, 12.1, 20])
+def test_a_grown_mask_holds_the_pixels_within_the_radius(pixels):
+    mask = RNG.random((40, 53)) > 0.995
+    mask[0, 0] = True
+    y, x = np.nonzero(mask)
+    rows, columns = np.indices(mask.shape)
+    squared = ((rows[..., None] - y) ** 2 + (columns[..., None] - x) ** 2).min(axis=2)
+    np.testing.assert_array_equal(grown(mask, pixels), squared <= pixels**2)
+    assert not grown(np.zeros((5, 5), bool), pixels).any()

@@ -18,6 +18,7 @@ from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.png import LARGEST_FILE, pixels_only
 
 CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth
+LARGEST_DISC = 12  # px: the radius up to which a dilation is faster than a distance transform
 
 
 def decode_png(data: bytes, name: object) -> Array:
@@ -162,14 +163,18 @@ def gaussian_blur(plane: Array, deviation: float) -> NDArray[np.float32]:
     return _cv2().GaussianBlur(plane, (0, 0), deviation)
 
 
-def warp_mask(mask: Array, flow: Array) -> NDArray[np.float32]:
-    """A soft mask (H, W) float32 at y + flow[1], x + flow[0], bilinear; beyond the border, the nearest value.
+def warp_mask(mask: Array, flow: Array, place: tuple[slice, slice]) -> NDArray[np.float32]:
+    """A soft mask (H, W) at y + flow[1], x + flow[0], bilinear; beyond the border, the nearest value.
 
     OpenCV rounds positions to 1/32 pixel, which is finer than the accuracy of any flow.
+
+    flow     (2, h, w) px of the pixels of `place`
+    place    rows and columns, h and w of them
+    Returns: (h, w) float32.
     """
     height, width = mask.shape
-    x = (np.arange(width, dtype=np.float32)[None, :] + flow[0]).astype(np.float32)
-    y = (np.arange(height, dtype=np.float32)[:, None] + flow[1]).astype(np.float32)
+    x = np.arange(width, dtype=np.float32)[None, place[1]] + flow[0]
+    y = np.arange(height, dtype=np.float32)[place[0], None] + flow[1]
     cv2 = _cv2()
     return cv2.remap(np.ascontiguousarray(mask), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
@@ -179,6 +184,10 @@ def grown(mask: NDArray[np.bool_], pixels: float) -> NDArray[np.bool_]:
     if pixels <= 0 or not mask.any():
         return mask.copy()
     cv2 = _cv2()
+    if pixels <= LARGEST_DISC:  # the same pixels as below, in less time
+        across = np.arange(-int(pixels), int(pixels) + 1)
+        disc = (across[:, None] ** 2 + across**2 <= pixels**2).astype(np.uint8)
+        return cv2.dilate(mask.astype(np.uint8), disc) > 0
     distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return distance <= pixels
 

@@ -21,6 +21,7 @@ far from both keys. Its expected gain is that loss, averaged over all frames: wh
 agreement. Below LEAST_GAIN no frame is named.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -140,24 +141,27 @@ def _carried(mask: BoolArray, to_last: Sequence[FloatArray], frames: range, lag:
 
 def carried_once(mask: FloatArray, flow: FloatArray) -> FloatArray:
     """A soft mask (H, W) at the next frame; flow (2, H, W) px from that frame to the one of the mask."""
-    moved = warp_mask(mask, flow)
-    place = _around(moved > 0.5)
+    moved = np.zeros_like(mask)
+    if not mask.any():
+        return moved
+    near = _around(mask > 0, math.ceil(max(flow.max(), -flow.min())) + 1)  # the others take a 0 from where they point
+    moved[near] = warp_mask(mask, flow[:, *near], near)
+    place = _around(moved > 0.5, REACH)
     inside = ~grown(moved[place] <= 0.5, INSIDE)
     if np.count_nonzero(inside) < LEAST_PIXELS:
         return moved
     weight = gaussian_blur(inside.astype(np.float32), SPREAD) + np.float32(1e-4)
-    edge, flow = grown(inside, EDGE) & ~inside, flow.copy()
-    for axis in flow:
-        part = axis[place]
-        part[edge] = (gaussian_blur(part * inside, SPREAD) / weight)[edge]
-    moved[place][edge] = warp_mask(mask, flow)[place][edge]
+    edge, own = grown(inside, EDGE) & ~inside, flow[:, *place].copy()
+    for axis in own:
+        axis[edge] = (gaussian_blur(axis * inside, SPREAD) / weight)[edge]
+    moved[place][edge] = warp_mask(mask, own, place)[edge]
     return moved
 
 
-def _around(mask: BoolArray) -> tuple[slice, slice]:
-    """Rows and columns of the pixels whose flow may change; nothing outside of them depends on the instrument."""
+def _around(mask: BoolArray, reach: int) -> tuple[slice, slice]:
+    """Rows and columns of the pixels of a mask and of all at most `reach` px from them; empty for an empty mask."""
     found = [np.flatnonzero(mask.any(axis=1 - axis)) for axis in (0, 1)]
-    rows, columns = (slice(max(0, at[0] - REACH), at[-1] + REACH + 1) if at.size else slice(0) for at in found)
+    rows, columns = (slice(max(0, at[0] - reach), at[-1] + reach + 1) if at.size else slice(0) for at in found)
     return rows, columns
 
 

@@ -7,7 +7,6 @@ missing or damaged file are computed; a failure to write one is no error.
 """
 
 import contextlib
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import dense_flow
 from endotsr.clips.opencv.library import cv2_library
 from endotsr.clips.sequences.clip import Picture
+from endotsr.clips.sequences.clip_pictures import all_decoded, fingerprint
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.files import in_threads
 from endotsr.untrusted.writing import replace_file
@@ -60,7 +60,7 @@ def motion_of(pictures: Sequence[Picture]) -> ClipFlows:
     """The flows of a clip, pictures (H, W, 3) uint8 in time order, from the cache if they are there."""
     if len(pictures) < 2:
         return ClipFlows([], [])
-    file = flow_folder() / f"{_fingerprint(pictures)}.npy"
+    file = flow_folder() / f"{fingerprint(pictures, f'{cv2_library().__version__} {STEPS}')}.npy"
     levels = _kept(file, (2, len(pictures) - 1, 2, *pictures[0].shape[:2]))
     if levels is None:
         levels = _computed(pictures)
@@ -70,7 +70,7 @@ def motion_of(pictures: Sequence[Picture]) -> ClipFlows:
 
 def _computed(pictures: Sequence[Picture]) -> NDArray[np.int16]:
     """The flows (2, n - 1, 2, H, W) in steps, forward first."""
-    planes = [np.ascontiguousarray(picture.transpose(2, 0, 1)) for picture in pictures]
+    planes = [np.ascontiguousarray(picture.transpose(2, 0, 1)) for picture in all_decoded(pictures)]
     levels = np.empty((2, len(planes) - 1, 2, *planes[0].shape[1:]), np.int16)
 
     def between(i: int) -> None:
@@ -79,14 +79,6 @@ def _computed(pictures: Sequence[Picture]) -> NDArray[np.int16]:
 
     in_threads(between, len(planes) - 1)
     return levels
-
-
-def _fingerprint(pictures: Sequence[Picture]) -> str:
-    """SHA-256 (hex) of the pictures and of all that decides their flows besides them."""
-    found = hashlib.sha256(f"{cv2_library().__version__} {STEPS} {[picture.shape for picture in pictures]}".encode())
-    for picture in pictures:
-        found.update(np.ascontiguousarray(picture).data)
-    return found.hexdigest()
 
 
 def _kept(file: Path, shape: tuple[int, ...]) -> NDArray[np.int16] | None:

@@ -5,7 +5,7 @@ In: a clip. Out: mask pictures (white = excluded), an overlay for inspection, an
 """
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -16,6 +16,7 @@ from endotsr.clips.opencv import area_resize, read_png, write_png
 from endotsr.clips.sequences.carry_masks import LEAST_GAIN, carry_masks
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.clip_flows import motion_of
+from endotsr.clips.sequences.clip_pictures import left_pictures
 from endotsr.clips.sequences.drawing import DrawnClip, drawing_of
 from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
 from endotsr.clips.sequences.files import shortened
@@ -28,6 +29,7 @@ from endotsr.clips.sequences.sources import PROPOSAL
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
+from endotsr.untrusted.files import in_threads
 from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
 
 OVERLAY = "proposed_masks.png"
@@ -36,14 +38,9 @@ OTHER_COLOUR, DRAWN_COLOUR, NEVER_COLOUR = (0, 255, 0), (0, 110, 255), (255, 150
 SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, per row, and their largest width
 
 
-def left_pictures(clip: Clip) -> Iterator[Picture]:
-    """The left pictures of all frames, decoded one at a time."""
-    return (pair.left for pair in clip.pictures(list(range(clip.count))))
-
-
 def _proposed(clip: Clip) -> Proposal:
     """The proposal for a clip. Raises InputError if it leaves most frames without tissue."""
-    proposal = propose_masks(left_pictures(clip))
+    proposal = propose_masks(pair.left for pair in clip.pictures(list(range(clip.count))))
     empty = without_tissue(clip, proposal)
     if len(empty) > MOST_WITHOUT * clip.count:
         raise InputError(
@@ -86,7 +83,7 @@ def from_keys(source: Path, margin: int, said: list[str]) -> Propose:
     """
 
     def propose(clip: Clip) -> Proposal:
-        pictures = list(left_pictures(clip))
+        pictures = left_pictures(clip)
         found = read_keys(source, clip, pictures[0])
         carried = carry_masks(motion_of(pictures), found.keys, margin)
         if carried.distrusted:
@@ -139,7 +136,7 @@ def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:
 
     Raises:  InputError as `from_keys` and `drawing_of`.
     """
-    pictures = list(left_pictures(clip))
+    pictures = left_pictures(clip)
     if keys is None:
         return drawing_of(clip, pictures, wanted, propose_masks(pictures))
     height, width = pictures[0].shape[:2]
@@ -205,8 +202,10 @@ def write_proposal(clip: Clip, out: Path, propose: Propose | None = None, replac
 
 
 def _write_masks(folder: Path, names: list[str], proposal: Proposal) -> None:
-    for name, plane in zip(names, proposal.excluded):
-        write_png(folder / f"{name}.png", np.where(plane, 255, 0).astype(np.uint8))
+    def write(i: int) -> None:
+        write_png(folder / f"{names[i]}.png", np.where(proposal.excluded[i], 255, 0).astype(np.uint8))
+
+    in_threads(write, len(proposal.excluded))
 
 
 def origin_of(proposal: Proposal, given: BoolArray | None = None) -> str:
