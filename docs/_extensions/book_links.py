@@ -1,20 +1,22 @@
 """Links added when a page is read; the sources stay plain text.
 
 A specification page has a line of links for each of its equations below its heading. Names of the package in back
-quotes become links, in pages and in the Markdown cells of notebooks. The reverse pass of a notebook gets an anchor.
+quotes become links, in pages and in the Markdown cells of notebooks. The reverse pass of a notebook gets an anchor. A
+chapter ends with the subjects under which docs/references.md names works for it.
 """
 
 import re
 from collections.abc import Callable
 
 from book_map import equations
-from book_pages import link_line
+from book_pages import DOCS, link_line
 from package_names import linkable
 from sphinx.application import Sphinx
 
 CODE = re.compile(r"(?<![`}\\])`([A-Za-z_][\w.]*)(\([^`\n]*\))?`(?!`)")
 FENCE = re.compile(r"^(```|~~~|\$\$)")
 REVERSE = "# ## The reverse pass"
+SUBJECT = re.compile(r"^\*\*([^*]+)\*\* \((every chapter|chapters? [^)]*\d)\)\.", re.MULTILINE)
 
 
 def linked(line: str) -> str:
@@ -52,8 +54,22 @@ def specification(name: str, text: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def literature(text: str, chapter: int) -> list[str]:
+    """Subjects of a page of references that name a chapter, such as "(chapters 6 to 9, 13)"; not "(every chapter)"."""
+    found = []
+    for subject, chapters in SUBJECT.findall(text):
+        spans = [list(map(int, re.findall(r"\d+", part))) for part in chapters.split(",")]
+        if any(span and span[0] <= chapter <= span[-1] for span in spans):
+            found.append(subject)
+    return found
+
+
 def notebook(name: str, text: str) -> str:
-    """The notebook with links in its Markdown cells and an anchor above its reverse pass."""
+    """The notebook with links in its Markdown cells, an anchor above its reverse pass, and its literature."""
+    subjects = literature((DOCS / "references.md").read_text(encoding="utf-8"), int(name[:2]))
+    if subjects:
+        named = ", ".join(subject[0].lower() + subject[1:] if subject[1].islower() else subject for subject in subjects)
+        text = f"{text.rstrip()}\n\n# %% [markdown]\n# **Literature** on {named}: {{doc}}`/references`.\n"
     parts = re.split(r"^(# %%.*)$", text, flags=re.MULTILINE)
     for k in range(1, len(parts), 2):
         if "[markdown]" in parts[k]:
