@@ -5,9 +5,9 @@
 
 --only    kernels whose name starts with this; may be given several times
 --sample  at most this number of mutants of a kernel, evenly spread
---survivors   only what survived the run in the JSON file and is not listed as equivalent, and what is not in the file;
-              the file is brought up to date (a run that is cut short by --minutes is continued so); --sample then
-              chooses among what is not in the file
+--survivors   only what survived the run in the JSON file and is not listed as equivalent, what is not in the file, and
+              what was detected by a check that is gone; the file is brought up to date (a run that is cut short by
+              --minutes is continued so); --sample then chooses among what is not in the file
 The page docs/discrimination.md is made from the result by tests/mutation/page.py.
 """
 
@@ -33,7 +33,7 @@ from endotsr.training.runs.machine import machine, now, versions  # noqa: E402
 from mutation.checks import COLLECTING, SLOW, SUITES, Check, run  # noqa: E402
 from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
-from mutation.merge import added, names, of_today, survivors, whole  # noqa: E402
+from mutation.merge import added, names, of_today, still_checked, survivors, whole  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
 from mutation.registry import DEFECT, defect_mutants  # noqa: E402
@@ -113,13 +113,15 @@ class Plugin:
         chosen = [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]
         groups = [every(mutants(k, functions[k]), self.options.sample) for k in wanted]
         chosen += [m for row in zip_longest(*groups) for m in row if m is not None]  # so that a stop is fair to all
+        checks = Checks(session.items, self.options.keep, self.say)
         if self.options.survivors:
-            self.before = of_today(self.before, functions)
+            self.before = still_checked(
+                of_today(self.before, functions), {c.name for c in checks.all} | set(checks.left_out)
+            )
             old, there = survivors(self.before), names(self.before)
             chosen = [m for m in chosen if m.name not in there]
             chosen += [m for k in wanted for m in mutants(k, functions[k]) if m.name in old]
         self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
-        checks = Checks(session.items, self.options.keep, self.say)
         work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
         outcomes: dict[str, Outcome] = {}
         for mutant, outcome in in_processes(work, self.options.jobs):

@@ -1,6 +1,7 @@
 """Adds a later run on the survivors of an earlier one to its report."""
 
 import json
+from collections.abc import Collection
 from typing import Any
 
 from mutation.equivalents import reasons
@@ -28,6 +29,19 @@ def of_today(result: dict[str, Any], functions: dict[str, Any]) -> dict[str, Any
             kernels[kernel] = {name: row for name, row in found.items() if name in today}
     planted = {d.name for d in defect_mutants(functions)}
     return result | {"kernels": kernels, "defects": {n: r for n, r in result["defects"].items() if n in planted}}
+
+
+def still_checked(result: dict[str, Any], today: Collection[str]) -> dict[str, Any]:
+    """The report without the mutants and defects that a check which is gone has detected; numbers of checks stay.
+
+    today   names of today's checks
+    """
+    gone = {k for k, name in enumerate(result["checks"]) if name not in today}
+    kept = lambda found: {name: row for name, row in found.items() if gone.isdisjoint(row[1])}
+    return result | {
+        "kernels": {kernel: kept(found) for kernel, found in result["kernels"].items()},
+        "defects": kept(result["defects"]),
+    }
 
 
 def whole(result: dict[str, Any], functions: dict[str, Any]) -> bool:

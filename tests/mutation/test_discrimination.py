@@ -10,7 +10,7 @@ import pytest
 
 from mutation.equivalents import EQUIVALENT
 from mutation.kernels import kernels, planted
-from mutation.merge import added, names, of_today, survivors, whole
+from mutation.merge import added, names, of_today, still_checked, survivors, whole
 from mutation.mutator import mutants
 from mutation.page import PAGE, RESULT, page, rows
 from mutation.registry import DEFECTS, defect_mutants
@@ -83,6 +83,14 @@ def test_what_the_source_no_longer_has_leaves_the_report(result):
     assert of_today(old, functions) == {"kernels": {kernel: {}}, "defects": {}}
     today = of_today(result, functions)
     assert today["defects"] == result["defects"] and names(today) <= names(result)
+
+
+def test_a_detection_by_a_check_that_is_gone_is_measured_again():
+    seen = {"by both": ["sign", [0, 1], None], "by the one that stays": ["sign", [1, -1], None]}
+    old = {"checks": ["gone", "stays"], "kernels": {"k": seen}, "defects": {"d": ["k", [0, -1]], "e": ["k", [-1, 1]]}}
+    found = still_checked(old, ["stays", "new"])
+    assert found["kernels"] == {"k": {"by the one that stays": ["sign", [1, -1], None]}}
+    assert found["defects"] == {"e": ["k", [-1, 1]]} and found["checks"] == old["checks"]
 
 
 def test_a_report_is_whole_when_no_mutant_is_missing():
