@@ -45,10 +45,14 @@ camera = sequence.cameras[0]
 # %% [markdown]
 # ## The sheet
 #
-# A material point has two coordinates $(a,b)$ in millimetres. At time $t$ it is at
-# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane
-# waves and, for each motion $k$, a time course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction
-# $\mathbf v_k$. Newton's method finds each pixel's point, to $10^{-10}$ mm.
+# The world has the axes of the camera at rest: $x$ to the right, $y$ down and $z$ forward. A material point of the sheet
+# has two coordinates $(a,b)$ in millimetres. At time $t$ it is at
+# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$. Here *distance* is that
+# from the camera to the middle of the tissue, and $h$ is a sum of plane waves. The motions $k$ are the breathing, the
+# beat and the pull. Each has a time course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction $\mathbf v_k$.
+#
+# A pixel shows the material point that its ray meets. Newton's method finds this point, to $10^{-10}$ mm from the ray.
+# In the transcription below, `weight` returns three arrays: the weight and its derivatives with respect to $a$ and $b$.
 
 
 # %% tags=["transcription"]
@@ -92,7 +96,8 @@ for index in (0, 5, 11):
 # ## Each effect is a switch
 #
 # With all effects off, all frames are equal. With one effect on, the difference between two frames is that effect
-# alone.
+# alone. The figure shows the first ten effects of `EFFECTS`. Noise, instrument and highlights are shown as a frame, and
+# the errors of the depth as the prior depth. The other panels are differences of brightness between two frames.
 
 # %% tags=["hide-input"]
 tiny = SimulatorSettings(width=64, height=51, frames=8)
@@ -172,8 +177,42 @@ plt.show()
 # %% [markdown]
 # ## Where Gaussians start
 #
-# The first Gaussians should show the first frame roughly, so that gradients begin near the tissue. Each pixel $(i,j)$ that
-# is drawn in a training frame, with colour and depth $D$, becomes one Gaussian.
+# The first Gaussians should show the first frame roughly, so that gradients begin near the tissue. Each pixel that is
+# drawn in a training frame becomes one Gaussian.
+#
+# **Which pixels are drawn.** The mask $M_k$ of frame $k$ is true on tissue, and its prior depth $D_k$ is 0 where there
+# is none. (The reader of a recorded clip has clipped the depths of each frame to their percentiles 3 and 99.8.) In the
+# first training frame, which has the index 0 here, the candidates are the tissue pixels with depth.
+# `initialisation.first_frame_points` of them are drawn at random, without replacement. In another training frame, a
+# tissue pixel with depth is a candidate if the first frame has no tissue with depth there, or if the depth has changed
+# by more than $\tau$, which is `initialisation.motion_threshold`:
+#
+# $$
+# M_k\wedge(D_k>0)\wedge\Bigl(\neg\,(M_0\wedge D_0>0)\ \vee\ |D_k-D_0|>\tau\Bigr)
+# $$
+#
+# Each of these frames adds `initialisation.other_frame_points` divided by the number of frames of the clip, held-out
+# frames included, and rounded down. The preset `paper` has the numbers 35 000 and 5000, and $\tau=40$ scene units. If a
+# frame has fewer candidates than that, all of them are used. In clips of more than 150 frames, every second frame is
+# left out.
+#
+# <!-- definition: endotsr.definition.initialisation.drawn_pixels -->
+# ```python
+# def drawn_pixels(sequence, config, rng):
+#     """(frame, flat indices): pixels of the first training frame, then new or moved pixels of the others."""
+#     usable = sequence.masks & (sequence.depth > 0) & np.isfinite(sequence.depth)
+#     first, count = sequence.train_index[0], len(sequence.images)
+#     for k in sequence.train_index:
+#         if k > first and count > 150 and (k - first) % 2 == 0:  # a long clip: every second frame
+#             continue
+#         with np.errstate(invalid="ignore"):
+#             moved = np.abs(sequence.depth[k] - sequence.depth[first]) > config.motion_threshold
+#         wanted = np.flatnonzero(usable[k] & ((k == first) | ~usable[first] | moved))
+#         number = config.first_frame_points if k == first else config.other_frame_points // count
+#         yield k, wanted if wanted.size <= number else np.sort(rng.choice(wanted, number, replace=False))
+# ```
+#
+# Let $(i,j)$ be a drawn pixel, with column $i$ and row $j$ counted from 0, and let $D$ be its depth.
 #
 # **(3.1) The ray.** The projection of chapter 7 has $u=f_xx/z+c_x$. A pixel is sampled at its centre, $u=i+\frac12$, and
 # its depth is $z=D$, so $x=(i+\frac12-c_x)\,D/f_x$, and in the same way for $y$.
@@ -185,16 +224,18 @@ plt.show()
 # $$
 #
 # **(3.3) Colour.** The harmonics above degree 0 start at 0, so the displayed colour is $rgb=Y_{00}h_0+\frac12$ and
-# $h_0=(rgb-\frac12)/Y_{00}$.
+# $h_0=(rgb-\frac12)/Y_{00}$ with $Y_{00}=1/\sqrt{4\pi}$. The colours of a frame are its 8-bit values divided by 255.
 #
 # **(3.4) Size.** All three semi-axes are the root mean square distance to the three nearest other points, so
 # neighbours overlap and leave no holes. Two points may coincide; the floor keeps the logarithm finite:
-# $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. A sphere needs no rotation.
+# $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. With fewer than four points the mean is over the others that exist, and a
+# single point has the floor. A sphere needs no rotation, and the quaternion starts at $(1,0,0,0)$.
 #
 # **(3.5) Opacity** starts at 0.1. By (9.3) the gradient of a Gaussian is proportional to the light that reaches it. If all
 # Gaussians started opaque, those behind the first would have almost none.
 #
-# **(3.6) Motion.** The weights of the time bases start at 0 and their centres are evenly spaced: the scene is at rest.
+# **(3.6) Motion.** The weights of the time bases start at 0, their centres are evenly spaced from 0 to 1, and their
+# widths are `model.initial_width`, 0.01 in `paper`. With the weights 0 the scene is at rest.
 # By (4.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
 
 

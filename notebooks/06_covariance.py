@@ -19,7 +19,7 @@
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
-# | $\tilde q$ | stored quaternion, in the order $(w,x,y,z)$, of any length | (4, N) |
+# | $\tilde q$ | stored quaternion, also called *raw*, in the order $(w,x,y,z)$, of any length | (4, N) |
 # | $q=(w,\mathbf v)$ | the same with length 1; $\mathbf v=(x,y,z)$ | (4, N) |
 # | $s$ | stored logarithms of the semi-axes | (3, N) |
 # | $S=e^s$ | semi-axes at one standard deviation, in scene units | (3, N) |
@@ -70,8 +70,16 @@ N = 6
 # \end{aligned}
 # $$
 #
-# Two kinds of input need a rule. A log-scale outside $[-40,40]$ is clipped to that interval, since the square of a
-# larger scale could overflow. The zero quaternion has no direction and is taken as the identity $(1,0,0,0)$.
+# A Gaussian with the centre $\mu$ has the value $\exp\bigl(-\tfrac12(\mathbf p-\mu)^\top\Sigma^{-1}(\mathbf p-\mu)\bigr)$ at
+# the point $\mathbf p$. On the ellipsoid with the semi-axes $S_k$ along the columns of $R$ this is $e^{-1/2}$.
+#
+# Two kinds of input need a rule. In float32, the square of a scale overflows from a log-scale of about 44.4 on. A
+# log-scale outside $[-40,40]$ is clipped to that interval. The zero quaternion has no direction and is taken as the
+# identity $(1,0,0,0)$.
+#
+# `covariance_forward` returns $R$ and $S$ as a `Shape`, and not $\Sigma$. The compiled projection ({doc}`07_projection`)
+# works with these two and does not form $\Sigma$. In float32, the short semi-axes of a needle, a Gaussian with one long
+# and two short semi-axes, would lose their digits in the sums of $\Sigma$.
 #
 # <!-- definition: endotsr.definition.covariance.unit -->
 # ```python
@@ -193,7 +201,12 @@ np.testing.assert_allclose(covariance_forward(q, s + 60)[0].scale, np.exp(40.0))
 # **(6.8) The length.** From $q=\tilde q/\|\tilde q\|$ follows
 # $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the
 # rotation, so the component of $g_q$ along $q$ is removed. The same step rotates a longer $\tilde q$ by a smaller
-# angle, so the rest is divided by the length. At $\tilde q=0$ the gradient is set to 0.
+# angle, so the rest is divided by the length. At $\tilde q=0$ the gradient is set to 0. If the largest entry of
+# $\tilde q$ is below $10^{-20}$ in size, `unit` returns a smaller number than $1/\|\tilde q\|$, which keeps the gradient
+# finite.
+#
+# In the program, steps (6.1) and (6.2) belong to the reverse pass of the projection, (7.2) to (7.4).
+# `covariance_reverse` starts from $g_R$ and $g_S$, at (6.3).
 #
 # In the display the indices of $G$ count from 0, as in the code.
 #
@@ -364,7 +377,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (6.2) and (6.6).
+# 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (6.1), (6.2), and
+#    $\mathrm dR=[\mathrm d\theta]_\times R$ for a rotation by the small vector $\mathrm d\theta$.
 # 2. Write `covariance_reverse` from (6.3), (6.6) and (6.8) and let the golden cases judge it: `--only covariance`
 #    ({doc}`index`). Which case fails if the division by the length is omitted?
 # 3. The cell below answers this one. Change the order of the axes of a Gaussian: its log-scales become $(s_2,s_3,s_1)$

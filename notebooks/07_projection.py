@@ -81,6 +81,9 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 #   is $R\,\mathrm{diag}(S)^2R^\top$. The covariance on the screen is therefore $JW\,R\,\mathrm{diag}(S)^2R^\top\,(JW)^\top$,
 #   the last line with $T=JWR$.
 #
+# A Gaussian is drawn if its centre is in front of the *near plane*, which means $z>0.2$ scene units (`raster.near`).
+# Any other Gaussian contributes nothing, and its gradients are 0.
+#
 # Far off the axis the linear expansion grows without bound. The slope that enters $J$ is clamped for this reason, with
 # $\kappa=1.3$ in the presets `paper` and `legacy`: if the principal point is the centre of the image, the clamp begins
 # $(\kappa-1)/2$ of the width beyond its border. In `exact` there is no clamp. The centre is never clamped. The low-pass

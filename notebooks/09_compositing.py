@@ -115,6 +115,11 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # no contributor. If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the blend ends before Gaussian $k$. The preset `paper` has
 # $\alpha_{\max}=0.99$, $\alpha_{\mathrm{cut}}=1/255$ and $T_{\mathrm{stop}}=10^{-4}$; `exact` has 1, 0 and 0.
 #
+# The function `reach` of the definition marks the columns and the rows of a box around the support of a Gaussian. In
+# `paper`, $o\,e^{-q/2}\ge\alpha_{\mathrm{cut}}$ means $q\le\varrho^2$ with $\varrho^2=2\ln(o/\alpha_{\mathrm{cut}})$. The box
+# of this ellipse has the half sides $\varrho\sqrt a$ and $\varrho\sqrt c$, and a margin that is larger than rounding.
+# Outside this box $\alpha$ is below the cutoff. The box saves time and changes no pixel.
+#
 # <!-- definition: endotsr.definition.compositing.opacity_of -->
 # ```python
 # def opacity_of(logit):

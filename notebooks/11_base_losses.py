@@ -195,9 +195,10 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # ## Smoothness
 #
 # The first term, $\mathcal Q$, keeps the depth smooth on tissue, away from the depth edges $E$. These are the edges
-# that the detector of Canny ({doc}`/references`) finds in the rendered depth, with the thresholds 20 and 200. The
-# depth is first clipped to 0 to 255 and rounded down to whole scene units. The two total variations keep depth and
-# colour flat under the instrument, where nothing is observed.
+# that the detector of Canny ({doc}`/references`) finds in the rendered depth. It is the detector of `cv2.Canny`, with
+# Sobel filters of size 3, the gradient size $|g_x|+|g_y|$ and the thresholds 20 and 200. The depth is first clipped to 0
+# to 255 and rounded down to whole scene units. The detector has no closed formula, and the definition takes $E$ as an
+# argument. The two total variations keep depth and colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}

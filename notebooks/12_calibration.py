@@ -14,10 +14,15 @@
 # # 12. Calibration of the Laplacian weight
 #
 # The photometric loss and the Laplacian loss act on the same image, and one number sets their relative weight. The
-# paper derives this number, $\lambda_{\mathrm{lap}}$, from gradients. At full weight, and in the median over the
-# views, the gradient of the Laplacian loss with respect to the rendered image has a fixed ratio $r$ to the gradient of
-# the photometric loss. The paper uses the result, 0.83, for all sequences. Whether another sequence asks for another
-# weight is not measured here.
+# paper derives this number, $\lambda_{\mathrm{lap}}$, from gradients. During training a ramp raises the weight from 0 to
+# $\lambda_{\mathrm{lap}}$, its full value ({doc}`14_full_sequence`). At full weight, and in the median over the views, the
+# gradient of the Laplacian loss with respect to the rendered image has a fixed ratio $r$ to the gradient of the
+# photometric loss. The paper uses the result, 0.83, for all sequences. Whether another sequence asks for another weight
+# is not measured here; a table of {doc}`/specification/rulings` has the weights of two recorded clips.
+#
+# The preset `paper` does not calibrate. With `loss.lambda_lap = "auto"` the program first trains the base model, without
+# A, S and L, to iteration 3000 with the seed of the run. It calibrates the weight on this model, and then trains the
+# full model from the start with the result.
 #
 # | Symbol | Meaning | In `paper` |
 # |---|---|---|
@@ -56,8 +61,8 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # The views are spread evenly over the $n_{\mathrm{train}}$ training frames. Their positions are
 # $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$, with halves rounded to the even number; a
 # position that occurs twice counts once. Each view is rendered by the base model, without A and S, with all harmonic
-# degrees and before a black background. This chapter uses a blurred frame in place of the base render. The results of
-# true base renders differ from those below; the last tables of {doc}`/specification/rulings` have them for two clips.
+# degrees and before a black background, and is not clamped. This chapter uses a blurred frame in place of the base
+# render. The results of true base renders differ from those below, as the tables of {doc}`/specification/rulings` show.
 #
 # **(12.1) Two gradients.** The objective contains
 # $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the
@@ -171,8 +176,8 @@ np.testing.assert_allclose(
 #
 # Before you look: where on the tissue is the gradient of the Laplacian loss 0, although the render is wrong there?
 #
-# The second and the third panel show the absolute gradients of the two losses. The gradient of L1 has the same size
-# everywhere and changes only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from
+# The second and the third panel show the absolute gradients of the two losses. On tissue the gradient of L1 has the same
+# size everywhere and changes only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from
 # pixel to pixel. (Its colour scale is a quarter of the other one.)
 #
 # The right panel shows $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset
@@ -216,7 +221,10 @@ axes[3].legend()
 plt.show()
 
 # %% [markdown]
-# The gradient is 0 near the instrument, where no band value is valid.
+# The gradient is 0 at tissue pixels that no valid band value reads. These pixels are next to the instrument. A pixel
+# whose own band values are invalid can still have a gradient, if a valid value further away reads it: of the pixels at
+# which no band is valid, most do. Elsewhere on tissue a gradient of 0 is an exception, in which the signs of
+# neighbouring band values cancel.
 
 # %% [markdown]
 # ## The reverse pass

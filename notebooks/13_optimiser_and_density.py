@@ -161,6 +161,11 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # The harmonics are one array with one step count, although their rates differ. At $i=K_s+1$ the arrays $A$ and $C$ are
 # added. They are filled with 0 and have moments 0 and step count 0.
 #
+# The function `learning_rates` below has two more factors, which are 1 in `paper`. `deformation_position_factor`
+# multiplies the rate of the weights of the position channels. After iteration `annealing_from`, the constant rates
+# decay to the fraction `annealed_factor` of their value. The exposure of a frame ({doc}`11_base_losses`) and the
+# correction of a pose ({doc}`07_projection`) are options that `paper` does not use.
+#
 # **(13.5) Exponential decay.** A decaying rate falls to the fraction $\varphi=0.01$ of its start. Every iteration
 # multiplies it by the same factor, which is $\varphi^{1/T}$ if the decay starts at iteration 0. The decay of the
 # residuals starts at $K_s$:
@@ -279,7 +284,8 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 #
 # Each iteration before `density.until` adds its one view to both sums. A Gaussian is *visible* in a view if it is in
 # front of the near plane and the box around its support, the ellipse with $\alpha\ge\alpha_{\mathrm{cut}}$, contains
-# the centre of a pixel. A Gaussian that no view has shown has $\bar g_i=0$.
+# the centre of a pixel of the image ({doc}`09_compositing` has the sides of the box). A Gaussian that no view has shown
+# has $\bar g_i=0$.
 #
 # The gradient is not left per pixel for the following reason. The losses are means over pixels, so an image of twice
 # the size has about half the gradient per pixel and about the same $\bar g_i$. One threshold serves all sizes.

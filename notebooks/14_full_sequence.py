@@ -17,8 +17,9 @@
 # whole clip, evaluates held-out frames, and removes the components of the paper one by one.
 #
 # The settings are those of the preset `paper`, with a shorter schedule and three changes that suit a few small frames:
-# wider time bases, fewer initial points, and views between the frames. With these changes the runs are not the
-# published method, and the numbers below are not results for it.
+# wider time bases, fewer initial points, and views between the frames. For the shorter schedule, `with_iterations`
+# multiplies each milestone, such as $i_s$ or $K_s$ below, by $T/6000$ and rounds it. The interval of density control
+# stays 100. With these changes the runs are not the published method, and the numbers below are not results for it.
 #
 # The equations are {eq}`eq-6` of {doc}`/specification/06_objective`, and {eq}`eq-m1` and {eq}`eq-m2` of
 # {doc}`/specification/metrics`.
@@ -119,14 +120,18 @@ print(
 # statistics of density control are 0. Iteration $i$ has these steps, in this order:
 #
 # 1. **Rates and degree.** Compute the learning rates of iteration $i$, (13.5). The active degree of the harmonics is
-#    $\lfloor i/500\rfloor$, and 3 at most.
+#    $\lfloor i/500\rfloor$, and 3 at most. Coefficients above it do not enter the colour. Their gradient is 0, and step 8
+#    leaves them at 0.
 # 2. **Residuals.** At $i=K_s+1$, add the arrays $A$ and $C$, filled with 0, with moments 0 and step count 0.
 # 3. **Draw.** Draw one training frame, each with equal probability and independently of the draws before. Held-out
 #    frames are never drawn. (With `bridge_fraction`, some draws are times between two frames, {doc}`18_between`.)
 # 4. **Forward.** At the time $t$ of the frame, compute the deformed Gaussians {eq}`eq-b1`, for $i>K_s$ with the translation
 #    {eq}`eq-3` and the colour residual {eq}`eq-2`. Then compute covariance {eq}`eq-b2`, projection {eq}`eq-b3`, colour
-#    {eq}`eq-b4` and the composited image and depth {eq}`eq-b5`, before a black background.
-# 5. **Losses.** Compare image and depth with the frame and form the objective above.
+#    {eq}`eq-b4` and the composited image and depth {eq}`eq-b5`, before a black background. Chapters 4 and 6 to 9 derive
+#    these stages. Chapters 1, 2 and 5 have the residuals. Their atoms need the reduced phase of {doc}`01_dictionary`: an
+#    atom that is rounding noise instead of 0 would move its coefficients by up to a full step of Adam, (13.3).
+# 5. **Losses.** Compare image and depth with the frame and form the objective above. The colours of the frame are its
+#    8-bit values divided by 255, and the render is not clamped. A term of weight 0 is not computed.
 # 6. **Reverse.** Run the reverse pass of each stage in the opposite order. The result is the gradient with respect to every
 #    stored array, and the screen gradients $g_u,g_v$ on the way.
 # 7. **Statistic.** While $i<4000$, add the norm of the screen gradient of every visible Gaussian to its statistic, (13.6).
@@ -134,8 +139,9 @@ print(
 # 9. **Density control.** If $i$ is a multiple of 100 and $500<i<4000$, prune, clone and split with the parameters after
 #    the step, and set all statistics to 0 ({doc}`13_optimiser_and_density`).
 #
-# The numbers are those of `paper`. All draws, of frames and of the children of splits, come from one generator with
-# the seed of the run. The definition is as long as the list:
+# The numbers are those of `paper`. All draws come from one generator, `np.random.default_rng` with the seed of the run.
+# It first draws the initial points, frame by frame. Each iteration of `paper` then draws one integer, the position of
+# its frame among the training frames, and step 9 draws the children of splits. The definition is as long as the list:
 #
 # <!-- definition: endotsr.definition.train.weights_at -->
 # ```python
@@ -169,7 +175,10 @@ print(
 # ```
 #
 # `view_gradients`, printed in {doc}`00_why`, is steps 4 to 6. `controlled` is step 9: it calls `densify` and gives new
-# Gaussians the moments 0.
+# Gaussians the moments 0. Three names of the definition are not in the list. The argument `edges` gives the depth edges of
+# the smoothness loss. Its default is an image without edges, while the compiled training detects them in the rendered
+# depth. With `legacy_skip`, an option that is off in `paper`, an iteration with density control omits step 8. The
+# dictionary `exposures` is empty unless `model.exposure` is set ({doc}`11_base_losses`).
 #
 # {doc}`/one_iteration` names the compiled function of each step.
 #
@@ -322,8 +331,9 @@ plt.show()
 # %% [markdown]
 # ## Held-out frames: the numbers
 #
-# Let $\hat x$ and $x$ be the render and the true frame, both with excluded pixels set to 0. The number of tissue
-# pixels is $n$, and $s$ is the map of {eq}`eq-b7`.
+# Let $\hat x$ and $x$ be the render and the true frame, both with excluded pixels set to 0. The render is first clipped to
+# $[0,1]$. The number of tissue pixels is $n$, and $s$ is the map of {eq}`eq-b7`. Over several frames the mean is that of
+# the decibels.
 #
 # $$
 # \begin{aligned}
@@ -459,8 +469,14 @@ SimpleNamespace(_repr_html_=lambda: picture)
 # %% [markdown]
 # ## Ablation, and a defeat
 #
-# Each component is removed in turn, with the same seed and the same schedule. The table also lists the baselines, which
-# need no model. Differences are from one seed of a short run, so small ones are not significant.
+# Each component is removed in turn, with the same seed and the same schedule. Differences are from one seed of a short
+# run, so small ones are not significant. The table also lists four baselines, which need no model:
+#
+# - *temporal mean*: the mean of the training frames, at each pixel over those in which it is tissue;
+# - *nearest frame*, also called the *copy*: the training frame nearest in time;
+# - *two neighbours*, the *blend*: the training frames before and after, weighted linearly in time;
+# - *flow interpolation*, the *flow*: the same two frames, each moved along the optical flow to the time in question before
+#   they are blended.
 
 # %% tags=["hide-input"]
 variants = {
