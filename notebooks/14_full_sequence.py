@@ -526,7 +526,8 @@ plt.show()
 #
 # ## At full size, with motion
 #
-# The preset `quick` gives better results. Among other changes, its Gaussians start with the tracked motion of the
+# The preset `quick` has a higher PSNR than `paper` on this clip and on EndoNeRF pulling, and a lower one on EndoNeRF
+# cutting ({doc}`/guides/which_preset`). Among other changes, its Gaussians start with the tracked motion of the
 # tissue ({doc}`19_tracked_motion`), and most of its iterations compare times between the frames ({doc}`18_between`).
 # {doc}`/results/README` reverts such changes one at a time. On the simulated clip of 63 frames of 640x512, with every
 # eighth frame held out, the PSNR over tissue is

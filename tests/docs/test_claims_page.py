@@ -336,7 +336,7 @@ def test_the_answer_says_what_the_records_say():
     low, high = stats.ttest_1samp(motion, 0.0).confidence_interval(0.95)
     assert f"{motion.mean():+.2f} ± {(high - low) / 2:.2f} dB where only the tissue moves" in text
     bare = answer(claims.RESULTS, {"pulling": record, "cutting": None}, [], "")
-    assert "on cutting is not finished" in bare and "right camera" not in bare and "1 choices" in bare
+    assert "on cutting is not finished" in bare and "right camera" not in bare and "1 combinations" in bare
     assert "| cutting | 40.96 | - | - | 42.80 |" in bare
 
 

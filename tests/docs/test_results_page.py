@@ -4,9 +4,12 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pages.book import figures, presets, readme_gaps
 from pages.full_size import interpolation, levers, record
+from pages.store.commands import loaded
+from pages.store.intervals import interval
 
 from endotsr.errors import InputError
 
@@ -95,6 +98,11 @@ def test_the_readme_says_of_the_gaps_what_their_table_says():
     assert all(abs(difference[gap][0]) < difference[gap][1] for gap in (4, 8))
     above_tissue_only = {gap: float(cells[4]) > float(cells[3]) for gap, cells in rows.items()}
     assert above_tissue_only == {1: True, 4: True, 8: True, 16: False}
+    splits = loaded(RESULTS / "interpolation.json")["clips"]["endonerf_pulling"]
+    for gap, (pattern, split) in readme_gaps.GAPS.items():
+        model = readme_gaps.by_frame([loaded(file) for file in sorted(RESULTS.glob(pattern))])
+        mean, half = interval(model - np.array(splits[split]["baselines"][f"{readme_gaps.FLOW}_tissue"]["psnr_tissue"]))
+        assert (mean > half) if gap < 16 else (-half < mean < 0)
     assert all(float(cells[7]) < float(cells[8]) for cells in rows.values())
 
 

@@ -102,7 +102,8 @@ def about(result: dict[str, Any]) -> str:
     clip = result["clip"]
     return (
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, held out: every eighth frame; "
-        f"{', '.join(sorted({run['processor'] for run in runs}))}; {max(run['date'] for run in runs)}."
+        f"{', '.join(sorted({run['processor'] for run in runs}))}; {max(run['date'] for run in runs)}. "
+        "LPIPS has its input in [0, 1]; the paper does not state the range of its own."
     )
 
 

@@ -47,10 +47,15 @@ def components(known: Mapping[str, Record]) -> str:
     wholes = {clip: contrast(record, WHOLE, "psnr_full") for clip, record in known.items()}
     steps = {clip: contrast(record, STEPS["A"], "psnr_full") for clip, record in known.items()}
     least, most = MATCHED_PSNR
-    published = f"(published medians {least} to {most} dB)"
+    limits = [f"{gain.paired[0]:+.2f} to {gain.paired[1]:+.2f} dB on {clip}"
+              for clip, gain in wholes.items() if gain is not None and gain.paired is not None]  # fmt: skip
+    paired = f"95 % intervals over the seeds {' and '.join(limits)}; " if limits else ""
+    published = f"({paired}published medians {least} to {most} dB, by sequence)"
     text = f"The three components together raise the PSNR of their base by {_by_clip(wholes, '')} {published}"
     measured = {clip: step for clip, step in steps.items() if step is not None}
-    return f"{text}; the step of A is {_by_clip(measured, '+')} (published +0.29 dB)." if measured else f"{text}."
+    if not measured:
+        return f"{text}."
+    return f"{text}; the step of A is {_by_clip(measured, '+')} (published +0.29 dB, mean of both clips)."
 
 
 def _by_clip(gains: Mapping[str, Estimate | None], sign: str) -> str:
@@ -142,7 +147,8 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
         below += sum(row["psnr_tissue"] for row in rows) / len(rows) < blend
     if not groups:
         return ""
-    return f"It is below the blend in {below} of the {len(groups)} choices of held-out frames measured."
+    measured = f"{len(groups)} combinations of clip, size and held-out frames measured"
+    return f"It is below the blend in {below} of the {measured}."
 
 
 def truth(found: Record) -> str:

@@ -25,6 +25,7 @@ EVERY_EIGHTH = "every eighth frame"
 CLIPS = ("pulling", "cutting")
 PLANNED = {"pulling": {"paper": 3, "sharp": 3}, "cutting": {"paper": 5, "quick": 3, "sharp": 3}}  # seeds of a preset
 MORE = "[All runs, with blocks of frames held out, machine and times](docs/results/README.md). ± is a 95 % interval."
+RANGE = "The paper does not state the input range of its LPIPS, so the published value stands in both columns."
 COLUMNS = (
     ("psnr_full", "PSNR full, dB", "{:.2f}"),
     ("psnr_tissue", "PSNR tissue, dB", "{:.2f}"),
@@ -86,7 +87,8 @@ def rows(records: dict[str, dict], without: tuple[int, ...] = ()) -> list[tuple[
     out += [(f"blend of the own renders of `{name}`{counted(of)}", of) for name, of in faded.items()]
     out += [(baseline["label"], [means(baseline, without)]) for baseline in first["baselines"].values()]
     published = first["published"] if split_of(first) == EVERY_EIGHTH else []
-    return out + [(row["label"], [{} if without else row]) for row in published]
+    both = [row | {"lpips_symmetric": row.get("lpips")} for row in published]  # the paper does not state the range
+    return out + [(row["label"], [{} if without else row]) for row in both]
 
 
 def missing(clip: str, records: dict[str, dict]) -> str:
@@ -161,13 +163,13 @@ def every_clip() -> str:
     found = {clip: records for clip in CLIPS if (records := stored(clip))}
     made = [part for clip, records in found.items() for part in (table(records), missing(clip, records))]
     runs = "\n".join(about(name, metrics) for records in found.values() for name, metrics in records.items())
-    return "\n\n".join([*filter(None, made), runs])
+    return "\n\n".join([*filter(None, made), RANGE, runs])
 
 
 def of_pulling() -> str:
     """The table of every eighth frame of pulling."""
     short = {name: metrics for name, metrics in stored("pulling").items() if split_of(metrics) == EVERY_EIGHTH}
-    return f"{table(short)}\n\n{MORE}"
+    return f"{table(short)}\n\n{MORE} {RANGE}"
 
 
 PROGRAM = Program(
