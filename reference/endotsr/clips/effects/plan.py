@@ -1,8 +1,8 @@
 """From verdicts to settings: components to switch off or reduce, with reasons and expected savings.
 
 In: an `Inspection` and the configuration that would otherwise be used. Out: a `Plan`, a list of changed settings. A
-plan never switches a component on and never adds a coefficient. It does not change the time bases: fewer bases save
-memory but fit worse after the same number of iterations.
+plan never switches a component on and never adds a coefficient. It does not change the time bases: how many of them a
+clip needs was not measured.
 """
 
 from typing import Any, NamedTuple

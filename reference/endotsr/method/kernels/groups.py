@@ -8,9 +8,8 @@
         write_group(results, start, count, out)
 
 The results of a group are kept in a local array (`vectors`). Stores in the loop over the group therefore cannot alias
-its inputs, and the compiler vectorises the loop without proving that two dozen arrays do not overlap. The projection
-then runs faster than one Gaussian at a time. A formula maps scalars and tuples of scalars to a tuple and has no array
-arguments (`jit_formula`).
+its inputs, and the compiler vectorises the loop without proving that two dozen arrays do not overlap. A formula maps
+scalars and tuples of scalars to a tuple and has no array arguments (`jit_formula`).
 
 As in `vectors`, each function has two forms: a plain Python function, which defines it and runs when the JIT is off,
 and the instructions that replace it in compiled code.

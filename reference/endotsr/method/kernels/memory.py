@@ -19,8 +19,8 @@ _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # of mallopt(3)
 def keep_freed_memory() -> bool:
     """Let glibc reuse freed arrays instead of returning their pages to the system.
 
-    Reallocating a returned page costs a page fault, one per 4 kB: 20 ms of an iteration at 640x512, and two seconds
-    with a million Gaussians. Therefore no array is mapped separately, and the heap retains freed memory.
+    Reallocating returned memory costs a page fault for each page. Therefore no array is mapped separately, and the
+    heap retains freed memory.
     returns  whether the setting was accepted; other C libraries are left unchanged
     """
     if not sys.platform.startswith("linux"):

@@ -108,7 +108,7 @@ def _cross_fade(
 ) -> LabelledFrames:
     """Held-out metrics of the blend of the model's renders at the two neighbouring training times.
 
-    A model that is no better has learned no useful motion between its training frames.
+    A model that is no better gains no accuracy from its motion between its training frames.
     """
 
     def blend(index: int) -> FloatArray:

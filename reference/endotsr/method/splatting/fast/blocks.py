@@ -1,13 +1,12 @@
 """The fast path of compositing: the same sums as `compositing`, a block of pixels at a time.
 
-It applies if the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). Its optimisations, in order
-of gain:
+It applies if the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). Its optimisations:
 
 * A Gaussian visits only the blocks that intersect its ellipse alpha >= cutoff. A block is 4x4 pixels (4x2 with
   eight-lane vectors), which small Gaussians fill better than sixteen pixels of one row. The span of each row is widened
   beyond rounding and every lane tests alpha >= cutoff, so no pixel is missed and no superfluous pixel is blended.
 * The visited blocks of a tile are the bits of a word, and one loop runs over all of them. Nested loops over rows of
-  blocks would mispredict a branch at the end of every row.
+  blocks would have a branch at the end of every row.
 * The lane loop is vector code. The pixels of a block are contiguous in flat planes (`tiles`) and within one cache
   line. The sums of a loop are local arrays in registers (`vectors`), without guards and reloads.
 * Terms that depend only on the lane and on the row of blocks are computed once per Gaussian (`_lane_tables`).
@@ -164,7 +163,7 @@ def _lane_tables(record, top, left, word, tables):
 
 
 def _first_columns(like):
-    """The first column of each block of a row of blocks. A visit loads it, which is faster than a conversion."""
+    """The first column of each block of a row of blocks. A visit loads it in place of a conversion."""
     found = local_array(BLOCKS_ACROSS, like)
     for block in range(BLOCKS_ACROSS):
         found[_U64(block)] = like.dtype.type(np.int32(block * BLOCK_WIDTH))
