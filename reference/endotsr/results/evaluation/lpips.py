@@ -87,8 +87,8 @@ def lpips(
     """LPIPS (M3) of two images; symmetric, 0 for equal images.
 
     a, b         (3, H, W)  RGB in [0, 1]; NaN gives NaN
-    input_range  "zero_one": unchanged input (the protocol value); "minus_one_one": input scaled to [-1, 1], the range
-                 for which the weights were trained. The two values are not comparable.
+    input_range  "zero_one": unchanged input; "minus_one_one": input scaled to [-1, 1], the range for which the weights
+                 were trained. The two values are not comparable.
     returns      the distance, or None if `lpips_obstacle` gives a reason
     Raises:      ValueError for shapes that do not fit or an unknown input_range.
     Oracle:      published pair of example images, 0.722 and 0.138 ("minus_one_one").
