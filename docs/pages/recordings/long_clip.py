@@ -97,7 +97,7 @@ def trained(options: argparse.Namespace) -> dict[str, Any]:
 def table(result: dict[str, Any]) -> str:
     """One row per measured training."""
     headings = ["Frames", "Size", "Preset", "`sequence.memory`, GB", "estimated, GB", "own memory, GB",
-                "file of the frames, GB"]  # fmt: skip
+                "file of the frames, estimated, GB"]  # fmt: skip
     cells = [
         [f"{row['frames']}", f"{row['width']}x{row['height']}", f"`{row['preset']}`", f"{row['memory']:g}",
          f"{row['estimated_bytes'] / 1e9:.2f}", f"{row['own_bytes'] / 1e9:.2f}",
