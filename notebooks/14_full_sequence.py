@@ -536,9 +536,9 @@ plt.show()
 # | Prediction | dB | 3 seeds | above the blend, dB |
 # |---|---|---|---|
 # | model | 38.40 | 38.38 to 38.40 | +2.38 to +2.40 |
-# | copy | 32.92 | - | -3.08 to -3.08 |
-# | blend | 36.00 | - | +0.00 to +0.00 |
-# | flow | 38.42 | - | +2.41 to +2.41 |
+# | copy | 32.92 | - | -3.08 |
+# | blend | 36.00 | - | - |
+# | flow | 38.42 | - | +2.41 |
 #
 # Preset `quick`, 1600 iterations, 22000 Gaussians; AMD EPYC, 2026-11-26.
 # <!-- running_clip:table:end -->

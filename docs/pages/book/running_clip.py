@@ -59,7 +59,8 @@ def table(record: dict[str, Any]) -> str:
     for name in PREDICTIONS:
         values, above = found[name], found[name] - found["two_neighbours"]
         spread = f"{values.min():.2f} to {values.max():.2f}" if np.ptp(values) > 0 else "-"
-        rows.append([LABELS[name], f"{values.mean():.2f}", spread, f"{above.min():+.2f} to {above.max():+.2f}"])
+        margin = f"{above.min():+.2f}" + (f" to {above.max():+.2f}" if np.ptp(above) > 0 else "")
+        rows.append([LABELS[name], f"{values.mean():.2f}", spread, "-" if name == "two_neighbours" else margin])
     run = record["runs"][0]
     about = f"{run['iterations_done']} iterations, {run['gaussians'][-1]} Gaussians; {run['machine']['processor']}"
     heads = ("Prediction", "dB", f"{len(record['runs'])} seeds", "above the blend, dB")
