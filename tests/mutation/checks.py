@@ -33,6 +33,7 @@ COLLECTING = (  # options of pytest, in this process: slow tests are among the c
     *("-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings"),
 )
 SLOW = 1.0  # s of processor time; a check that takes longer without the compiler is left out
+WAIT = 60.0  # s of the clock beside the processor time: a check may wait for another process, or for its turn
 INDEPENDENT = re.compile(r"oracle|mpmath|scipy|skimage|cv2|definition\.|by_definition|(the|its|their)_definition")
 BLOCKS = 0.01  # s; a forward pass as quick as this is also differentiated block by block
 
@@ -53,18 +54,21 @@ class OutOfTime(BaseException):
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Processor time, so that other work on the machine does not matter."""
+    """Processor time, so that other work on the machine does not matter; a check that only waits ends after WAIT."""
 
     def stop(*_):
         raise OutOfTime
 
-    before = signal.signal(signal.SIGVTALRM, stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 5.0)  # again, in case the first is swallowed
+    timers = ((signal.SIGVTALRM, signal.ITIMER_VIRTUAL, seconds), (signal.SIGALRM, signal.ITIMER_REAL, WAIT + seconds))
+    before = [signal.signal(number, stop) for number, _, _ in timers]
+    for _, timer, limit in timers:
+        signal.setitimer(timer, limit, 5.0)  # again, in case the first is swallowed
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, before)
+        for (number, timer, _), handler in zip(timers, before):
+            signal.setitimer(timer, 0)
+            signal.signal(number, handler)
 
 
 def run(check: Check, seconds: float, facts: dict[str, Any]) -> str:

@@ -4,10 +4,12 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from mutation import checks
 from mutation.equivalents import EQUIVALENT
 from mutation.kernels import kernels, planted
 from mutation.merge import added, names, of_today, still_checked, survivors, whole
@@ -91,6 +93,13 @@ def test_a_detection_by_a_check_that_is_gone_is_measured_again():
     found = still_checked(old, ["stays", "new"])
     assert found["kernels"] == {"k": {"by the one that stays": ["sign", [1, -1], None]}}
     assert found["defects"] == {"e": ["k", [-1, 1]]} and found["checks"] == old["checks"]
+
+
+def test_a_check_that_waits_for_another_process_ends(monkeypatch):
+    monkeypatch.setattr(checks, "WAIT", 0.2)
+    begin = time.monotonic()
+    waiting = checks.Check("hard", "waits", lambda facts: time.sleep(30) or "")
+    assert checks.run(waiting, 0.1, {}) == "out of time" and time.monotonic() < begin + 10
 
 
 def test_a_report_is_whole_when_no_mutant_is_missing():
