@@ -126,6 +126,7 @@ def test_folders_that_cannot_be_paired_are_refused(names, said, sequence, tmp_pa
         (np.zeros((32, 48, 3), np.uint8), "uint8; allowed: an array of float32 or float64"),
         (np.full((3, 32, 48), 128.0), "128; allowed: display units, from 0 to 1"),
         (np.full((3, 32, 48), np.nan), "not finite"),
+        (np.linspace(-1, 1, 3 * 32 * 48).reshape(3, 32, 48), "value -1; allowed: display units, from 0 to 1"),
         (b"not an array", "not a plain NumPy array file"),
     ],
 )
@@ -144,6 +145,14 @@ def test_planes_last_and_16_bits_are_the_same_picture(tmp_path):
     np.save(tmp_path / "c.npy", levels / 255)
     a, b, c = (read_picture(tmp_path / name, (3, 32, 48)) for name in ("a.png", "b.png", "c.npy"))
     assert np.array_equal(a, b) and np.abs(a - c).max() < 1e-7 and c.dtype == np.float64
+
+
+def test_levels_of_8_bits_stored_in_16_are_refused(tmp_path):
+    write_png(tmp_path / "a.png", np.full((32, 48, 3), 200, np.uint16))
+    with pytest.raises(InputError, match=r"a\.png: 16 bits whose largest value is 200: levels of 8 bits"):
+        read_picture(tmp_path / "a.png", (3, 32, 48))
+    write_png(tmp_path / "b.png", np.zeros((32, 48, 3), np.uint16))
+    assert not read_picture(tmp_path / "b.png", (3, 32, 48)).any()
 
 
 def test_training_frames_are_measured_where_the_folder_holds_them(sequence, tmp_path):

@@ -28,6 +28,7 @@ KINDS = (".npy", ".png", *stored.TIFF_ENDINGS, ".bmp")  # lossless; the first ki
 CHANNELS = 3
 LARGEST_FILE = 1 << 32  # bytes
 LARGEST = 16.0  # display units; a larger value means 8-bit or 16-bit levels, not an overshoot
+LOWEST = -0.5  # display units; a lower value means pictures from -1 to 1, not an undershoot
 
 
 class Pictures(NamedTuple):
@@ -161,6 +162,11 @@ def _read_levels(file: Path) -> FloatArray:
     pixels = stored.read_picture(file)
     if pixels.dtype.kind != "u":
         raise InputError(f"{file}: type {pixels.dtype}; allowed: levels of 8 or 16 bits, or .npy")
+    if pixels.dtype == np.uint16 and pixels.any() and pixels.max() <= np.iinfo(np.uint8).max:
+        raise InputError(
+            f"{file}: 16 bits whose largest value is {pixels.max()}: levels of 8 bits, which would be divided by 65535;"
+            " allowed: levels of 8 bits stored as such, or of 16 bits up to 65535"
+        )
     return pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
 
 
@@ -173,6 +179,8 @@ def _read_array(file: Path) -> Array:
         raise InputError(f"{file}: values that are not finite; allowed: display units [0, 1]")
     if array.size and np.abs(array).max() > LARGEST:
         raise InputError(f"{file}: value {np.abs(array).max():g}; allowed: display units, from 0 to 1 (not to 255)")
+    if array.size and array.min() < LOWEST:
+        raise InputError(f"{file}: value {array.min():g}; allowed: display units, from 0 to 1 (not from -1)")
     return array
 
 

@@ -81,7 +81,13 @@ def fused(views: list[DepthView], voxel: float | None = None) -> Mesh:
     distance, weight = _distances(views, grid)
     # The border of the observed region is no surface: use only cells whose whole neighbourhood was observed.
     known = binary_erosion(weight > 0, np.ones((3, 3, 3)))
-    corners, faces, _, _ = marching_cubes(distance, 0.0, mask=known, gradient_direction="descent")
+    try:
+        corners, faces, _, _ = marching_cubes(distance, 0.0, mask=known, gradient_direction="descent")
+    except (RuntimeError, ValueError):  # its two ways to say that no cell holds the surface
+        raise InputError(
+            f"export: no surface in a grid of {'x'.join(map(str, grid.shape))} voxels of side {grid.side:.3g};"
+            " allowed: a smaller --voxel"
+        ) from None
     vertices = grid.low + grid.side * corners
     return Mesh(vertices.astype(np.float32), faces.astype(np.int32), _colours(views, vertices, grid.side))
 
