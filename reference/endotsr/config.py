@@ -25,6 +25,8 @@ from endotsr.untrusted.sections import (
 )
 from endotsr.untrusted.toml import read_toml, toml_text
 
+LARGEST_SEED = (1 << 53) - 1  # larger integers are not exact in JSON, which records the seed of a run
+
 
 class SequenceConfig(Section, frozen=True, kw_only=True):
     """Frames, masks and depth of a sequence folder."""
@@ -268,9 +270,15 @@ class Config(Section, frozen=True, kw_only=True):
                 f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
                 f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
             )
-        if not 0 <= low < high <= 100:
+        if not 0 <= low < 50 < high <= 100:  # beyond the median, one number would replace most of the depth
             raise InputError(
-                f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: 0 <= low < high <= 100"
+                f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: percent, 0 <= low < 50 <"
+                " high <= 100"
+            )
+        if self.training.seed > LARGEST_SEED:
+            raise InputError(
+                f"{where}: training.seed = {self.training.seed} is not allowed; allowed: an integer from 0 to"
+                f" {LARGEST_SEED}"
             )
 
 

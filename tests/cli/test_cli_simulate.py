@@ -54,6 +54,7 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["stil"], ("scene 'stil' is not allowed", "allowed: still, breathing, pulling")),
         ([], ("SCENE is missing", "--effects")),
         (["still", "--effects", "fog"], ("unknown: fog", "allowed: breathing")),
+        (["still", "--width", "9000", "--height", "9000"], ("9000x9000 pixels are not allowed", "at most 67108864")),
         (["still", "--width", "15"], ("width = 15 is not allowed", "an integer >= 16")),
         (["still", "--frames", "2"], ("frames = 2 is not allowed", "an integer >= 3")),
         (["breathing", "--breathing.amplitude", "60"], ("breathing.amplitude = 60 leaves", "allowed: at most")),

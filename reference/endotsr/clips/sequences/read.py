@@ -122,10 +122,10 @@ def usable(clip: Clip) -> Clip:
 
 
 def check_percentiles(config: SequenceConfig) -> None:
-    """Raises InputError unless the depth percentiles are two ascending values in [0, 100]."""
+    """Raises InputError unless the depth percentiles are in [0, 100], one below and one above the median."""
     low, high = config.depth_percentiles
-    if not 0 <= low < high <= 100:
-        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: two ascending values in [0, 100]")
+    if not 0 <= low < 50 < high <= 100:
+        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: percent, 0 <= low < 50 < high <= 100")
 
 
 def _depth_percentiles(clip: Clip, config: SequenceConfig) -> tuple[SequenceConfig, list[str]]:

@@ -10,6 +10,7 @@ import msgspec
 
 from endotsr.clips.simulator import sections
 from endotsr.errors import InputError
+from endotsr.untrusted.files import MOST_PIXELS
 from endotsr.untrusted.sections import Count, NonNegative, Positive, Section
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
@@ -56,6 +57,13 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     motion_blur: sections.MotionBlur = sections.MotionBlur()
     stereo: sections.Stereo = sections.Stereo()
     depth_rounding: sections.DepthRounding = sections.DepthRounding()
+
+    def refuse_contradictions(self, where: str) -> None:
+        """Raise InputError for pictures that no reader takes."""
+        if self.width * self.height > MOST_PIXELS:
+            raise InputError(
+                f"{where}: {self.width}x{self.height} pixels are not allowed; allowed: at most {MOST_PIXELS} in all"
+            )
 
 
 EFFECTS = tuple(
