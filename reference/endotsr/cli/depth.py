@@ -80,9 +80,29 @@ def run(words: list[str]) -> int:
         print("  --farthest-over-nearest changes nothing: the clip has depth that fixes scale and shift")
     if report.file.depth.assumed:
         print(f"not metric ({report.file.depth.assumed} of the depth assumed): {KINDS['assumed-depth'].why}")
+    for line in depth_warnings(report, options):
+        print(line)
     print(f"next: endotsr train {options.sequence} --out RUN")
     write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
     return 0
+
+
+def depth_warnings(report: "DepthReport", options: DepthOptions) -> list[str]:
+    """Lines on little depth, and on depth in millimetres at no distance of an endoscope."""
+    from endotsr.clips.sequences.checks.depth import LITTLE, unit_finding
+    from endotsr.clips.sequences.checks.kinds import KINDS
+
+    assert report.file.depth is not None
+    said, usual = [], sum(report.coverage) / len(report.coverage)
+    if usual < LITTLE:
+        pair = "" if options.given else "; are the views rectified, of one moment, and neither mirrored nor turned?"
+        said.append(f"warning: little-depth: {usual:.1%} of the pixels have depth; {KINDS['little-depth'].why}{pair}")
+    if report.file.depth.unit == "mm":
+        found = unit_finding(report.median, str(options.sequence))
+        remedy = "--unit-scale states millimetres, or pixels of disparity, per stored unit" if options.given else ""
+        remedy = remedy or "check the baseline and its unit"
+        said += [f"warning: {each.code}: {each.what}; {each.why}; {remedy}" for each in found]
+    return said
 
 
 def _check_ratio(options: DepthOptions) -> None:

@@ -211,7 +211,7 @@ def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
             "next: set the baseline of the two cameras, [camera] baseline in"
             f" {out / FILE_NAME} (or prepare --baseline MM), then endotsr depth {out}"
         )
-    if stereo:
+    if stereo and pair:
         return f"next: endotsr depth {out}"
     return (
         f"next: endotsr poses {out} --sfm (a moving camera), or endotsr depth {out} --given FILES --kind relative"

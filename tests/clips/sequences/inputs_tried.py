@@ -71,6 +71,7 @@ from raw_sources import stereomis
 from rig_inputs import RIG_ROWS
 from silent_inputs import SILENT_ROWS
 from squeezed_inputs import SQUEEZED_ROWS
+from strange_inputs import STRANGE_ROWS
 from stranger_inputs import STRANGER_ROWS
 from stream_inputs import STREAM_ROWS
 from test_propose_masks import scene, through_a_scope
@@ -428,6 +429,7 @@ ROWS = [
     *STREAM_ROWS,
     *MASK_ROWS,
     *STRANGER_ROWS,
+    *STRANGE_ROWS,
 ]  # fmt: skip
 
 

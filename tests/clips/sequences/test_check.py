@@ -311,7 +311,7 @@ def test_everything_is_found_in_one_pass(sequence, tmp_path):
         ("distortion = []", "distortion = [0.1, 0, 0, 0]", "distortion"),
         ("cx = 15.0", "cx = 29.0", "principal-point"),
         ("fy = 33.0", "fy = 66.0", "pixel-shape"),
-        ("width = 32", "width = 64", "cameras"),
+        ("width = 32", "width = 64", "sequence-file"),
         ("frames = 5", "frames = 7", "cameras"),
         ('[depth]\nfolder = "depth"\nunit = "mm"', '[depth]\nfolder = "depth"\nunit = "m"', "depth-unit"),
     ],

@@ -43,7 +43,10 @@ def chosen_frames(text: str, clip: Clip) -> list[int]:
 
 def without(frames: list[int], text: str, clip: Clip) -> list[int]:
     """The frames that are not in a list as in `chosen_frames`. Raises InputError."""
-    dropped = set(chosen_frames(text, clip)) if text.strip() else set()
+    try:
+        dropped = set(chosen_frames(text, clip)) if text.strip() else set()
+    except InputError as error:
+        raise InputError(str(error).replace("--frames", "--drop", 1)) from None
     return [i for i in frames if i not in dropped]
 
 

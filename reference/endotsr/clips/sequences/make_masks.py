@@ -20,6 +20,7 @@ from endotsr.clips.sequences.clip_pictures import left_pictures
 from endotsr.clips.sequences.drawing import DrawnClip, drawing_of
 from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
 from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.key_checks import polarity_warnings, refuse_no_tissue
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.mask_shapes import shapes_of
 from endotsr.clips.sequences.masks import mask_levels, threshold_masks
@@ -78,8 +79,8 @@ def from_keys(source: Path, margin: int, said: list[str]) -> Propose:
     margin   px by which the masks grow, see `carry_masks`
     said     receives a line for frames that are not trusted, and one for the frame to draw next
 
-    The function raises InputError for a folder without keys, a name that is no frame, a picture that is no mask, and a
-    file that `read_drawn` refuses.
+    The function raises InputError for a folder without keys, a name that is no frame, a picture that is no mask, a
+    file that `read_drawn` refuses, and masks that leave hardly any tissue.
     """
 
     def propose(clip: Clip) -> Proposal:
@@ -94,9 +95,11 @@ def from_keys(source: Path, margin: int, said: list[str]) -> Propose:
             said.append(f"the mask that would help most: {named} (expected gain of the mean agreement at most {gain})")
         else:
             said.append(f"no further key is expected to raise the mean agreement by {LEAST_GAIN}")
+        said.extend(polarity_warnings(found.keys, pictures))
         frames = f"{len(found.keys)} key frame{'s' if len(found.keys) != 1 else ''}"
         never = found.never
         excluded = carried.excluded if never is None else [plane | never for plane in carried.excluded]
+        refuse_no_tissue(excluded, clip.names, source, margin)
         never_said = "" if never is None else f"; {never.mean():.1%} of the picture is never tissue"
         said_of = f"carried from {frames}, margin {margin} px{never_said}"
         return Proposal(excluded, said_of, kind="carried", drawn=tuple(sorted(found.keys)), never=never)

@@ -185,10 +185,9 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
     if report.movement.answer == "unclear":
         lines.append("warning: if the scope is still, these poses are motion of the tissue; then do not use them")
     e, unit = found.estimate, report.unit
-    lines.append(
-        f"path {e.path:.4g} {unit}; {e.agreeing:.0%} of the matches agree; the poses leave {e.left:.2f} pixels of the"
-        f" {e.still:.2f} that the picture moves"
-    )
+    left = f"the poses leave {e.left:.2f} pixels of the {e.still:.2f} that the picture moves"
+    left = left if np.isfinite(e.left) else "no pair of frames is left to hold the poses against"
+    lines.append(f"path {e.path:.4g} {unit}; {e.agreeing:.0%} of the matches agree; {left}")
     if e.returns:
         lines.append(
             f"the scope sees earlier places again: {len(e.returns)} pairs of frames hold the path against drift"

@@ -31,6 +31,11 @@ from endotsr.errors import InputError
 
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
 LOOKED_AT = 8  # frames
+EXCHANGED = (
+    "neighbouring pixels differ far less with the two bytes of each number exchanged; allowed: the order of bytes of"
+    " the format, in PNG the high one first"
+)
+ROUGHER = 4.0  # times the mean difference of neighbours with exchanged bytes
 REMEDY = (
     "a disparity is read by `endotsr depth FOLDER --given FILES --kind disparity` after a prepare without --depth, a"
     " relative inverse depth with --kind relative; --trust-depth reads the files as lengths anyway"
@@ -59,7 +64,8 @@ def _of_names(path: Path) -> str:
 def _of_values(clip: Clip, path: Path, frames: list[int]) -> str:
     """Evidence against lengths in the values and in comparison with the pictures; "" without any.
 
-    Raises:  InputError for depth that is upside down or mirrored, or whose largest value marks missing depth.
+    Raises:  InputError for depth that is upside down or mirrored, whose largest value marks missing depth, or whose
+             bytes are exchanged.
     """
     read, masks, where = clip.depth, clip.masks, str(clip.where)
     assert read is not None
@@ -93,6 +99,8 @@ def _of_values(clip: Clip, path: Path, frames: list[int]) -> str:
     unit = [] if clip.arbitrary else unit_finding(usual_depth(facts), where)
     if unit:
         return f"{unit[0].what}; state another unit with --depth-unit and --depth-scale"
+    if any(bytes_exchanged(plane / read.scale) for plane in planes):
+        raise InputError(f"{path}: {EXCHANGED}, or --trust-depth")
     found = light_finding(light, where)
     return found[0].what if found else ""
 
@@ -110,3 +118,16 @@ def _full_scale(stored: list[NDArray[np.float32]]) -> str:
     if all(0.99 <= value <= 1.0 for value in highest):
         return "the largest number of every frame is 1: the frames are stretched to the full range"
     return ""
+
+
+def bytes_exchanged(stored: NDArray[np.float32]) -> bool:
+    """Whether a plane (H, W) of 16-bit integers varies far less between neighbours with its bytes exchanged.
+
+    Multiples of 256 do so rightly, and are left to the check of the unit.
+    """
+    whole = np.rint(stored)
+    if np.abs(stored - whole).max() > 1e-2 or not 0 < whole.max() <= FULL_SCALE[1] or not (whole % 256).any():
+        return False
+    levels = whole.astype(np.uint16)
+    rough, other = (np.abs(np.diff(plane.astype(np.int32), axis=1)).mean() for plane in (levels, levels.byteswap()))
+    return bool(rough > ROUGHER * other)

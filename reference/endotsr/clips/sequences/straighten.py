@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
 from endotsr.clips.sequences.camera import Intrinsics, intrinsics_of_matrix, opencv_matrix
+from endotsr.clips.sequences.checks.lens import lens_warnings
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.errors import InputError
@@ -96,8 +97,9 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
         return Straightener(plain.scaled(*new_size), None, None, np.eye(3), clip.baseline, [], clipped)
     maps = undistortion_maps(opencv_matrix(intrinsics), np.array(intrinsics.distortion), width, height)
     new = intrinsics_of_matrix(maps.matrix, width, height, where=clip.where)
-    note = f"undistorted: distortion {', '.join(f'{k:g}' for k in intrinsics.distortion)}"
-    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, [note], clipped)
+    notes = [f"undistorted: distortion {', '.join(f'{k:g}' for k in intrinsics.distortion)}"]
+    notes += lens_warnings(maps.matrix, np.array(intrinsics.distortion), width, height)
+    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, notes, clipped)
 
 
 def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:
@@ -125,5 +127,7 @@ def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:
         )
     intrinsics = intrinsics_of_matrix(maps.left.matrix, width, height, where=clip.where).scaled(*new_size)
     angle = degrees_between(maps.left.rotation, np.eye(3))
-    note = f"rectified: baseline {maps.baseline:.6g} mm, left camera turned by {angle:.3g} degrees"
-    return Straightener(intrinsics, maps.left, maps.right, maps.left.rotation, maps.baseline, [note])
+    notes = [f"rectified: baseline {maps.baseline:.6g} mm, left camera turned by {angle:.3g} degrees"]
+    for view, distortion in zip((maps.left, maps.right), distortions):
+        notes += lens_warnings(view.matrix, distortion, width, height)
+    return Straightener(intrinsics, maps.left, maps.right, maps.left.rotation, maps.baseline, notes)

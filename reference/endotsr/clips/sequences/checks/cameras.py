@@ -14,6 +14,7 @@ STILL = 1e-4  # of the depth; a shorter camera path is most likely in metres, wi
 FARTHEST_STEP = 2.0  # of the depth; with a larger step, neighbouring frames would not overlap
 WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
 OFF_CENTRE = 0.25  # of the picture
+EXCHANGED, IN_TURN = 0.08, 3.0  # of the picture; times nearer to its centre with cx and cy exchanged
 
 
 def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Finding]:
@@ -52,12 +53,19 @@ def intrinsics_findings(camera: Camera | Intrinsics, where: str) -> list[Finding
     angle = float(np.degrees(2 * np.arctan(camera.width / (2 * camera.fx))))
     if not NARROWEST < angle < WIDEST:
         found.append(finding("field-of-view", where, f"the horizontal field of view is {angle:.1f} degrees"))
-    across, down = abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)
-    if max(across, down) > OFF_CENTRE:
+    apart = _off_centre(camera, camera.cx, camera.cy)
+    exchanged = apart > max(EXCHANGED, IN_TURN * _off_centre(camera, camera.cy, camera.cx))
+    if apart > OFF_CENTRE or exchanged:
         size = f"{camera.width}x{camera.height}"
         what = f"the principal point is at ({camera.cx:g}, {camera.cy:g}) of {size}"
+        what += ", and near the centre with cx and cy exchanged" if exchanged else ""
         found.append(finding("principal-point", where, what))
     ratio = camera.fy / camera.fx
     if not 0.8 < ratio < 1.25:
         found.append(finding("pixel-shape", where, f"fy / fx is {ratio:.2f}"))
     return found
+
+
+def _off_centre(camera: Camera | Intrinsics, x: float, y: float) -> float:
+    """The distance of a point from the centre of the picture, as a fraction of its side, in the farther direction."""
+    return max(abs(x / camera.width - 0.5), abs(y / camera.height - 0.5))

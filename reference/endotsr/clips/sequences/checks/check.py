@@ -33,6 +33,7 @@ from endotsr.clips.sequences.checks.frames import (
     frame_findings,
     gap_findings,
     profile_findings,
+    rate_findings,
     time_findings,
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
@@ -119,9 +120,8 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     run.findings += clip.faults + _stated(clip)
     if not clip.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
-    run.findings += (
-        profile_findings(clip.images) + gap_findings(clip.images) + time_findings(clip.times, str(clip.where))
-    )
+    run.findings += profile_findings(clip.images) + gap_findings(clip.images)
+    run.findings += time_findings(clip.times, where := str(clip.where)) + rate_findings(clip.times, clip.rate, where)
     size = _read_frames(clip, run)
     facts: dict[str, Any] = {"frames": len(clip.images)}
     if run.frames:
@@ -168,7 +168,7 @@ def _check_cameras(clip: Clip, run: _Pass, size: Size) -> dict[str, str]:
     camera, where = clip.intrinsics, clip.stated_in
     if camera and (camera.height, camera.width) != size:
         what = f"{where}: states {camera.width}x{camera.height}, the pictures have {size[1]}x{size[0]}"
-        run.findings.append(finding("cameras", where, what))
+        run.findings.append(finding("sequence-file" if clip.layout == "common" else "cameras", where, what))
         return {}
     cameras = run.tried(lambda: clip.cameras(range(clip.count)), "cameras", where)
     if not cameras:

@@ -3,6 +3,7 @@
 In: one `DepthFacts` per frame. Out: findings. Plausible lengths are those of endoscopy: tissue at 5 to 500 mm.
 """
 
+from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ NEAREST, FARTHEST = 5.0, 500.0  # mm; a median outside indicates another unit
 FEW_LEVELS = 6  # whole millimetres, as in published clips, give a dozen or more
 LITTLE = 0.2  # of the tissue
 FAR_OFF = 4.0
+LEAST_FRAMES, REPEATED = 4, 0.5  # frames; different planes of depth for each of them
 FULL_SCALE = (255.0, 65535.0)
 MARK, MARKED = 8.0, 0.005  # a mark of missing depth: times the median, fraction of the pixels
 AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
@@ -37,6 +39,7 @@ class DepthFacts(NamedTuple):
     integers: bool  # the file stores integers
     at_highest: float = 0.0  # fraction of the pixels with depth that have the largest value
     limit: float = 0.0  # far limit: the upper percentile to which a reader clips
+    digest: bytes = b""  # of the depth, equal for equal planes
 
 
 def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: NDArray[np.bool_] | None) -> DepthFacts:
@@ -55,6 +58,7 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
         stored.dtype.kind in "iu",
         float((values == values.max()).mean()) if values.size else 0.0,
         float(np.percentile(values, CLIPPED[1])) if values.size else 0.0,
+        blake2b(depth.tobytes(), digest_size=16).digest(),
     )
 
 
@@ -82,10 +86,19 @@ def depth_findings(
     found += [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, usual, where, i)]
     if outlying := outlying_frames(far_limits(facts)):
         found.append(finding("depth-outliers", where, f"the depth reaches much farther in frame {said(outlying)}"))
+    found += [] if assumed else _repeated(with_depth, where)
     coverage = float(np.mean([fact.tissue_coverage for fact in facts]))
     if coverage < LITTLE:
         found.append(finding("little-depth", where, f"{coverage:.1%} of the tissue has depth"))
     return found
+
+
+def _repeated(facts: list[DepthFacts], where: str) -> list[Finding]:
+    """A note on depth that is stored once for many frames."""
+    different = len({fact.digest for fact in facts})
+    if len(facts) < LEAST_FRAMES or different > REPEATED * len(facts):
+        return []
+    return [finding("still-depth", where, f"the depth of {len(facts)} frames is that of {different}")]
 
 
 def usual_depth(facts: list[DepthFacts]) -> float:

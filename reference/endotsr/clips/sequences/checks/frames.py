@@ -25,6 +25,7 @@ JUMP = 2.0  # ratio of the mean brightness of neighbouring frames; published cli
 FLAT = 4  # grey levels between the darkest and the brightest pixel of a channel: a frame of one colour
 NOTHING = 0.5  # of the frames; a clip with more black, white or one-coloured frames shows nothing
 BLUE = 20.0  # grey levels of blue above red; in two public clips red is 30 and 47 above blue
+SLOWEST, FASTEST = 0.1, 1000.0  # frames a second of a camera, time-lapse and high-speed recordings included
 CLIPPED = 0.3  # of the pixels of a frame at 255 in all channels
 
 
@@ -124,6 +125,15 @@ def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding
         return []
     steps = np.diff(times)
     return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
+
+
+def rate_findings(times: NDArray[np.float64] | None, rate: float | None, where: str) -> list[Finding]:
+    """A warning on a frame rate that no camera has; `times` (n,) in seconds come before the stated `rate`."""
+    if times is not None and len(times) > 1:
+        rate = float(1 / np.median(np.diff(times)))
+    if rate is None or SLOWEST <= rate <= FASTEST:
+        return []
+    return [finding("frame-rate", where, f"{rate:.3g} frames a second, {1 / rate:.3g} s between two")]
 
 
 def profile_findings(files: list[Path]) -> list[Finding]:

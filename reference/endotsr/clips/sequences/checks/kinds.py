@@ -37,6 +37,8 @@ KINDS: dict[str, Kind] = {
                        "supply the missing frames, or cut the clip there"),
     "not-read": Kind("note", "training knows nothing of it",
                      "none needed for files of other programs; endotsr prepare has options that read such files"),
+    "frame-rate": Kind("warning", "times may be in milliseconds, or the time between two frames may stand for the rate",
+                       "state times in seconds, and frame_rate in frames per second"),
     "uneven-times": Kind("note", "training uses the times in sequence.toml", "none needed"),
     # pictures
     "picture": Kind("refusal", REFUSED, f"copy or export the file again, or {LEAVE_OUT}"),
@@ -110,6 +112,8 @@ KINDS: dict[str, Kind] = {
                        "store millimetres, or a smaller step with its scale"),
     "marked-depth": Kind("warning", "the value seems to mark pixels without depth but is read as a distance",
                          "store 0 where there is no depth"),
+    "still-depth": Kind("note", "the shape of the tissue comes from one moment",
+                        "none needed if the scene rests; else supply one file of depth for each frame"),
     "constant-depth": Kind("refusal", "the scene would be a flat board", "supply measured depth"),
     "normalised-depth": Kind("warning", "each frame looks stretched to the full range, so its values are not"
                              " lengths", "store lengths with one scale for all frames"),

@@ -21,6 +21,7 @@ from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import MASK_ENDINGS
 from endotsr.clips.sequences.unread import folders_of, together, unread
+from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.untrusted.names import plain_line
@@ -55,6 +56,9 @@ def layouts() -> tuple[Layout, ...]:
 
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
 OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd")
+JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
+OTHER_FILMS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjpg", ".yuv")
+FILMS = (".gif", ".apng", ".y4m", ".ogv", ".ivf", ".mjpeg", ".mjpg", ".yuv")
 
 
 def layout_of(path: Path, name: str = "auto") -> Layout:
@@ -80,11 +84,18 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
 def _held(path: Path) -> str:
     """What a path in no known layout is, where a remedy follows from it."""
     if path.is_file():
-        return ": an archive; unpack it first" if path.suffix.lower() in ARCHIVES else ""
+        film = path.suffix.lower() in OTHER_FILMS
+        said = ": a film of another kind; convert it to mp4" if film else ""
+        return ": an archive; unpack it first" if path.suffix.lower() in ARCHIVES else said
     endings = Counter(file.suffix.lower() for file in path.iterdir() if file.is_file() and file.suffix)
     ending, count = endings.most_common(1)[0] if endings else ("", 0)
     if ending in OTHER_PICTURES:
         return f": it holds {count} files that end in {ending}; convert them to png"
+    if ending in JPEG_NAMES:
+        return f": it holds {count} files that end in {ending}; let their names end in .jpg"
+    films = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
+    if films:
+        return f": it holds {shortened(films)}; give the video itself, and join the parts of one recording before"
     if not any(path.iterdir()):
         return ": the folder is empty"
     folders = sorted(plain_line(folder.name) for folder in path.iterdir() if folder.is_dir())
@@ -145,5 +156,7 @@ def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     if not found.direct:
         raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` converts it")
     clip = found.describe(path, SourceOptions(settings=config))
+    if not clip.names and clip.faults:  # nothing is known of the folder, and so nothing of what is not read in it
+        return clip
     left = unread(path, (*found.reads, *clip.read_here), NOTHING, found.takes, clip.inside)
     return replace(clip, not_read=tuple(left))

@@ -35,7 +35,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
     folder.list_pictures(IMAGES, RIGHT)
     if folder.images and len(folder.images) != found.frames:
         what = f"{where}: frames = {found.frames}, but images/ holds {len(folder.images)} pictures"
-        folder.faults.append(finding("cameras", where, what))
+        folder.faults.append(finding("sequence-file", where, what))
     intrinsics = found.camera.intrinsics(where)
     folder.size, folder.size_said = (intrinsics.width, intrinsics.height), STATES
     masks, notes = _masks(folder, found, options)

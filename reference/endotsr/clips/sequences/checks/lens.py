@@ -1,0 +1,44 @@
+"""Whether a lens model is one-to-one over the picture.
+
+In: camera matrix and distortion coefficients of OpenCV. Out: the fraction of the picture beyond the radius at which the
+model turns back. Straightened pictures show parts of the source twice there: the coefficients are wrong, in another
+order, or of another lens.
+"""
+
+import numpy as np
+
+from endotsr.method.kernels.arrays import FloatArray
+
+STEPS = 1000  # radii between the axis and the farthest corner
+
+
+def folded_fraction(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> float:
+    """The fraction of the pixels whose rays lie beyond the turning point of r f(r), with
+
+        f = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6).
+
+    matrix      (3, 3) of the straightened picture
+    distortion  k1 k2 p1 p2 [k3 [k4 k5 k6]]; the tangential ones count as 0
+    """
+    k1, k2, _, _, k3, k4, k5, k6 = np.pad(np.asarray(distortion, np.float64).ravel()[:8], (0, 8))[:8]
+    x = (np.arange(width) - matrix[0, 2]) / matrix[0, 0]
+    y = (np.arange(height) - matrix[1, 2]) / matrix[1, 1]
+    radius = np.hypot(x, y[:, None])
+    r = np.linspace(0.0, float(radius.max()), STEPS)
+    above, below = np.polyval([k3, k2, k1, 1.0], r * r), np.polyval([k6, k5, k4, 1.0], r * r)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = r * above / below
+    turned = np.flatnonzero(~(np.diff(seen) > 0))
+    return float((radius > r[turned[0]]).mean()) if turned.size else 0.0
+
+
+def lens_warnings(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> list[str]:
+    """A warning on a lens model that turns back inside the straightened picture."""
+    folded = folded_fraction(matrix, distortion, width, height)
+    if folded == 0:
+        return []
+    said = ", ".join(f"{k:g}" for k in np.ravel(distortion))
+    return [
+        f"warning: the distortion {said} turns back inside the picture: {folded:.1%} of it show parts of the source"
+        " twice; allowed: coefficients of this lens in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]"
+    ]
