@@ -57,8 +57,7 @@ def layouts() -> tuple[Layout, ...]:
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
 OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd")
 JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
-OTHER_FILMS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjpg", ".yuv")
-FILMS = (".gif", ".apng", ".y4m", ".ogv", ".ivf", ".mjpeg", ".mjpg", ".yuv")
+OTHER_VIDEOS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjpg", ".yuv")
 
 
 def layout_of(path: Path, name: str = "auto") -> Layout:
@@ -84,18 +83,18 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
 def _held(path: Path) -> str:
     """What a path in no known layout is, where a remedy follows from it."""
     if path.is_file():
-        film = path.suffix.lower() in OTHER_FILMS
-        said = ": a film of another kind; convert it to mp4" if film else ""
-        return ": an archive; unpack it first" if path.suffix.lower() in ARCHIVES else said
+        ending = path.suffix.lower()
+        said = ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
+        return ": an archive; unpack it first" if ending in ARCHIVES else said
     endings = Counter(file.suffix.lower() for file in path.iterdir() if file.is_file() and file.suffix)
     ending, count = endings.most_common(1)[0] if endings else ("", 0)
     if ending in OTHER_PICTURES:
         return f": it holds {count} files that end in {ending}; convert them to png"
     if ending in JPEG_NAMES:
         return f": it holds {count} files that end in {ending}; let their names end in .jpg"
-    films = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
-    if films:
-        return f": it holds {shortened(films)}; give the video itself, and join the parts of one recording before"
+    videos = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
+    if videos:
+        return f": it holds {shortened(videos)}; give the video itself, and join the parts of one recording before"
     if not any(path.iterdir()):
         return ": the folder is empty"
     folders = sorted(plain_line(folder.name) for folder in path.iterdir() if folder.is_dir())
