@@ -193,8 +193,8 @@ plt.show()
 #
 # Each of these frames adds `initialisation.other_frame_points` divided by the number of frames of the clip, held-out
 # frames included, and rounded down. The preset `paper` has the numbers 35 000 and 5000, and $\tau=40$ scene units. If a
-# frame has fewer candidates than that, all of them are used. In clips of more than 150 frames, every second frame is
-# left out.
+# frame has fewer candidates than that, all of them are used. In clips of more than 150 frames, the training frames at
+# an even distance from the first one are left out.
 #
 # <!-- definition: endotsr.definition.initialisation.drawn_pixels -->
 # ```python

@@ -176,9 +176,9 @@ np.testing.assert_allclose(
 #
 # Before you look: where on the tissue is the gradient of the Laplacian loss 0, although the render is wrong there?
 #
-# The second and the third panel show the absolute gradients of the two losses. On tissue the gradient of L1 has the same
-# size everywhere and changes only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from
-# pixel to pixel. (Its colour scale is a quarter of the other one.)
+# The second and the third panel show the absolute gradients of the two losses. On tissue, wherever render and frame
+# differ, the gradient of L1 has the same size and changes only its sign; SSIM adds a part that varies. The gradient of
+# the Laplacian loss varies from pixel to pixel. (Its colour scale is a quarter of the other one.)
 #
 # The right panel shows $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset
 # `paper`, these substitutes for a base render give 1.3 to 1.5. The published 0.83 results from them at a weight below

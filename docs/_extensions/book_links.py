@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 CODE = re.compile(r"(?<![`}\\])`([A-Za-z_][\w.]*)(\([^`\n]*\))?`(?!`)")
 FENCE = re.compile(r"^(```|~~~|\$\$)")
 REVERSE = "# ## The reverse pass"
-SUBJECT = re.compile(r"^\*\*([^*]+)\*\* \((every chapter|chapters? [^)]*\d)\)\.", re.MULTILINE)
+SUBJECT = re.compile(r"^\*\*([^*]+)\*\* \((chapters? [^)]*\d)\)\.", re.MULTILINE)
 
 
 def linked(line: str) -> str:
@@ -59,7 +59,7 @@ def literature(text: str, chapter: int) -> list[str]:
     found = []
     for subject, chapters in SUBJECT.findall(text):
         spans = [list(map(int, re.findall(r"\d+", part))) for part in chapters.split(",")]
-        if any(span and span[0] <= chapter <= span[-1] for span in spans):
+        if any(span[0] <= chapter <= span[-1] for span in spans):
             found.append(subject)
     return found
 

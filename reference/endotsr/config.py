@@ -28,6 +28,14 @@ from endotsr.untrusted.toml import read_toml, toml_text
 LARGEST_SEED = (1 << 53) - 1  # larger integers are not exact in JSON, which records the seed of a run
 
 
+PERCENTILES = "percent, 0 <= low < 50 < high <= 100"
+
+
+def enclose_median(low: float, high: float) -> bool:
+    """Whether percentiles may limit depth: beyond the median, one number would replace most of the depth."""
+    return 0 <= low < 50 < high <= 100
+
+
 class SequenceConfig(Section, frozen=True, kw_only=True):
     """Frames, masks and depth of a sequence folder."""
 
@@ -270,10 +278,9 @@ class Config(Section, frozen=True, kw_only=True):
                 f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
                 f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
             )
-        if not 0 <= low < 50 < high <= 100:  # beyond the median, one number would replace most of the depth
+        if not enclose_median(low, high):
             raise InputError(
-                f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: percent, 0 <= low < 50 <"
-                " high <= 100"
+                f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: {PERCENTILES}"
             )
         if self.training.seed > LARGEST_SEED:
             raise InputError(

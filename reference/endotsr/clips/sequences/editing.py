@@ -22,11 +22,13 @@ from endotsr.method.kernels.arrays import FloatArray
 ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
 
-def chosen_frames(text: str, clip: Clip) -> list[int]:
+def chosen_frames(text: str, clip: Clip, option: str = "--frames") -> list[int]:
     """The frames of a list such as `0:10,12,2.5s:8s`, ascending and unique; "" selects all.
 
     Numbers follow Python's slices; negative ones count from the end. Seconds count from the first frame. The end is
     exclusive.
+
+    option   named in messages
 
     Raises:  InputError for a part that is invalid, selects nothing, or is outside the clip.
     """
@@ -34,52 +36,52 @@ def chosen_frames(text: str, clip: Clip) -> list[int]:
         return list(range(clip.count))
     found: set[int] = set()
     for part in text.split(","):
-        frames = _seconds(part.strip(), clip) if "s" in part else _numbers(part.strip(), clip.count)
+        try:
+            frames = _seconds(part.strip(), clip) if "s" in part else _numbers(part.strip(), clip.count)
+        except InputError as error:
+            raise InputError(f"{option} {error}") from None
         if not frames:
-            raise InputError(f"--frames {part.strip()!r}: selects nothing of {clip.count} frames; {ALLOWED}")
+            raise InputError(f"{option} {part.strip()!r}: selects nothing of {clip.count} frames; {ALLOWED}")
         found.update(frames)
     return sorted(found)
 
 
 def without(frames: list[int], text: str, clip: Clip) -> list[int]:
     """The frames that are not in a list as in `chosen_frames`. Raises InputError."""
-    try:
-        dropped = set(chosen_frames(text, clip)) if text.strip() else set()
-    except InputError as error:
-        raise InputError(str(error).replace("--frames", "--drop", 1)) from None
+    dropped = set(chosen_frames(text, clip, "--drop")) if text.strip() else set()
     return [i for i in frames if i not in dropped]
 
 
 def _numbers(part: str, count: int) -> list[int]:
-    """The frames of a slice, or the frame of a number."""
+    """The frames of a slice, or the frame of a number. The messages begin with the part, without the option."""
     try:
         number = int(part)
     except ValueError:
         try:
             return [*parse_frame_range(part, count, 0)] if part else []
         except InputError as error:
-            raise InputError(f"--{error}; {ALLOWED}") from None
+            raise InputError(f"{str(error).removeprefix('frames ')}; {ALLOWED}") from None
     if not -count <= number < count:
-        raise InputError(f"--frames {part!r}: {number} is outside the {count} frames of the source")
+        raise InputError(f"{part!r}: {number} is outside the {count} frames of the source")
     return [number % count]
 
 
 def _seconds(part: str, clip: Clip) -> list[int]:
-    """The frames of a time span such as `2.5s:8s`."""
+    """The frames of a time span such as `2.5s:8s`. The messages begin with the part, without the option."""
     if clip.times is None and not clip.rate:
-        raise InputError(f"--frames {part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
+        raise InputError(f"{part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
     words = part.split(":")
     try:
         bounds = [float(word.removesuffix("s")) if word.strip() else None for word in words]
     except ValueError:
         bounds = []
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
-        raise InputError(f"--frames {part!r}: no span of seconds; {ALLOWED}")
+        raise InputError(f"{part!r}: no span of seconds; {ALLOWED}")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
     times = clip.times_of(range(clip.count))
     elapsed: FloatArray = times - times[0]
     if np.isfinite(last) and last > elapsed[-1] + 1.5 / (clip.rate or 1.0):
-        raise InputError(f"--frames {part!r}: the source ends after {elapsed[-1]:.3f} seconds")
+        raise InputError(f"{part!r}: the source ends after {elapsed[-1]:.3f} seconds")
     return np.flatnonzero((elapsed >= first - 1e-9) & (elapsed < last - 1e-9)).tolist()
 
 

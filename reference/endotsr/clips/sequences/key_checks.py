@@ -12,7 +12,7 @@ import numpy as np
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.sequences.files import shortened
-from endotsr.clips.sequences.propose_masks import LITTLE_TISSUE
+from endotsr.clips.sequences.propose_masks import frames_without_tissue
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
 
@@ -21,7 +21,7 @@ MEANING = "allowed: white = instrument, black = tissue"
 
 def refuse_no_tissue(excluded: Sequence[BoolArray], names: Sequence[str], source: Path, margin: int) -> None:
     """Raises InputError if the carried masks leave hardly any tissue in all frames."""
-    empty = [name for name, plane in zip(names, excluded) if 1 - plane.mean() < LITTLE_TISSUE]
+    empty = [names[i] for i in frames_without_tissue(excluded)]
     if len(empty) == len(names):
         raise InputError(
             f"{source}: the carried masks, with a margin of {margin} px, leave hardly any tissue in all {len(empty)}"

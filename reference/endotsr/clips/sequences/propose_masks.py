@@ -18,7 +18,7 @@ every frame and from the search.
 In: the pictures of a clip. Out: a `Proposal`, or the reason why there is none. A person has to inspect it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,16 +85,16 @@ def propose_masks(pictures: Iterable[Picture]) -> Proposal:
     chosen, reason = _instruments(small, outside)
     if not outside.any():
         excluded = [_enlarged(_widened(plane), size) for plane, size in zip(chosen, sizes)]
-        return Proposal(excluded, reason, 0.0, _without_tissue(excluded, 1.0))
+        return Proposal(excluded, reason, 0.0, frames_without_tissue(excluded, 1.0))
     border = _enlarged(outside, sizes[0])
     widened = [_widened(plane) for plane in chosen] or [np.zeros_like(outside)] * len(sizes)
     excluded = [_enlarged(plane | outside, size) for plane, size in zip(widened, sizes)]
     fraction = float(border.mean())
     said = f"field of view: {1 - fraction:.1%} of the picture, the dark border of all frames is excluded; {reason}"
-    return Proposal(excluded, said, fraction, _without_tissue(excluded, 1 - fraction), border=border)
+    return Proposal(excluded, said, fraction, frames_without_tissue(excluded, 1 - fraction), border=border)
 
 
-def _without_tissue(excluded: list[BoolArray], view: float) -> tuple[int, ...]:
+def frames_without_tissue(excluded: Sequence[BoolArray], view: float = 1.0) -> tuple[int, ...]:
     """Frames with less than `LITTLE_TISSUE` of the field of view left; `view` is its fraction of the picture."""
     return tuple(i for i, plane in enumerate(excluded) if 1 - plane.mean() < LITTLE_TISSUE * view)
 

@@ -31,7 +31,7 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.smaller import smaller
 from endotsr.clips.sequences.splits import normalised_times, selected_frames, split_frames
 from endotsr.clips.sequences.world import fitting_world, moved_cameras, world_note
-from endotsr.config import SequenceConfig
+from endotsr.config import PERCENTILES, SequenceConfig, enclose_median
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import camera_centre
 from endotsr.untrusted.files import in_threads
@@ -124,8 +124,8 @@ def usable(clip: Clip) -> Clip:
 def check_percentiles(config: SequenceConfig) -> None:
     """Raises InputError unless the depth percentiles are in [0, 100], one below and one above the median."""
     low, high = config.depth_percentiles
-    if not 0 <= low < 50 < high <= 100:
-        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: percent, 0 <= low < 50 < high <= 100")
+    if not enclose_median(low, high):
+        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: {PERCENTILES}")
 
 
 def _depth_percentiles(clip: Clip, config: SequenceConfig) -> tuple[SequenceConfig, list[str]]:
