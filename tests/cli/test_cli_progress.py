@@ -47,9 +47,10 @@ class Told:
     One thread makes the targets of a gap at its first visit, a second one makes one gap in each iteration beside it.
     The kernels compile for three minutes in the first iteration, and for 40 s in the ninth. A coarse start lasts to
     `ends`, by default to the end of density control; from iteration 50 on, it is expected to end an eighth later.
+    Another program makes the iterations of `slow` take 1.4 times as long.
     """
 
-    def __init__(self, monkeypatch, plan, ends=None):
+    def __init__(self, monkeypatch, plan, ends=None, slow=range(0)):
         clock, stderr, self.out, self.left = Clock(), io.StringIO(), [], {}
         monkeypatch.setattr(progress, "time", clock)
         monkeypatch.setattr(progress.sys, "stderr", stderr)
@@ -65,7 +66,9 @@ class Told:
                 state.coarse, state.making, made = False, Making(), set()
             size = 0.25 if state.coarse else 1.0
             count = self.gaussians(plan, iteration)
-            clock.now += UNIT * float(iteration_work(count, size * PIXELS, iteration / total))
+            clock.now += UNIT * float(iteration_work(count, size * PIXELS, iteration / total)) * (
+                1.4 if iteration in slow else 1.0
+            )
             clock.now += {1: 180.0, 9: 40.0}.get(iteration, 0.0)
             gap = len(made) if plan.threads > 1 else int(rng.integers(plan.frames.gaps))
             bridged = plan.threads > 1 or rng.random() < config.training.bridge_fraction
@@ -127,6 +130,16 @@ def test_the_forecast_holds_if_the_coarse_start_ends_early(monkeypatch):
     assert all(
         told.left[now] == pytest.approx(told.end - now, rel=0.15) for now in told.left if at < now < told.end - 5
     )
+
+
+def test_half_a_minute_of_another_program_changes_the_time_left_of_a_long_run_by_less_than_a_tenth(monkeypatch):
+    slow = range(2000, 2250)
+    told = Told(monkeypatch, plan_of("sharp", 156, 2), slow=slow)
+    least = np.inf
+    for now, left in told.left.items():
+        assert left <= 1.1 * least or now > told.end - 5, now
+        least = min(least, left)
+    assert len(slow) * UNIT < 30
 
 
 def seconds(shown):

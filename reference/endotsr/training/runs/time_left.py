@@ -21,6 +21,9 @@ from endotsr.clips.sequences.checks.duration import (
 from endotsr.training.fitting.records import NOTHING_MADE, Making
 
 LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
+# Of a long run, this fraction is remembered instead: other programs slow a machine for half a minute at a time, and 200
+# iterations of a large scene take no longer than that.
+REMEMBERED = 0.125
 SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left out; a coarse check takes three
 
 
@@ -29,7 +32,8 @@ class TimeLeft:
 
     def __init__(self, plan: TimedCommand) -> None:
         self._plan = plan
-        self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)  # per unit of work, without waiting
+        most = max(MOST_ITERATIONS, round(REMEMBERED * plan.config.training.iterations))
+        self._seconds: deque[float] = deque(maxlen=most)  # per unit of work, without waiting
         self._waited: deque[float] = deque(maxlen=LEAST_ITERATIONS)  # per unit of work, of iterations that waited
         self._coarse, self._making = False, NOTHING_MADE
 
