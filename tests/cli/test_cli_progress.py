@@ -13,10 +13,12 @@ from endotsr.clips.sequences.checks.duration import (
     PAGES,
     TimedCommand,
     assumed_unit,
+    at_start,
     estimated_seconds,
     frames_of,
     iteration_work,
     vector_factor,
+    work_left,
 )
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened
@@ -66,8 +68,10 @@ class Told:
                 state.coarse, state.making, made = False, Making(), set()
             size = 0.25 if state.coarse else 1.0
             count = self.gaussians(plan, iteration)
-            clock.now += UNIT * float(iteration_work(count, size * PIXELS, iteration / total)) * (
-                1.4 if iteration in slow else 1.0
+            clock.now += (
+                UNIT
+                * float(iteration_work(count, size * PIXELS, iteration / total))
+                * (1.4 if iteration in slow else 1.0)
             )
             clock.now += {1: 180.0, 9: 40.0}.get(iteration, 0.0)
             gap = len(made) if plan.threads > 1 else int(rng.integers(plan.frames.gaps))
@@ -186,11 +190,13 @@ def test_the_evaluation_of_a_simulated_clip_is_forecast_with_its_known_motion(co
 def test_the_vectors_change_the_forecast_of_the_iterations_alone(monkeypatch):
     """Reading, motion and evaluation are assumed to take as long without AVX-512."""
     plan, seconds = plan_of("quick", 63, 2)._replace(perceived=True), {}
-    for register, unit in ((64, 0.08), (32, 0.12)):
+    for register, unit in ((64, 0.08), (32, 0.128)):
         monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", register)
         assert assumed_unit(2) == pytest.approx(unit)
         seconds[register] = estimated_seconds(plan._replace(vectors=vector_factor()), unit)
-    assert seconds[32].iterations == pytest.approx(1.5 * seconds[64].iterations)
+    work = {vectors: work_left(plan.config, PIXELS, at_start(plan.config), vectors) for vectors in (1.0, 1.6)}
+    assert work[1.6] != work[1.0], "the parts of an iteration depend on the vectors"
+    assert seconds[32].iterations / work[1.6] == pytest.approx(1.6 * seconds[64].iterations / work[1.0])
     assert seconds[32]._replace(iterations=0.0) == pytest.approx(seconds[64]._replace(iterations=0.0))
 
 

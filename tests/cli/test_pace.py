@@ -36,7 +36,7 @@ def test_the_ends_are_the_presets():
 @pytest.mark.parametrize("minutes", [1.0, 3.0, 10.0, 40.0])
 def test_the_planned_time_is_the_wish(still, minutes):
     config = paced_for(minutes, still, SHARP, unit=0.12, threads=1)
-    planned = 0.12 * work_left(config, still.width * still.height, at_start(config))
+    planned = 0.12 * work_left(config, still.width * still.height, at_start(config), vector_factor())
     gaps, times, size = 8, 12, 64 * 48 / (640 * 512)  # of training frames; two gaps have a frame between
     assert np.diff(still.train_index).tolist() == [2, 1, 1, 1, 1, 1, 1, 2]
     sizes = 1.25 if config.training.coarse_start else 1.0
@@ -65,6 +65,7 @@ def test_a_late_iteration_of_the_whole_model_takes_longer_than_the_timed_ones(st
     """A clock on which each call takes a second: an iteration of one second is 0.55 of a late one."""
     monkeypatch.setattr(pace, "time", SimpleNamespace(perf_counter=itertools.count(0.0).__next__))
     monkeypatch.setattr(pace, "training_step", lambda state, constants: None)
+    monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", 64)  # bytes, of a processor with AVX-512
     points = new_training(
         still, with_settings(SHARP, initialisation=with_settings(QUICK.initialisation, motion="none"))
     )

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from endotsr.clips.sequences.checks import duration as forecasts
+from endotsr.config import PRESETS, lengthened, with_iterations
 from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import duration, markdown
 from pages.store import figures
@@ -25,6 +27,26 @@ def told(row: dict[str, Any], when: str) -> str:
     return f"{duration(said['left'])} of {duration(left)} ({said['left'] / left - 1:+.0%})"
 
 
+def today(row: dict[str, Any]) -> str:
+    """What the first line would say with the constants of today, where it assumed the speed of a known processor."""
+    start, register = row["said"]["start"], row["register_bytes"]
+    if start["speed"] != "assumed" or not register:
+        return "-"
+    config = PRESETS[row["preset"]]
+    frames = forecasts.expected_frames(row["frames"], config)
+    if row["clip"].startswith("simulated"):
+        frames = frames.with_true_motion()
+    config = lengthened(config, frames.training)
+    if config.training.iterations != row["iterations"]:
+        config = with_iterations(config, row["iterations"])
+    width, height = map(int, row["size"].split("x"))
+    factor = forecasts.vector_factor(register)
+    plan = forecasts.TimedCommand(config, frames, width * height, row["threads"], "lpips" in row["held_out"], factor)
+    found = forecasts.estimated_seconds(plan, forecasts.assumed_unit(row["threads"], register))
+    seconds = sum(found) - found.reading + forecasts.COMPILATION * row["cold"]
+    return f"{duration(seconds)} ({seconds / (row['whole'] - start['at']) - 1:+.0%})"
+
+
 def named(row: dict[str, Any]) -> str:
     """Clip, preset, seed, vectors of the processor, clock, and whether the kernels were compiled first."""
     about = [row["clip"], f"`{row['preset']}`", f"{row['iterations']} iterations", f"seed {row['seed']}"]
@@ -35,14 +57,14 @@ def named(row: dict[str, Any]) -> str:
 def said(result: dict[str, Any]) -> str:
     """One row per command."""
     rows = result["rows"]
-    heads = ["Training", "Frames", "First line: said, left", "Forecast", "After a minute",
+    heads = ["Training", "Frames", "First line: said, left", "today", "Forecast", "After a minute",
              "Largest rise", "Evaluation", "Whole command"]  # fmt: skip
     cells = []
     for row in rows:
         first = told(row, "start") + (", speed assumed" if row["said"]["start"]["speed"] == "assumed" else "")
         after = row["whole"] - row["trained"]
         cells.append(
-            [named(row), str(row["frames"]), first, told(row, "forecast"), told(row, "minute"),
+            [named(row), str(row["frames"]), first, today(row), told(row, "forecast"), told(row, "minute"),
              f"{row['largest_rise']:.0%}", duration(after), duration(row["whole"])]
         )  # fmt: skip
     return noted(heads, cells, about(rows))
@@ -56,7 +78,7 @@ def about(rows: list[dict[str, Any]]) -> str:
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "
-        "that of the time left over its smallest value before."
+        "that of the time left over its smallest value before. *Today* is the first line with the present constants."
     )
 
 

@@ -76,9 +76,10 @@ def seconds_of_unit(sequence: Sequence, config: Config) -> float:
     short = with_settings(config, initialisation=still, training={"bridge_fraction": 0.0, "coarse_start": False})
     state, constants, found = new_training(sequence, short), training_constants(sequence, short), []
     state.lambda_lap = state.lambda_lap or 0.0
+    pixels, vectors = sequence.width * sequence.height, vector_factor()
     for _ in range(WARM + TIMED):
         began = time.perf_counter()
         training_step(state, constants)
         seconds = time.perf_counter() - began
-        found.append(seconds / float(iteration_work(state.gaussians.count, sequence.width * sequence.height, 1.0)))
+        found.append(seconds / float(iteration_work(state.gaussians.count, pixels, 1.0, vectors)))
     return statistics.median(found[WARM:]) / PLAIN

@@ -47,7 +47,7 @@ class TimeLeft:
         self._coarse, self._making = standing.coarse, making
         seconds -= making.waited - before.waited + (making.beside - before.beside) / self._plan.threads
         progress = standing.iteration / self._plan.config.training.iterations
-        work = iteration_work(standing.gaussians, self._seen(standing.coarse), progress)
+        work = iteration_work(standing.gaussians, self._seen(standing.coarse), progress, self._plan.vectors)
         waited = making.waited > before.waited  # such an iteration finds cold caches
         (self._waited if waited else self._seconds).append(max(seconds, 0.0) / float(work))
 
@@ -62,7 +62,7 @@ class TimeLeft:
         if unit is None:
             return None
         plan = self._plan
-        return unit * work_left(plan.config, plan.pixels, standing) + self._targets(unit, standing)
+        return unit * work_left(plan.config, plan.pixels, standing, plan.vectors) + self._targets(unit, standing)
 
     def _targets(self, unit: float, standing: Standing) -> float:
         """Seconds that targets will add, at this size of the frames and, during a coarse start, at full size."""

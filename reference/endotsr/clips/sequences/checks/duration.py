@@ -1,12 +1,13 @@
 """Seconds of the parts of `endotsr train`, estimated from the settings, the frames and the speed of the machine.
 
-    work(N, P, u) = (0.1 + 0.4 P / (640 * 512) + 0.5 N / 60 000) (0.77 + 0.23 min(u / 0.35, 1))
+    work(N, P, u) = (0.1 + p P / (640 * 512) + n N / 60 000) (0.77 + 0.23 min(u / 0.35, 1))
 
 is the work of an iteration with N Gaussians and P pixels at the fraction u of the run. Its unit is a late iteration of
-the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing. The
-first factor was measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256 pixels, the second
-on `quick` with and without its coarse start, on both EndoNeRF clips: early iterations have small Gaussians, colours of
-degree 0 and mostly inactive time bases.
+the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing.
+p = 0.4 and n = 0.5 were measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256 pixels on
+processors with AVX-512. Without it, p = 0.3 and n = 0.6 fit `sharp` on two clips and `quick` on both EndoNeRF clips.
+The second factor was measured on `quick` with and without its coarse start, on both EndoNeRF clips: early iterations
+have small Gaussians, colours of degree 0 and mostly inactive time bases.
 
 The constants of the other parts are in units of one thread at 640x512 pixels. They were measured on the two EndoNeRF
 clips together with the unit itself, as processor time of one thread. Nothing is timed here.
@@ -23,12 +24,14 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import IndexArray
 
 PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
-BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration
+BASE = 0.1  # part of its iteration
+OF_PIXELS, OF_GAUSSIANS = 0.4, 0.5  # other parts, on a processor with AVX-512
+WITHOUT_OF_PIXELS, WITHOUT_OF_GAUSSIANS = 0.3, 0.6  # and on one without
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
-# Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.13 s were measured on one
+# Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.14 s were measured on one
 # machine. The parts beside the iterations are assumed to take as long on both.
-WITHOUT_AVX512 = 1.5
+WITHOUT_AVX512 = 1.6
 # Assumed growth for `density.growth = "threshold"`, whose final number is not known in advance: a larger weight of the
 # similarity gives larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
 # at half size and twice the threshold the growth was 1.5, 1.8 and 2.1 with the weights 0.2, 0.35 and 0.5.
@@ -50,16 +53,16 @@ COMPARED = 1.6  # units per pair of them
 COMPILATION = 30.0  # seconds for the kernels of a training, once per machine
 
 
-def assumed_unit(threads: int) -> float:
-    """Seconds per unit of work of a machine whose speed is unknown."""
-    return SECONDS * (1.0 if threads > 1 else SERIAL) * vector_factor()
+def assumed_unit(threads: int, register: int | None = None) -> float:
+    """Seconds per unit of work of a machine whose speed is unknown; register as in `vector_factor`."""
+    return SECONDS * (1.0 if threads > 1 else SERIAL) * vector_factor(register)
 
 
-def vector_factor() -> float:
-    """The time of an iteration on this processor over that on one with AVX-512."""
-    from endotsr.method.kernels.vectors import REGISTER
+def vector_factor(register: int | None = None) -> float:
+    """The time of an iteration over that with AVX-512. register: bytes of a vector (default: of this processor)."""
+    from endotsr.method.kernels import vectors
 
-    return 1.0 if REGISTER >= 64 else WITHOUT_AVX512
+    return 1.0 if (vectors.REGISTER if register is None else register) >= 64 else WITHOUT_AVX512
 
 
 class Standing(NamedTuple):
@@ -82,10 +85,14 @@ def coarse_end(config: Config, at: Standing) -> int:
     return at.coarse_until or config.density.until
 
 
-def iteration_work(gaussians: float | NDArray, pixels: float | NDArray, progress: float | NDArray) -> float | NDArray:
-    """Work of one iteration; `progress` is the completed fraction of the run."""
+def iteration_work(
+    gaussians: float | NDArray, pixels: float | NDArray, progress: float | NDArray, vectors: float = 1.0
+) -> float | NDArray:
+    """Work of one iteration; `progress` is the completed fraction of the run, `vectors` the `vector_factor`."""
     early = EARLY + (1 - EARLY) * np.minimum(progress / LATE_FROM, 1.0)
-    return (BASE + OF_PIXELS * pixels / PIXELS + OF_GAUSSIANS * gaussians / GAUSSIANS) * early
+    long = (OF_PIXELS, OF_GAUSSIANS)
+    of_pixels, of_gaussians = long if vectors == 1.0 else (WITHOUT_OF_PIXELS, WITHOUT_OF_GAUSSIANS)
+    return (BASE + of_pixels * pixels / PIXELS + of_gaussians * gaussians / GAUSSIANS) * early
 
 
 def gaussians_at_end(config: Config) -> int:
@@ -100,17 +107,18 @@ def growth_by_threshold(config: Config) -> float:
     return GROWTH + GROWTH_BY_GRADIENT * config.loss.ssim_weight / config.density.gradient_threshold
 
 
-def work_left(config: Config, pixels: int, at: Standing) -> float:
+def work_left(config: Config, pixels: int, at: Standing, vectors: float = 1.0) -> float:
     """Work from here to the end, with the numbers of `expected_gaussians`.
 
-    pixels   of a frame of full size
+    pixels    of a frame of full size
+    vectors   `vector_factor` of the processor
 
     A coarse start is assumed to last until `coarse_end`.
     """
     later = np.arange(at.iteration + 1, config.training.iterations + 1)
     seen = np.where(at.coarse & (later <= max(coarse_end(config, at), 1)), pixels / 4, pixels)
     counts = expected_gaussians(config, at, later)
-    return float(np.sum(iteration_work(counts, seen, later / config.training.iterations)))
+    return float(np.sum(iteration_work(counts, seen, later / config.training.iterations, vectors)))
 
 
 def expected_gaussians(config: Config, at: Standing, later: NDArray[np.integer]) -> NDArray[np.floating]:
@@ -234,7 +242,7 @@ def estimated_seconds(plan: TimedCommand, unit: float = SECONDS) -> PartSeconds:
         alone * size * READ * frames.total,
         alone * size * tracked * frames.training,
         alone * size * targets / plan.threads,
-        unit * work_left(config, plan.pixels, first),
+        unit * work_left(config, plan.pixels, first, plan.vectors),
         0.0 if plan.perceived is None else plan.evaluating(unit) * (PAGES * gaussians_at_end(config) + size * pictures),
     )
 
