@@ -1,5 +1,6 @@
 """The map of the equations: no empty cell, and everything that it points to exists."""
 
+import re
 from importlib import import_module
 
 import pytest
@@ -50,6 +51,16 @@ def test_everything_named_exists(row: Equation):
     assert all((NOTEBOOKS / f"{name}.py").is_file() for name in row.notebooks)
     if row.without:
         assert (ROOT / row.without.tests).is_file()
+
+
+def test_the_specification_names_the_pages_without_a_definition():
+    """A definition is included where it exists; the first page lists the other pages by their first equation."""
+    folder = ROOT / "docs" / "specification"
+    pages = [page.read_text(encoding="utf-8") for page in folder.glob("[0-9b]*_*.md")]
+    label = re.compile(r"^\$\$ \((eq-\w+)\)$", re.MULTILINE)
+    without = {label.findall(text)[0] for text in pages if "{literalinclude}" not in text}
+    (said,) = re.findall(r"The pages of ([^.]+) have none", (folder / "index.md").read_text(encoding="utf-8"))
+    assert set(re.findall(r"`(eq-\w+)`", said)) == without
 
 
 def test_every_pair_stands_in_the_map():
