@@ -133,9 +133,9 @@ def by_division(alphas, dtype):
     "Reverse pass behind an opaque Gaussian",
     naive="`T = T / (1 - alpha)`, back to front",
     bound=8,
-    why="The transmittance is not stored but recovered by division. Once an alpha is 1, this is 0/0. Many programs "
-    "therefore clamp alpha at 0.99. (Gradient of the red of one pixel with respect to the first of three alphas, 0.3, "
-    "1 and 0.5; only the first is red.)",
+    why="The transmittance is not stored but recovered by division. Once an alpha is 1, this is 0/0. A clamp of alpha "
+    "at 0.99, as released programs have it, avoids this. (Gradient of the red of one pixel with respect to the first "
+    "of three alphas, 0.3, 1 and 0.5; only the first is red.)",
 )
 def opaque(dtype):
     return 1.0, by_division([0.3, 1.0, 0.5], dtype), weight_gradient([0.3, 1.0, 0.5], dtype)
@@ -160,7 +160,8 @@ def faint(dtype):
     "Opacity of one faint splat",
     naive="`1 - T`",
     bound=8,
-    why="In float32 1 - 1e-8 is 1. The sum of the weights keeps the digits that the product loses.",
+    why="In float32 1 - 1e-8 is 1. The sum of the weights keeps the digits that the product loses. (This is the "
+    "renderer without a cutoff. The fast path of `paper` computes 1 - T: below its cutoff of 1/255 no splat is drawn.)",
 )
 def opacity(dtype):
     scene = stack([1e-8], dtype)
