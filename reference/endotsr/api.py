@@ -134,7 +134,8 @@ def train(
                    gaussians, seconds, and every tenth iteration psnr. May raise StopTraining. Its result is ignored
     on_run         called next, with the run at this iteration, to use its `model` or `render`. The next iteration
                    changes the arrays in place: copy those to keep, and do not modify them
-    on_message     called with a line of text when kernels are compiled or equation (7) is calibrated
+    on_message     called with each line on what is done: compilation, calibration (7), coarse start, plan of `effects`,
+                   advice
     effects        "auto" trains only the components that the clip needs, as `train --effects auto`; keys in `sections`
                    take precedence
 

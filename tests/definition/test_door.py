@@ -1,6 +1,7 @@
 """What the docstring of `endotsr.definition` says of its compiled twins is true."""
 
 import ast
+import re
 
 import endotsr.definition
 import house
@@ -51,6 +52,13 @@ def test_compiled_functions_take_the_same_arguments_in_the_same_order():
     assert len(shared) > 70
     assert {name for name in shared if not follows(here[name], there[name])} == DIFFERENT
     assert all(f"`{name}`" in (endotsr.definition.__doc__ or "") for name in DIFFERENT | OTHER_FIELDS)
+
+
+def test_the_docstring_lists_every_module():
+    """Beside those that hold no equation of their own."""
+    names = {name.rpartition(".")[2] for name, _ in TREES if house.room(name) == "definition"}
+    listed = set(re.findall(r"\w+", endotsr.definition.__doc__ or ""))
+    assert names - listed <= {"__init__", "__main__", "definition", "settings", "simulate", "scene"}
 
 
 def test_tuples_have_the_same_fields():

@@ -34,7 +34,7 @@ class DepthOptions:
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
     """folder with sequence.toml"""
     given: Annotated[Path | None, Option("FOLDER")] = None
-    """files of another program, one per frame: npy, pfm, tiff or png"""
+    """files of another program, one per frame: npy, npz, mat, pfm, tiff or png; or one array of all frames"""
     kind: Literal["disparity", "depth", "relative"] = "disparity"
     """content of these files: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
     pairing: Pairing = "auto"

@@ -1,4 +1,4 @@
-"""`endotsr export`: a trained scene as .ply files, a point cloud, a slim model, or an interactive page."""
+"""`endotsr export`: a trained scene as .ply files, points, a mesh, a slim model, or an interactive page."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +41,7 @@ class ExportOptions:
     count: Annotated[int | None, Option("N")] = None
     """number of times, evenly spaced over [0, 1], instead of --times"""
     opacity: float = 0.1
-    """with points: minimum opacity of a Gaussian"""
+    """with points, .glb included: minimum opacity of a Gaussian"""
     voxel: float | None = None
     """with mesh: side of a voxel, scene units (default: 1.5 pixels at the median depth)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()

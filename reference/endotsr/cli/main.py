@@ -18,7 +18,7 @@ from endotsr.training.runs.stopping import INTERRUPTED, signals_stop
 from endotsr.untrusted.names import plain_line
 
 OTHER_PROGRAMS = "close other programs"
-LESS_MEMORY = {  # advice by command; the other commands have no option that reduces memory
+LESS_MEMORY = {  # advice by command; the other commands get OTHER_PROGRAMS
     "train": "a smaller --scale, fewer --frames or a smaller --density.maximum needs less; with --resume, "
     + OTHER_PROGRAMS,
     "demo": "a smaller --scale needs less",
@@ -136,7 +136,7 @@ def _overview() -> str:
             "  -h, --help   print this overview; `endotsr COMMAND --help` lists the options of a command",
             "  --version    print the version",
             "  --completion {bash,zsh,fish}   print a completion script for a shell",
-            "  --cache [clear]   show location and size of the compiled kernels; `clear` removes them",
+            "  --cache [clear]   show location and size of the compiled kernels and kept flows; `clear` removes them",
             "  -q, --quiet; --log-file FILE   print only errors; also write the output to a file (any command)",
         ]
     )

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 class PrepareOptions:
     """Convert a recording to a folder for `endotsr train`: pictures, masks, depth and sequence.toml.
 
-    SOURCE is a folder of pictures, a video, a StereoMIS, COLMAP, TUM, EuRoC or EndoNeRF folder, or a folder in the
-    common format. Options supply missing metadata. Lengths are converted to millimetres. The printed notes list all
-    assumptions and changes.
+    SOURCE is a folder of pictures, a video, a folder in the layout of StereoMIS, SCARED, SERV-CT, Hamlyn, C3VD,
+    EndoNeRF, COLMAP, nerfstudio, TUM or EuRoC, points of a reconstruction, or a folder in the common format. Options
+    supply missing metadata. Lengths are converted to millimetres. The printed notes list all assumptions and changes.
     """
 
     source: Annotated[Path, Option("SOURCE", positional=True)]
@@ -55,7 +55,8 @@ class PrepareOptions:
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
     """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; pictures are undistorted"""
     calibration: Annotated[Path | None, Option("FILE")] = None
-    """calibration of one camera or of a pair (is rectified): ini, YAML of OpenCV, ROS or Kalibr, .mat, or a matrix K"""
+    """calibration of one camera or of a pair (is rectified): of StereoMIS, OpenCV, ROS, Kalibr, ORB-SLAM, EuRoC, KITTI,
+    MATLAB or Bouguet's toolbox, or a matrix K"""
     baseline: float | None = None
     """baseline of an already rectified pair, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
@@ -65,7 +66,7 @@ class PrepareOptions:
     trajectory_axes: Axes | None = None
     """axes of the camera: opencv = right, down, forward; opengl = right, up, backward; llff = down, right, backward"""
     trajectory_unit: Unit | None = None
-    """unit of the positions (TUM and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
+    """unit of the positions (--trajectory, TUM, EuRoC and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one per frame, one file for all frames, a video, or an array"""
     excluded_value: ExcludedValue = "white"
@@ -73,7 +74,7 @@ class PrepareOptions:
     pairing: Pairing = "auto"
     """how masks and depth belong to frames: by number, by the number in the source of a prepared clip, or in order"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
-    """depth of every frame: png, tiff, npy, mat or pfm"""
+    """depth of every frame: png, tiff, npy, npz, mat or pfm; or one array of all frames"""
     depth_unit: Unit = "mm"
     """unit of the depth"""
     depth_scale: float = 1.0

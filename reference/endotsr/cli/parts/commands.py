@@ -1,11 +1,11 @@
 """The commands with summaries, and the replacements of commands from earlier versions."""
 
 COMMANDS = {
-    "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
+    "demo": "train and evaluate a simulated sequence, and write a report: the whole method in one command",
     "prepare": "convert a video, pictures or another layout to a folder for `train`",
     "depth": "compute depth from stereo pairs, or import it from another program",
-    "masks": "propose instrument masks for a clip without masks, with an overlay for inspection",
-    "poses": "estimate the poses of a moving scope, from the pictures and depth of a clip",
+    "masks": "propose instrument masks for a clip without masks, or carry drawn ones from a few frames to all",
+    "poses": "estimate the poses of a moving scope, from pictures and depth, or from pictures alone",
     "check": "list all faults of a sequence, with remedies",
     "train": "train on a sequence folder, or continue a run",
     "simulate": "write a simulated sequence with exact ground truth for `train`",

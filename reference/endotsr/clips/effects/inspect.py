@@ -1,7 +1,8 @@
 """All tests of a clip, in order: noise, blur and smoke, motion, then the others.
 
-Every test measures in units of the noise. Frames with blur or smoke are excluded as reference and from motion. The test
-of light depends on the result of the test of motion.
+The tests of blur, smoke, motion, light and topology measure in units of the noise. Frames with blur or smoke are
+excluded as reference and from motion. The test of light depends on the results of the tests of motion and of the
+camera.
 """
 
 from typing import Any, NamedTuple

@@ -104,8 +104,8 @@ def _colour_rate(plan: Plan, config: Config, explicit: frozenset[str], inspectio
 def _degree(inspection: Inspection, config: Config) -> tuple[int, str]:
     """The degree that the views determine if the tissue is static; all degrees if it moves.
 
-    Moving tissue is seen from varying directions and turns relative to the lamp. The harmonics follow both: clips with
-    motion fit worse without them.
+    Moving tissue is seen from varying directions and turns relative to the lamp, and the harmonics can follow both.
+    What they bring to such a clip was not measured.
     """
     views, motion = inspection.verdicts["view change"], inspection.verdicts["motion"]
     if motion.present:

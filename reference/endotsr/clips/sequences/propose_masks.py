@@ -5,7 +5,7 @@ Tissue is red, orange or mauve, and metal is grey. With the redness of a pixel,
     s = (R - min(G, (G + B) / 2)) / (R + G + B + FLOOR),
 
 and the usual redness m of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m join them.
-Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. Such a
+Gaps and holes are filled, and a margin is added: with a mask that is too small, metal is trained as tissue. Such a
 region is an instrument if it has an edge, and enters from the border of the picture, moves relative to the surrounding
 tissue, or overlaps an instrument of the previous or next frame. It has an edge if the redness rises there by EDGE m or
 more within some pixels: pale and overexposed tissue fades instead. A region without an edge counts where it covers most

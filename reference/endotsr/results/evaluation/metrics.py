@@ -1,8 +1,8 @@
 """PSNR (M1) and SSIM (M2) of a render against a frame, over the full image and over tissue.
 
 In: planar images (3, H, W) in display units and the tissue mask. Out: plain floats. "Full" sets excluded pixels to 0 in
-both images and averages over all pixels, as published tables do. "Tissue" averages over tissue pixels only and gives
-lower values. All arithmetic is float64. Values at excluded pixels, including NaN, have no effect.
+both images and averages over all pixels, as published tables do. "Tissue" averages over tissue pixels only; its PSNR is
+never above the full one. All arithmetic is float64. Values at excluded pixels, including NaN, have no effect.
 """
 
 import math
@@ -40,7 +40,7 @@ def psnr_tissue(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float
 def ssim_full(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
     """SSIM (M2) of the images with excluded pixels 0: mean of the SSIM map over all pixels.
 
-    11 x 11 Gaussian window, sigma 1.5, zero padding, C1 = 0.01^2, C2 = 0.03^2; other variants differ by up to 0.07.
+    11 x 11 Gaussian window, sigma 1.5, zero padding, C1 = 0.01^2, C2 = 0.03^2; other variants give other values.
     Edges:   no tissue: nan. Raises as `psnr`. Oracle: `endotsr.definition.metrics`.
     """
     if not mask.any():

@@ -17,7 +17,8 @@ SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
 
 
 class Kind(NamedTuple):
-    """One kind of finding. `endotsr train` also refuses what is a refusal here, but for `pose-convention`."""
+    """One kind of finding. `endotsr train` also refuses what is a refusal here, but for `inverted-depth`, and for
+    `pose-convention` in a folder that `prepare` wrote."""
 
     level: Level
     why: str
@@ -107,7 +108,7 @@ KINDS: dict[str, Kind] = {
                           "write all frames with one scale"),
     "depth-outliers": Kind("warning", "the depth loss divides by the largest depth of a frame: a few wrong far depths"
                            " change it in the whole frame",
-                           "remove them: sequence.depth_outliers = removed, as in the presets quick and sharp"),
+                           "remove them: sequence.depth_outliers = removed, as in every preset but paper"),
     "metres-cut": Kind("refusal", "metres were truncated to whole numbers",
                        "store millimetres, or a smaller step with its scale"),
     "marked-depth": Kind("warning", "the value seems to mark pixels without depth but is read as a distance",
