@@ -63,6 +63,12 @@ def test_import_is_light():
     assert done.stdout.strip() == "[]", done.stdout + done.stderr
 
 
+def test_the_guide_names_every_public_name():
+    guide = (Path(__file__).parents[1] / "docs" / "guides" / "python.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^\| `endotsr\.(\w+)` \|", guide, re.MULTILINE))
+    assert named == set(endotsr.__all__) - {"__version__", "Run"}, "Run is listed by its methods"
+
+
 def test_every_public_name_exists_and_is_typed():
     assert set(endotsr.__all__) <= set(dir(endotsr))
     for name in endotsr.__all__:

@@ -7,6 +7,12 @@ from endotsr.clips.simulator.scenes import SCENES
 made = importlib.import_module("pages.recordings.simulate")
 
 
+def test_what_the_scenes_have_in_common():
+    """As the guide says below its table."""
+    assert all("noise" in effects for effects in SCENES.values())
+    assert [name for name, effects in SCENES.items() if "highlights" not in effects] == ["still"]
+
+
 def test_every_scene_has_its_row_of_the_guide():
     assert set(made.PROGRAM.read()["scenes"]) == set(SCENES)
     text = made.PROGRAM.pages[0].read_text(encoding="utf-8")
