@@ -254,9 +254,9 @@ show("motion")
 # **Light alone.** A explains the change of light and gains on training and held-out frames. The other components have
 # no term for light. No variant moves the tissue by more than a small fraction of a pixel.
 #
-# **Motion alone.** No variant of this short run follows the motion: the trajectory error equals the error of a static
-# model, with S and without. A nevertheless gains on the training frames. It cannot move a Gaussian, so training changes
-# the colours of static Gaussians until each training frame looks right. No light changes in this clip.
+# **Motion alone.** No variant of this short run follows the motion: the trajectory error is close to that of a static
+# model, with S and without. A nevertheless gains on the training frames. It cannot move a Gaussian: training changes the
+# colours of Gaussians that hardly move until the training frames look better. No light changes in this clip.
 #
 # The learning rate of S is 10 %<!--=rate.motion--> of the rate of the deformation. Is this rate the cause? The next cell
 # trains S with the rate of the deformation and with a tenfold one. A faster S does not follow the motion either, and the
@@ -347,13 +347,13 @@ assert held[1] > 0 > held[4] and held[6] > held[4], "not monotonic in the rate"
 #
 # - On the **simulated clip of the demonstration**, with the preset `paper`, A loses PSNR on held-out frames
 #   ({doc}`/claims`) and gains it on training frames. That clip has a beat with five cycles in 24 frames.
-# - On the **real clip**, adding A to S gains PSNR ({doc}`/claims`). Most of its held-out frames are between two
+# - On the **two real clips**, adding A to S gains PSNR ({doc}`/claims`). Most of their held-out frames are between two
 #   training frames that differ little, as in the slow clip.
-# - After **721 iterations** on the real clip, a model without residuals is much worse ({doc}`/tradeoff`); after 6000
+# - After **721 iterations** on one of them, a model without residuals is much worse ({doc}`/tradeoff`); after 6000
 #   iterations the difference is small ({doc}`/claims`). After 721 iterations the deformation may
 #   have hardly begun to follow the motion, so A paints the rest.
-# - On a **simulated clip at full size**, `paper` shows every vessel twice where the tissue moves by three pixels between
-#   two training frames ({doc}`/full_size`): it fades one frame into the next.
+# - On a **simulated clip at full size**, `paper` loses about as much as the blend of both frames where the tissue moves by
+#   three pixels between two training frames ({doc}`/full_size`). It shows vessels twice there ({doc}`14_full_sequence`).
 # - With **light alone**, false motion is the same with and without A ({doc}`/effects`). So is the picture: over three
 #   seeds and 1000 iterations its PSNR is the same with A and without, within the interval. The gain of A in the table
 #   above is that of one seed after 500 iterations; it does not show that A is needed for this clip.

@@ -303,8 +303,8 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # $$
 #
 # Each candidate adds one Gaussian, so there is room for $M-N$ of them. If there are more candidates than that, those
-# with the largest $\bar g_i$ remain; of equal ones, those with the lower index. (The presets with a budget replace
-# threshold and room by (20.1).)
+# with the largest $\bar g_i$ remain; of equal ones, those with the lower index. (With a budget, as in the preset `quick`,
+# (20.1) replaces threshold and room.)
 #
 # **(13.8) Clone or split.** A candidate with $\max_kS_{ki}\le p\,e$, which is 0.1 scene units in `paper`, is small for
 # its region. It is *cloned*: it stays, and an exact copy is added at the same place. A candidate with
@@ -606,8 +606,8 @@ assert abs(moved[0] - moved[1]) > 1e-3
 # %% [markdown]
 # ### Figure: growth of the running clip
 #
-# The presets `quick` and `sharp` replace the threshold by a budget: every run of density control adds the steepest
-# candidates, in equal parts until the budget is reached ({doc}`20_first_look`). The left panel shows the number of
+# The preset `quick` replaces the threshold by a budget: every run of density control adds the steepest candidates, in
+# about equal parts until the budget is reached ({doc}`20_first_look`). The left panel shows the number of
 # Gaussians of the running clip, whose budget is 22000. Where would the next ones be added? The statistic needs many
 # views. The right panel has one, the held-out frame, and marks the steepest twentieth of the Gaussians. The middle
 # panel shows the error of the render.

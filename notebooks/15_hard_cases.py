@@ -233,7 +233,7 @@ assert render_reverse(out.colour, out.depth, None, saved).d_position.shape == (3
 #
 # For $n$ equal sheets of opacity $\alpha$ and colour $c$, the image must be $c\,\bigl(1-(1-\alpha)^n\bigr)$. The
 # opacity image is the **sum** of the weights. The alternative $1-T_n$ would be 0 in float32 for one sheet of
-# $\alpha=10^{-8}$.
+# $\alpha=10^{-8}$. (The fast path of training computes $1-T_n$. It has a cutoff, and below it no sheet is drawn.)
 
 # %%
 n, faint = 2000, 1e-3
