@@ -17,7 +17,7 @@ from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
 from endotsr.clips.sequences.between import flows_between, frame_between
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
-from endotsr.config import PAPER, with_iterations
+from endotsr.config import PAPER, PRESETS, with_iterations
 from endotsr.training.fitting.state import new_training, training_constants
 from endotsr.training.fitting.trainer import training_step
 
@@ -75,6 +75,34 @@ def test_the_digits_of_the_slope_of_tanh():
     wide = np.arange(17.0, 20.0, 1e-3)
     true = 1 / np.cosh(wide) ** 2
     assert wide[np.argmax(np.abs(1 - np.tanh(wide) ** 2 - true) >= true / 2)] == pytest.approx(18.9, abs=0.05)
+
+
+def test_what_every_preset_but_paper_has():
+    """Tracked motion, targets between the frames, no wrong far depth, wider bases; a budget only in `quick`."""
+    others = {name: preset for name, preset in PRESETS.items() if name != "paper"}
+    for preset in others.values():
+        assert preset.training.bridge_fraction > 0 == PAPER.training.bridge_fraction
+        assert (preset.initialisation.motion, PAPER.initialisation.motion) == ("flow", "none")
+        assert (preset.sequence.depth_outliers, PAPER.sequence.depth_outliers) == ("removed", "kept")
+        assert (preset.model.initial_width, PAPER.model.initial_width) == (0.05, 0.01)
+    assert [name for name, preset in PRESETS.items() if preset.density.growth == "budget"] == ["quick"]
+    assert [name for name, preset in PRESETS.items() if preset.training.coarse_start] == ["quick"]
+
+
+def test_without_tracked_motion_the_paths_are_more_than_twice_as_wrong():
+    """As B15 says of the simulated scenes; the records of `full_size.levers`."""
+    scenes = json.loads((RESULTS / "levers.json").read_text(encoding="utf-8"))["scenes"]
+    known = [scenes[name] for name in ("demo", "pull and breath")]
+    for of in known:
+        mean = {name: np.mean([row["scene_units"] for row in rows]) for name, rows in of.items()}
+        assert mean["no tracked motion"] > 2 * mean["`sharp`"]
+
+
+def test_the_depth_of_sharp_is_not_more_accurate_with_motion_alone():
+    """docs/guides/which_preset.md promises no depth; the records of `effects measure truth`."""
+    of = json.loads((RESULTS / "effects_truth.json").read_text(encoding="utf-8"))["scenes"]["motion"]
+    paper, sharp = ([row["depth_mm"] for row in of[name]] for name in ("`paper`", "`sharp`"))
+    assert max(paper) < min(sharp)
 
 
 def test_the_target_between_frames_against_the_moved_pair():
