@@ -93,7 +93,8 @@ def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
          "simulated-000001.render.png", "simulated-000009.render.png", "names"),
         (["r_9.png", "r_1.png", "r_2.png"], "r_1.png", "r_9.png", "frame numbers"),
         (["00000.png", "00001.png"], "00000.png", "00001.png", "as many files as held-out frames"),
-        ([f"{i:03d}.png" for i in range(1, 13)], "001.png", "009.png", "frame numbers"),
+        ([f"{i:03d}.png" for i in range(12)], "001.png", "009.png", "frame numbers"),
+        ([f"{i:03d}.png" for i in range(1, 13)], "002.png", "010.png", "as many files as frames"),
         ([f"{10 * i}.png" for i in range(1, 13)], "20.png", "100.png", "as many files as frames"),
         (["a10.npy", "a9.npy", "a3.png"], "a9.npy", "a10.npy", "as many files as held-out frames"),
     ],
@@ -163,3 +164,11 @@ def test_training_frames_are_measured_where_the_folder_holds_them(sequence, tmp_
     assert found["label"] == "grey" and found["pictures"]["files"]["simulated-000003"] == "simulated-000003.png"
     fewer = dataclasses.replace(sequence, test_index=np.array([9]), train_index=np.arange(9))
     assert find_pictures(tmp_path, fewer).files.keys() == set(range(12))
+
+
+def test_a_part_of_a_name_that_two_frames_share_pairs_no_file(sequence, tmp_path):
+    """Names of seconds: a file of the held-out frame is not that of a training frame of the same second."""
+    names = [f"{1305031102 + i // 4}.{25 * (i % 4):02d}" for i in range(12)]
+    timed = dataclasses.replace(sequence, names=names)
+    found = find_pictures(write_folder(tmp_path, [f"{names[i]}.png" for i in HELD_OUT]), timed)
+    assert {i: file.stem for i, file in found.files.items()} == {i: names[i] for i in HELD_OUT}

@@ -6,6 +6,7 @@ reproduces its metrics to the last digit; an 8-bit file rounds. Compression loss
 method.
 """
 
+from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,8 +52,8 @@ def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
     """Pair the held-out frames with the pictures of a folder or a video.
 
     The first of these rules with one file for every held-out frame applies: the name of the frame (the stem, or the
-    stem up to its first dot); the frame number in the name; the order of the numbers, if there are as many files as
-    held-out frames, or as many as frames. For a video only the order applies.
+    stem up to its first dot); the frame number in the name, counted from 0; the order of the numbers, if there are as
+    many files as held-out frames, or as many as frames. For a video only the order applies.
 
     Raises: InputError for a folder without pictures, if no rule applies, or for an unreadable video.
     """
@@ -64,7 +65,7 @@ def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
     numbers = frame_numbers(files)
     for found, pairing in (
         (_by_name(files, sequence), "by the names of the frames"),
-        (_by_number(files, numbers), "by the frame numbers in the names"),
+        (_by_number(files, numbers, sequence.count), "by the frame numbers in the names"),
         (_by_order(files, numbers, held_out), "in order: as many files as held-out frames"),
         (_by_order(files, numbers, list(range(sequence.count))), "in order: as many files as frames"),
     ):
@@ -105,26 +106,33 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:
-    """Pair frames and files with equal names, or equal names up to the first dot if only one file matches."""
+    """Pair frames and files with equal names, or equal names up to the first dot if one frame and one file have it."""
     whole = {file.stem: file for file in files}
     short: dict[str, list[Path]] = {}
     for file in files:
         short.setdefault(file.name.split(".")[0], []).append(file)
+    shared = Counter(name.split(".")[0] for name in sequence.names)  # by names of seconds: all frames of one second
     found = {}
     for i, name in enumerate(sequence.names):
-        alike = short.get(name.split(".")[0], [])
+        first = name.split(".")[0]
+        alike = short.get(first, [])
         if name in whole:
             found[i] = whole[name]
-        elif len(alike) == 1:
+        elif len(alike) == shared[first] == 1:
             found[i] = alike[0]
     return found
 
 
-def _by_number(files: list[Path], numbers: list[tuple[int, ...]] | None) -> dict[int, Path]:
-    """The files by the number in their names; {} if a name has not exactly one number, or a number repeats."""
+def _by_number(files: list[Path], numbers: list[tuple[int, ...]] | None, count: int) -> dict[int, Path]:
+    """The files by the number in their names, that of a frame counted from 0.
+
+    {} if a name has not exactly one number, if a number repeats, or if there are as many files as frames with other
+    numbers, such as those of files counted from 1.
+    """
     if numbers is None or len(numbers[0]) != 1 or len(set(numbers)) < len(numbers):
         return {}
-    return {number: file for (number,), file in zip(numbers, files)}
+    found = {number: file for (number,), file in zip(numbers, files)}
+    return {} if len(files) == count and found.keys() != set(range(count)) else found
 
 
 def _by_order(files: list[Path], numbers: list[tuple[int, ...]] | None, frames: list[int]) -> dict[int, Path]:
