@@ -8,6 +8,9 @@ from tiny import assert_refused, log_without_seconds
 
 from endotsr.cli.main import main
 from endotsr.config import load_config
+from endotsr.training.fitting.checkpoint import load_checkpoint
+from endotsr.training.runs.folder import RunFolder
+from endotsr.training.runs.training import extend_run
 
 
 def test_a_finished_run_is_extended_and_only_its_length_changes(finished_run, run_copy, tmp_path, capsys):
@@ -39,3 +42,32 @@ def test_a_run_is_not_shortened_and_keeps_its_other_settings(words, named, run_c
     before = (run_copy / "config.toml").read_text()
     assert_refused(capsys, ["train", "--out", str(run_copy), "--resume", *words], named)
     assert (run_copy / "config.toml").read_text() == before
+
+
+def test_a_run_whose_latest_checkpoint_is_damaged_is_extended_from_the_one_before(run_copy):
+    """The damaged file does not replace the checkpoint before it."""
+    (run_copy / "checkpoint.npz").write_bytes(b"cut short")
+    before = (run_copy / "checkpoint.previous.npz").read_bytes()
+    extend_run(RunFolder(run_copy), 40)
+    assert (run_copy / "checkpoint.damaged.npz").read_bytes() == b"cut short"
+    assert (run_copy / "checkpoint.previous.npz").read_bytes() == before
+    assert load_checkpoint(run_copy / "checkpoint.npz").header["config"]["training"]["iterations"] == 40
+
+
+def test_a_run_with_the_previous_checkpoint_alone_is_extended(run_copy):
+    (run_copy / "checkpoint.npz").unlink()
+    assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "34", "--no-evaluate"]) == 0
+    assert load_checkpoint(run_copy / "checkpoint.npz").iteration == 34
+
+
+def test_a_run_stopped_after_its_last_iteration_is_finished_by_a_resume(run_copy, capsys):
+    RunFolder(run_copy).update({"status": "interrupted", "finished": None})
+    assert main(["train", "--out", str(run_copy), "--resume", "--no-evaluate"]) == 0
+    record = json.loads((run_copy / "run.json").read_text())
+    assert record["status"] == "finished" and record["finished"] and record["resumed"] == []
+
+
+def test_metrics_of_an_earlier_iteration_are_not_compared(run_copy, finished_run, capsys):
+    assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "31", "--no-evaluate"]) == 0
+    words = ["evaluate", str(finished_run), f"longer={run_copy}"]
+    assert_refused(capsys, words, "its metrics.json is of iteration 30, its checkpoint of 31")

@@ -13,6 +13,7 @@ from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
 from endotsr.training.runs.files import read_json, write_json
 from endotsr.training.runs.folder import open_run
+from endotsr.untrusted.json import Keys
 from endotsr.untrusted.sections import Section
 from endotsr.untrusted.writing import replace_text
 
@@ -134,7 +135,10 @@ def _metrics(
     if (path / "run.json").exists() or is_windowed(path):
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
-        return cast("EvaluationRecord", read_json(path / "metrics.json")), sequence
+        metrics = read_json(path / "metrics.json")
+        if not is_windowed(path):
+            _refuse_earlier(path, metrics)
+        return cast("EvaluationRecord", metrics), sequence
     from endotsr.clips.sequences.video_file import is_video
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
@@ -146,6 +150,18 @@ def _metrics(
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
         sequence = shown_sequence("evaluate", run, asked.sequence, asked.settings)
     return measure_pictures(find_pictures(path, sequence), sequence, label, load_lpips_weights(asked.lpips)), sequence
+
+
+def _refuse_earlier(path: Path, metrics: Keys) -> None:
+    """Raises InputError for metrics of an earlier iteration than the checkpoint of a run that was continued."""
+    about = metrics.get("run")
+    measured = about.get("iteration") if isinstance(about, dict) else None
+    done = read_json(path / "run.json").get("iterations_done")
+    if isinstance(measured, int) and isinstance(done, int) and measured != done:
+        raise InputError(
+            f"{path}: its metrics.json is of iteration {measured}, its checkpoint of {done}; `endotsr evaluate {path}`"
+            " measures it again"
+        )
 
 
 def _as_dict(row: Any) -> dict[str, Any]:

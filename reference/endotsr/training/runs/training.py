@@ -96,6 +96,8 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
             entry: ResumedEntry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
             folder.update({"status": "running", "resumed": [*folder.record().get("resumed", []), entry]})
             train_run(folder, state, sequence, config, observer)
+        elif folder.record().get("status") != "finished":  # stopped between the last checkpoint and this record
+            folder.update({"status": "finished", "finished": now(), "iterations_done": state.iteration})
 
 
 def extend_run(folder: RunFolder, iterations: int) -> None:
@@ -109,8 +111,8 @@ def extend_run(folder: RunFolder, iterations: int) -> None:
     with folder.locked():
         before = folder.config()
         config = with_settings(before, training={"iterations": iterations})
-        if folder.checkpoint.exists():
-            save_training(folder, load_training(folder, before), config)
+        if folder.has_checkpoint:
+            save_training(folder, load_training(folder, before, continues=True), config)
         replace_text(folder.path / "config.toml", config_to_toml(config))
         entry: ExtendedEntry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
         folder.update({"extended": [*folder.record().get("extended", []), entry]})
