@@ -76,6 +76,12 @@ def scared(folder: Path, archive: bool = True) -> None:
     stereo_yaml(folder / "endoscope_calibration.yaml", M1=K, D1=nothing, M2=K, D2=nothing, R=np.eye(3),
                 T=np.array([[-BASELINE], [0.0], [0.0]]))  # fmt: skip
     texts = {f"frame_data{i:06d}.json": json.dumps({"camera-pose": pose.tolist()}) for i, pose in enumerate(poses())}
+    frame_data(folder, texts, archive)
+
+
+def frame_data(folder: Path, texts: dict[str, str], archive: bool) -> None:
+    """The files of the frames of SCARED, by name."""
+    (folder / "data").mkdir(exist_ok=True)
     if archive:
         with tarfile.open(folder / "data/frame_data.tar.gz", "w:gz") as stored:
             for name, text in texts.items():

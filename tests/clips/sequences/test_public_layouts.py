@@ -8,6 +8,7 @@ from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.layouts import c3vd as c3vd_layout
 from endotsr.clips.sequences.layouts import describe, layout_of
+from endotsr.clips.sequences.layouts.scared import frame_texts
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 
@@ -63,6 +64,37 @@ def test_scared(archive, tmp_path):
     same_poses(found.poses)
     pair = next(found.pictures([1]))
     assert pair.right is not None and pair.left.shape == (made.HEIGHT, made.WIDTH, 3)
+
+
+@pytest.mark.parametrize("archive", [True, False])
+def test_numbers_without_leading_zeros_are_in_order(archive, tmp_path):
+    texts = {f"frame_data{i}.json": str(i) for i in range(12)}
+    made.frame_data(tmp_path, {name: texts[name] for name in sorted(texts)}, archive)
+    found = [content if isinstance(content, str) else content.decode() for _, content in frame_texts(tmp_path)]
+    assert found == [str(i) for i in range(12)]
+
+
+def test_files_that_macos_writes_beside_others_are_passed_over(tmp_path):
+    """`._NAME` holds attributes of NAME, in folders copied from macOS and in archives made there."""
+    made.scared(tmp_path / "scared", archive=False)
+    (tmp_path / "scared/data/frame_data/._frame_data000000.json").write_bytes(b"\0\5\x16\7\xff")
+    made.c3vd(tmp_path / "c3vd")
+    (tmp_path / "c3vd/._0_color.png").write_bytes(b"\0\5\x16\7\xff")
+    assert describe(tmp_path / "scared").count == made.FRAMES and describe(tmp_path / "c3vd").count == 2
+    (tmp_path / "pictures").mkdir()
+    for i in range(3):
+        write_png(tmp_path / "pictures" / f"{i}.png", made.picture(i))
+    (tmp_path / "pictures/times.txt").write_text("0.0\n0.1\n0.3\n")
+    (tmp_path / "pictures/._times.txt").write_bytes(b"\0\5\x16\7\xff")
+    np.testing.assert_allclose(describe(tmp_path / "pictures").times, [0.0, 0.1, 0.3])
+
+
+def test_depth_of_c3vd_by_either_ending(tmp_path):
+    made.c3vd(tmp_path / "raw")
+    for file in sorted((tmp_path / "raw").glob("*_depth.tiff")):
+        file.rename(file.with_suffix(".tif"))
+    found = describe(tmp_path / "raw")
+    assert found.depth is not None and (found.depth(1) > 0).any()
 
 
 def test_scared_without_kinematics_rests_and_a_broken_archive_is_refused(tmp_path, capsys):
@@ -153,6 +185,16 @@ def test_sides_by_the_names_of_files(names, tmp_path):
     assert found.count == 11
     for i, pair in enumerate(found.pictures(list(range(11)))):
         assert pair.left[0, 0].tolist() == [i, 0, 0] and pair.right[0, 0].tolist() == [i, 200, 0]
+
+
+def test_a_folder_with_both_videos_of_a_pair_takes_no_other_view(tmp_path):
+    (tmp_path / "raw").mkdir()
+    for name in ("raw/left", "raw/right", "other"):
+        made.write(tmp_path / f"{name}.mkv", [made.picture(i) for i in range(3)])
+    with pytest.raises(InputError, match="raw: has a right video, and --right names another; allowed: one of them"):
+        describe(tmp_path / "raw", SourceOptions(right=tmp_path / "other.mkv", baseline=4.0))
+    with pytest.raises(InputError, match="two videos of a pair and --stereo side_by_side; allowed: one of them"):
+        describe(tmp_path / "raw", SourceOptions(stereo="side_by_side", baseline=4.0))
 
 
 def test_a_side_without_its_other_is_refused(tmp_path):

@@ -16,6 +16,11 @@ TRUTH = "truth"  # folder of a simulated sequence
 ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, and no other PNG files"
 
 
+def visible_files(folder: Path, pattern: str = "*") -> list[Path]:
+    """The entries of a folder by name, without hidden ones, such as the `._NAME` that macOS writes beside a file."""
+    return sorted(file for file in folder.glob(pattern) if not file.name.startswith("."))
+
+
 def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Path]:
     """Picture files of a folder in time order: by the numbers in their names, or by name if there are no numbers.
 
@@ -26,7 +31,7 @@ def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Pa
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found")
-    files = sorted(f for f in folder.iterdir() if f.suffix.lower() in endings and not f.name.startswith("."))
+    files = [file for file in visible_files(folder) if file.suffix.lower() in endings]
     if not files:
         kinds = "PNG file" if endings == (".png",) else f"PNG file, and none that ends in {', '.join(endings[1:])}"
         raise InputError(f"{folder}: holds no {kinds}")

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.files import visible_files
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.names import plain_line, relative_path
@@ -90,7 +91,7 @@ def picture_times(folders: list[Path], pictures: list[Path], rate: float | None)
     """
     seconds, notes, names = None, [], []
     for folder in dict.fromkeys(folders):
-        for file in sorted(folder.iterdir()):
+        for file in visible_files(folder):
             if not any(fnmatchcase(file.name.lower(), pattern) for pattern in LISTS) or not file.is_file():
                 continue
             names.append(file.name.lower())

@@ -16,6 +16,7 @@ from endotsr.clips.opencv.stereo import Maps, remapped
 from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matrix, inverse_pose, rows_of_motion
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
+from endotsr.clips.sequences.files import visible_files
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
@@ -24,7 +25,7 @@ from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
 
-POSES, COLOUR, DEPTH = "pose.txt", "_color.png", "_depth.tiff"
+POSES, COLOUR, DEPTH = "pose.txt", "_color.png", "_depth.tif*"
 FILES = Inventory(
     "the folder of a sequence of C3VD",
     used={
@@ -93,7 +94,7 @@ def read_poses(path: Path) -> list[CameraPose | None]:
 def describe_c3vd(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip of a pinhole camera. Raises InputError for another size."""
     number = lambda file: int(digits) if (digits := file.name.split("_")[0]).isdecimal() else -1
-    files, planes = (sorted(path.glob(f"*{end}"), key=number) for end in (COLOUR, DEPTH))
+    files, planes = (sorted(visible_files(path, f"*{end}"), key=number) for end in (COLOUR, DEPTH))
     poses, maps = read_poses(path / POSES), pinhole_maps()
     if len(poses) != len(files):
         raise InputError(f"{path / POSES}: {len(poses)} poses for {len(files)} pictures; allowed: one per picture")

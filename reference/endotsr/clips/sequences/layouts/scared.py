@@ -7,6 +7,7 @@ data/frame_data.tar.gz            or data/frame_data/: one JSON per frame, camer
 Structured-light depth belongs to unrectified pictures and is not read; `endotsr depth` matches the pairs.
 """
 
+import re
 import tarfile
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from pathlib import Path
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.camera import checked_rotation, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import frame_numbers, shortened
+from endotsr.clips.sequences.files import frame_numbers, shortened, visible_files
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
@@ -87,7 +88,7 @@ def _poses(path: Path, count: int, notes: list[str]) -> list[CameraPose | None] 
 
     One file for each frame belongs to them in order; otherwise a file belongs to the frame with its number.
     """
-    texts = _texts(path)
+    texts = frame_texts(path)
     if not texts:
         return None
     numbers = frame_numbers([Path(name) for name, _ in texts])
@@ -110,10 +111,10 @@ def _poses(path: Path, count: int, notes: list[str]) -> list[CameraPose | None] 
     return found
 
 
-def _texts(path: Path) -> list[tuple[str, str | bytes]]:
-    """Names and contents of the JSON files, ordered by name."""
+def frame_texts(path: Path) -> list[tuple[str, str | bytes]]:
+    """Names and contents of the JSON files, in the order of the numbers in their names."""
     if (path / FOLDER).is_dir():
-        files = sorted((path / FOLDER).glob("*.json"))[:MOST_FILES]
+        files = sorted(visible_files(path / FOLDER, "*.json"), key=lambda file: _in_order(file.name))[:MOST_FILES]
         return [(file.name, read_text(file, LARGEST_FILE)) for file in files]
     if not (path / ARCHIVE).is_file():
         return []
@@ -121,14 +122,20 @@ def _texts(path: Path) -> list[tuple[str, str | bytes]]:
     try:
         with tarfile.open(path / ARCHIVE, "r:gz") as archive:
             for member in archive:
-                if member.isfile() and member.name.endswith(".json") and member.size <= LARGEST_FILE:
+                name = Path(member.name).name
+                if member.isfile() and name.endswith(".json") and name[0] != "." and member.size <= LARGEST_FILE:
                     stream = archive.extractfile(member)
-                    found[Path(member.name).name] = stream.read(LARGEST_FILE) if stream else b""
+                    found[name] = stream.read(LARGEST_FILE) if stream else b""
                 if len(found) > MOST_FILES:
                     raise InputError(f"{path / ARCHIVE}: more than {MOST_FILES} files")
     except (tarfile.TarError, OSError, EOFError) as error:
         raise InputError(f"{path / ARCHIVE}: cannot be read: {error}") from None
-    return sorted(found.items())
+    return sorted(found.items(), key=lambda entry: _in_order(entry[0]))
+
+
+def _in_order(name: str) -> list[str | int]:
+    """A key that sorts names by the numbers in them, with or without leading zeros."""
+    return [int(part) if k % 2 else part for k, part in enumerate(re.split(r"(\d+)", name))]
 
 
 LAYOUT = Layout(

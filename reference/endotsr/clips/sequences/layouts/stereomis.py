@@ -11,7 +11,7 @@ from pathlib import Path
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import list_pictures
+from endotsr.clips.sequences.files import list_pictures, visible_files
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.pairing import matching_files
@@ -32,7 +32,7 @@ def recognises(path: Path) -> bool:
 
 
 def _videos(path: Path) -> list[Path]:
-    return sorted(file for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
+    return [file for file in visible_files(path) if file.suffix.lower() in VIDEO_ENDINGS] if path.is_dir() else []
 
 
 def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
@@ -54,10 +54,11 @@ def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
         notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
     masks, inside = clip.masks, {}
     if options.masks is None and (path / MASKS).is_dir():
-        assert clip.calibration is not None
+        camera = clip.calibration.left if clip.calibration else clip.intrinsics
+        assert camera is not None  # a calibration file states one
         files = matching_files(clip.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
         inside = folders_of(files)
-        masks = masks_of(files, "black", clip.calibration.left.width, clip.calibration.left.height)
+        masks = masks_of(files, "black", camera.width, camera.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
     return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes, inside=inside)

@@ -14,7 +14,7 @@ from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Depth
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
-from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.files import shortened, visible_files
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -97,13 +97,13 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
     notes = _unlisted(path, files)
-    if pairs := sorted(file.name for file in path.glob("associat*.txt")):
+    if pairs := [file.name for file in visible_files(path, "associat*.txt")]:
         notes.append(f"{shortened(pairs)}: not read; pictures, depth and poses are paired by their times")
     width, height = size_of(files)
     intrinsics = stated_camera(options, width, height, path).intrinsics
     notes += picture_notes(files)
     given = [path / name for name in TRAJECTORIES if (path / name).is_file()]
-    settings = next((file for file in sorted(path.glob("*.yaml")) if SETTINGS in read_text(file)), None)
+    settings = next((file for file in visible_files(path, "*.yaml") if SETTINGS in read_text(file)), None)
     if intrinsics is None and settings is not None:
         intrinsics = calibrated(settings, width, height).intrinsics
         notes.append(f"intrinsics of {settings.name}: {HALF_A_PIXEL}")

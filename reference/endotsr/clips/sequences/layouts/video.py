@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
+from endotsr.clips.sequences.files import visible_files
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
 from endotsr.clips.sequences.layouts.pictures import SIDE
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -40,7 +41,7 @@ def recognises(path: Path) -> bool:
 
 def _sides(path: Path) -> tuple[Path, Path] | None:
     """The left and the right video of a folder; None unless it has two videos whose names state their sides."""
-    files = [file for file in sorted(path.iterdir()) if is_video(file)] if path.is_dir() else []
+    files = [file for file in visible_files(path) if is_video(file)] if path.is_dir() else []
     found = {(side[1] or side[2])[0].lower(): file for file in files if (side := SIDE.search(file.stem))}
     return (found["l"], found["r"]) if len(files) == 2 and set(found) == {"l", "r"} else None
 
@@ -48,7 +49,11 @@ def _sides(path: Path) -> tuple[Path, Path] | None:
 def describe_video(path: Path, options: SourceOptions) -> Clip:
     """The video as a clip. Raises InputError."""
     sides = _sides(path)
+    if sides and options.right is not None:
+        raise InputError(f"{path}: has a right video, and --right names another; allowed: one of them")
     path, right = sides or (path, options.right)
+    if right is not None and options.stereo not in ("auto", "none"):
+        raise InputError(f"{path}: two videos of a pair and --stereo {options.stereo}; allowed: one of them")
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
