@@ -1,5 +1,7 @@
 """Editing a clip: frames by number and second, frames left out, a crop, masks united, a folder replaced."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
@@ -10,7 +12,7 @@ from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
-from endotsr.clips.sequences.editing import chosen_frames, cropped, without
+from endotsr.clips.sequences.editing import chosen_frames, cropped, thinned, without
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
@@ -171,3 +173,19 @@ def test_what_is_assumed_of_the_depth_survives_an_edit(tmp_path):
     assert main(["prepare", clip, "--out", clip, "--replace", "--drop", "0"]) == 0
     entry = read_sequence_file(tmp_path / "clip").depth
     assert entry.assumed == "shape" and entry.method.startswith("assumed: a plane")
+
+
+def test_frames_of_a_lower_rate_are_the_nearest_without_a_table_of_all_pairs():
+    rng, notes = np.random.default_rng(0), []
+    for count in (1, 2, 3, 40):
+        times = np.cumsum(rng.uniform(0.01, 0.2, count))
+        wanted = times[0] + np.arange(int((times[-1] - times[0]) * 4.0 + 1e-6) + 1) / 4.0
+        table = np.abs(times[None, :] - wanted[:, None] + 1e-9).argmin(axis=1)
+        found = thinned(recording(count, rate=10.0, times=times), list(range(count)), 4.0, notes)
+        assert found == np.unique(table).tolist()
+    tracemalloc.start()
+    try:
+        assert len(thinned(recording(8000, rate=30.0), list(range(8000)), 15.0, notes)) == 4000
+        assert tracemalloc.get_traced_memory()[1] < 10e6  # bytes; the table has 256 million
+    finally:
+        tracemalloc.stop()

@@ -190,3 +190,14 @@ def test_a_real_pair_agrees_with_the_given_depth():
     both = tissue & (given > 0) & (depth > 0)
     assert both.sum() > 0.7 * (tissue & (given > 0)).sum()
     assert np.median(np.abs(depth - given.astype(float))[both]) < 1.5  # mm; the given depth is in whole millimetres
+
+
+def test_depth_beyond_the_steps_of_the_first_frame_is_said(tmp_path):
+    written(tmp_path / "clip", depth=False)
+    (tmp_path / "other").mkdir()
+    for i in range(FRAMES):
+        np.save(tmp_path / "other" / f"{i:06d}.npy", np.full((HEIGHT, WIDTH), 500.0 if i == 3 else 10.0 + i))
+    report = write_depth(tmp_path / "clip", from_files(tmp_path / "clip", tmp_path / "other", "depth", 1.0))
+    assert report.note == (
+        f"{HEIGHT * WIDTH} pixels are clipped at 131.07, eight times the usual depth of the first frame"
+    )

@@ -97,9 +97,17 @@ def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str])
         raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; allowed: no more")
     times = clip.times_of(frames)
     wanted = times[0] + np.arange(int((times[-1] - times[0]) * rate + 1e-6) + 1) / rate
-    kept = np.unique(np.abs(times[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
+    kept = np.unique(_nearest(times, wanted))
     notes.append(f"{len(kept)} of {len(frames)} frames kept for {rate:g} a second, by their times")
     return [frames[k] for k in kept]
+
+
+def _nearest(times: FloatArray, wanted: FloatArray) -> NDArray[np.intp]:
+    """For each wanted time the number of the nearest of the ascending times; of two equally near ones, the earlier."""
+    after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
+    before, after = after - 1, np.minimum(after, len(times) - 1)
+    nearer = np.abs(times[after] - wanted + 1e-9) < np.abs(times[before] - wanted + 1e-9)
+    return np.where(nearer, after, before)
 
 
 def written_times(

@@ -46,7 +46,7 @@ class DepthReport(NamedTuple):
     file: SequenceFile
     coverage: list[float]  # per frame, fraction of its pixels
     median: float  # of the frame medians
-    note: str = ""  # on the files
+    note: str = ""  # on the files, and on depth that does not fit into them
 
 
 def stereo_frames(clip: Clip, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
@@ -189,7 +189,7 @@ def write_depth(
     names, file = describe_prepared(folder).names, read_sequence_file(folder)
     if (file.depth or (folder / DEPTH).exists()) and not replace:
         raise InputError(f"{folder}: has depth already; allowed: --replace")
-    coverage, medians, step = [], [], 0.0
+    coverage, medians, step, clipped = [], [], 0.0, 0
     with replacing_folder(folder / DEPTH) as place:
         for k, depth in enumerate(made.frames):
             known = depth[depth > 0]
@@ -197,7 +197,7 @@ def write_depth(
                 step = step or step_of_depth(float(np.percentile(known, 99.8)))
                 medians.append(float(np.median(known)))
             coverage.append(known.size / depth.size)
-            write_levels(place / f"{names[k]}.png", depth, step or 1.0)
+            clipped += write_levels(place / f"{names[k]}.png", depth, step or 1.0)
             on_frame(k + 1, len(names))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
@@ -205,4 +205,6 @@ def write_depth(
     entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
     found = msgspec.structs.replace(file, depth=entry, unit=unit if made.assumed else file.unit)
     replace_text(folder / FILE_NAME, sequence_text(found))
-    return DepthReport(found, coverage, float(np.median(medians)), made.note)
+    lost = f"{clipped} pixels are clipped at {65535 * step:g}, eight times the usual depth of the first frame"
+    notes = [made.note] * bool(made.note) + [lost] * bool(clipped)
+    return DepthReport(found, coverage, float(np.median(medians)), "; ".join(notes))
