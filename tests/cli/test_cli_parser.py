@@ -40,6 +40,8 @@ class Options(Base):
     """may be negative"""
     sizes: tuple[int, ...] = (1, 2)
     """several numbers"""
+    places: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """three numbers"""
     marks: Annotated[tuple[int, ...], Option("INT ...", may_be_empty=True)] = (3,)
     """numbers or none"""
     fast: bool = False
@@ -57,6 +59,19 @@ def test_options_and_positional_arguments_may_be_mixed():
     found = tried("--offset", "2", "a", "--fast", "b", "--out=x=y", "c", "--level", "0")
     assert (found.first, found.rest) == ("a", (Path("b"), Path("c")))
     assert (found.offset, found.fast, found.out, found.level) == (2.0, True, Path("x=y"), 0)
+
+
+@pytest.mark.parametrize("word", ["-3e-05", "-1.5E+2", "-5.", "-1", "-.5", "-0.25"])
+def test_a_negative_number_is_one_of_several_values(word):
+    found = tried("--sequence.depth-percentiles", "1", "99", "--places", "1", word, "2e-3", "a")
+    assert found.places == (1.0, float(word), 2e-3) and found.first == "a"
+
+
+@pytest.mark.parametrize(("words", "fast"), [(["--no-fast=true"], False), (["--no-fast=false"], True)])
+def test_a_negated_switch_takes_a_word(words, fast):
+    assert tried("--fast", *words).fast is fast
+    with pytest.raises(InputError, match="--fast 'maybe' is not allowed; allowed: true, false"):
+        tried("--no-fast=maybe")
 
 
 def test_without_words_the_defaults_stand():

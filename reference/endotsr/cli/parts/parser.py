@@ -10,7 +10,9 @@ relations between options.
 """
 
 import argparse
+import math
 import re
+from decimal import Decimal
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -31,6 +33,7 @@ T = TypeVar("T")
 HELP_ALL = "--help-all"
 HELP = {"-h", "--help", HELP_ALL}
 THOUSANDS = {"k": 1e3, "K": 1e3, "M": 1e6}
+NEGATIVE = re.compile(r"-\d+|-\d*\.\d+")  # numbers of argparse before Python 3.14
 SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a settings file
 
 
@@ -120,29 +123,43 @@ def _plain_words(fields: list[Field], words: list[str]) -> list[str]:
     """The words in the form of argparse: names with `-` for `_`, and every switch as `--name` or `--no-name`.
 
     `--model.appearance false`, the form of a settings file, becomes `--model.no-appearance`. `--x -1e-3` becomes
-    `--x=-1e-3`, because argparse would read the number as an option. Raises InputError for `--switch=other`.
+    `--x=-1e-3`, because argparse would read the number as an option; one of several values becomes -0.001. Raises
+    InputError for `--switch=other`.
     """
     by_name = {field.name: field for field in fields if not field.positional}
+    negated = {field.off: field for field in by_name.values() if field.switch}
     out: list[str] = []
+    several = False  # whether the word may be one of several values
     for word in words:
         name, equals, value = word.partition("=")
-        name = name.replace("_", "-") if name.startswith("--") else name
+        if name.startswith("--"):
+            name = name.replace("_", "-")
+            several = name in by_name and by_name[name].count != 1
         before = by_name.get(out[-1]) if out else None
         if equals and name in by_name and by_name[name].switch:
             out.append(_switched(by_name[name], value))
+        elif equals and name in negated:
+            out.append(_switched(negated[name], value, on=False))
         elif before and before.switch and word.lower() in SWITCH_WORDS:
             out[-1] = _switched(before, word)
         elif before and not before.switch and before.count == 1 and _is_negative(word):
             out[-1] += f"={word}"
         else:
-            out.append(name + equals + value)
+            out.append(_without_exponent(word) if several and _is_negative(word) else name + equals + value)
     return out
 
 
-def _switched(switch: Field, value: str) -> str:
+def _switched(switch: Field, value: str, on: bool = True) -> str:
     if value.lower() not in SWITCH_WORDS:
         raise _refused(switch, value)
-    return switch.name if SWITCH_WORDS[value.lower()] else switch.off
+    return switch.name if SWITCH_WORDS[value.lower()] == on else switch.off
+
+
+def _without_exponent(word: str) -> str:
+    """A negative number in the form that argparse takes for a number; other words, such as -inf, unchanged."""
+    number = float(word)
+    plain = NEGATIVE.fullmatch(word) or not math.isfinite(number)
+    return word if plain else f"{Decimal(repr(number)):f}"
 
 
 def _is_negative(word: str) -> bool:
