@@ -107,6 +107,7 @@ def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
         (["--out", "{}/a", "--camera", "circle"], "--camera 'circle' is not allowed; allowed: observed, orbit, sway"),
         (["--out", "{}/a", "--camera", "{}/no.json"], "no.json: cannot be read"),
         (["--out", "{}/a", "--camera", "-1"], "--camera -1 is not allowed; allowed: a frame from 0 to 8"),
+        (["--out", "{}/a", "--camera=--5"], "--camera '--5' is not allowed; allowed: observed, orbit, sway"),
         (["--out", "{}/a", "--size", "12"], "--size '12' is not allowed; allowed: WIDTHxHEIGHT"),
         (["--out", "{}/a", "--size", "0x9"], "allowed: an integer from 1 to 16384"),
         (["--out", "{}/a", "--camera", "orbit", "--angle", "90"], "--angle 90 is not allowed"),
@@ -116,3 +117,14 @@ def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
 def test_render_refuses_in_one_line_and_leaves_nothing(words, said, finished_run, tmp_path, capsys):
     assert_refused(capsys, ["render", str(finished_run), *(word.format(tmp_path) for word in words)], said)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["--out", "{}/a"], ["--film", "{}/a.gif", "--frames", "test"]])
+def test_a_run_without_held_out_frames_names_the_other_choices(words, run_copy, tmp_path, capsys):
+    """As a training in Python on a sequence without a split leaves it."""
+    file = run_copy / "sequence.json"
+    record = json.loads(file.read_text(encoding="utf-8"))
+    file.write_text(json.dumps(record | {"test_index": []}), encoding="utf-8")
+    words = [word.format(tmp_path) for word in words]
+    assert_refused(capsys, ["render", str(run_copy), *words], "render: no frame is held out; allowed: --frames train")
+    assert not (tmp_path / "a").exists()

@@ -153,6 +153,10 @@ def damaged(tmp_path, change):
         (lambda e, h: e.update({"gaussians.log_scale": e["gaussians.log_scale"].astype(int)}), "has type int64"),
         (lambda e, h: e.update(other=np.zeros(2)), "other is not an entry of a slim model"),
         (lambda e, h: h.update(frame_times=[0.0]), "two arrays for 1 frames expected"),
+        (lambda e, h: h.update(frame_times=3), "header: frame_times: holds int; allowed: a list"),
+        (lambda e, h: h.update(frame_times=["0"]), "header: frame_times: '0' is not allowed"),
+        (lambda e, h: h["config"]["model"].update(harmonics_degree=2), "model.harmonics_degree = 2, but its arrays"),
+        (lambda e, h: h["config"]["model"].update(frequencies=9), "model.frequencies = 9, but its arrays have 8"),
     ],
 )  # fmt: skip
 def test_a_damaged_slim_model_is_refused(change, said, tmp_path):

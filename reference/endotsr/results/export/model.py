@@ -7,6 +7,7 @@ bytes) with settings, iteration and the record of the sequence, and one entry pe
 """
 
 import json
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.record import SequenceRecord, checked_record, recorded
-from endotsr.config import config_from_dict
+from endotsr.config import ModelConfig, config_from_dict
 from endotsr.errors import InputError
 from endotsr.training.fitting.model import corrected_cameras, spectral_from
 from endotsr.training.runs.model import Model
 from endotsr.training.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
 from endotsr.training.scene.parameters import FrameParameters, pose_at, trained
 from endotsr.untrusted.arrays import RefusedArray, open_npz
-from endotsr.untrusted.json import integer, parsed
+from endotsr.untrusted.json import integer, listed, number, parsed
 from endotsr.untrusted.writing import replace_file
 
 FORMAT = "endotsr slim model"
@@ -93,6 +94,7 @@ def load_slim_model(path: Path) -> SlimModel:
     record = checked_record(header["sequence"], f"{path}: header", "sequence.")
     config = config_from_dict(header["config"], str(path))
     gaussians = _gaussians(entries, path)
+    _refuse_other_settings(gaussians, config.model, path)
     frames = _frames(entries, header["frame_times"], path)
     if entries:
         raise InputError(f"{path}: {next(iter(entries))} is not an entry of a slim model")
@@ -133,6 +135,19 @@ def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
             raise InputError(f"{path}: gaussians.{name} has the shape {array.shape}")
 
 
+def _refuse_other_settings(found: Gaussians, model: ModelConfig, path: Path) -> None:
+    """Raises InputError for arrays of another harmonic degree or number of frequencies than the settings."""
+    seen = [("harmonics_degree", math.isqrt(len(found.harmonics)) - 1)]
+    residuals = (found.appearance_coefficients, found.motion_coefficients)
+    seen += [("frequencies", array.shape[1] // 2) for array in residuals if array is not None]
+    for key, value in seen:
+        if getattr(model, key) != value:
+            raise InputError(
+                f"{path}: model.{key} = {getattr(model, key)}, but its arrays have {value}; allowed: settings and"
+                " arrays of one run"
+            )
+
+
 def _exposures(frames: FrameParameters | None) -> FrameParameters | None:
     """The frame parameters stored in the file: exposures only, since its cameras include the pose correction."""
     if frames is None or frames.exposure_log_gain is None:
@@ -151,6 +166,8 @@ def _with_corrected_cameras(record: SequenceRecord, model: Model) -> SequenceRec
 def _frames(entries: dict[str, NDArray], times: Any, path: Path) -> FrameParameters | None:
     if times is None:
         return None
+    where = f"{path}: header: frame_times"
+    times = [number(time, where) for time in listed(times, where)]
     found = [_entry(entries, f"frames.{name}", path) for name in ("exposure_log_gain", "exposure_bias")]
     if any(array is None or array.shape != (3, len(times)) for array in found):
         raise InputError(f"{path}: frames.exposure_*: two arrays for {len(times)} frames expected")

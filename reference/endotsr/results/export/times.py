@@ -30,7 +30,8 @@ def chosen_times(
     command   for messages
     default   frames to use if nothing is chosen
 
-    Raises: InputError for a time outside [0, 1], a count below 1, or more than one kind of choice.
+    Raises: InputError for a time outside [0, 1], a count below 1, more than one kind of choice, or frames of which the
+            sequence has none.
     """
     if sum([bool(request.times), request.frames is not None, request.count is not None]) > 1:
         raise InputError(f"{command}: give one of --times, --frames and --count")
@@ -44,6 +45,8 @@ def chosen_times(
         return [(t, i, f"{k:05d}", known[i] == t) for k, (t, i) in enumerate(zip(times, nearest))]
     every = range(record.count)
     chosen = {"test": record.test_index, "train": record.train_index, "all": every}[request.frames or default]
+    if not chosen:
+        raise InputError(f"{command}: no frame is held out; allowed: --frames train or all, --times, --count")
     return [(record.times[i], i, record.names[i], True) for i in chosen]
 
 

@@ -45,7 +45,7 @@ def check_request(request: ViewRequest, count: int) -> None:
     if not all(math.isfinite(number) for number in request.offset):
         raise InputError("render: --offset is not allowed; allowed: three finite numbers")
     camera = request.camera
-    if camera.lstrip("-").isdecimal() and not 0 <= int(camera) < count:
+    if camera.removeprefix("-").isdecimal() and not 0 <= int(camera) < count:
         raise InputError(f"render: --camera {camera} is not allowed; allowed: a frame from 0 to {count - 1}")
     if not (camera in PATHS or camera.isdecimal() or camera.lower().endswith(".json")):
         allowed = f"{', '.join(PATHS)}, the number of a frame, or a JSON file of cameras"
