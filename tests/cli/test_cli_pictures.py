@@ -99,5 +99,8 @@ def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "none.json")], "none.json: cannot be read")
     assert_refused(capsys, ["evaluate", "--compare", run, "--seed", "-1"], "--seed -1 is not allowed")
     assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label with several methods")
+    assert_refused(capsys, ["evaluate", run, "--label", "x"], "--label has no effect without --pictures")
+    assert_refused(capsys, ["evaluate", run, "--seed", "1"], "--seed has no effect without a comparison")
+    assert_refused(capsys, ["evaluate", run, "--no-baselines"], "--no-baselines has no effect without a comparison")
     (tmp_path / "m.json").write_text("{}")
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "m.json")], "m.json", "that `endotsr evaluate` wrote")

@@ -132,6 +132,13 @@ def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys)
         assert_refused(capsys, words, f"error: {file}: cannot be written: ", "allowed: ")
 
 
+def test_the_working_folder_is_judged(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["golden", "judge", ".", "--level", "0", "--search", "0"]) == 1
+    assert "no level is complete" in capsys.readouterr().out
+    assert_refused(capsys, ["golden", "judge"], "OUTDIR is missing")
+
+
 def test_an_error_while_writing_names_the_file_that_was_asked_for(tmp_path):
     for folder in (tmp_path / "missing", tmp_path / "file"):
         (tmp_path / "file").touch()

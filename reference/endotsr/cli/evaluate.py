@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from endotsr.cli.parts.comparison import SHOWN, EvaluateOptions, compare_methods, shown_sequence
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import given_names, parse
 from endotsr.errors import InputError
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.folder import RunFolder, open_run
@@ -24,6 +24,7 @@ def run(words: list[str]) -> int:
     use_threads(options.threads)
     if len(options.methods) > 1 or options.compare:
         return _compare(options)
+    _refuse_without_effect(options, given_names(EvaluateOptions, words))
     if options.pictures and options.measures:
         raise InputError("evaluate: --measures with --pictures is not allowed: measures render views of a run")
     metrics = _pictures(options) if options.pictures else _run(options)
@@ -32,6 +33,17 @@ def run(words: list[str]) -> int:
     if options.csv:
         replace_text(options.csv, frames_csv(metrics, metrics.get("label", "this model")))
     return 0
+
+
+def _refuse_without_effect(options: EvaluateOptions, given: frozenset[str]) -> None:
+    """Raises InputError for an option that changes nothing where a single method is evaluated."""
+    for name, shown in (("seed", "--seed"), ("baselines", "--no-baselines")):
+        if name in given:
+            raise InputError(f"evaluate: {shown} has no effect without a comparison; add --compare, or omit {shown}")
+    if options.label and options.pictures is None:
+        raise InputError(
+            "evaluate: --label has no effect without --pictures; a comparison takes NAME=PATH, or omit --label"
+        )
 
 
 def _compare(options: EvaluateOptions) -> int:

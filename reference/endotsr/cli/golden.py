@@ -42,7 +42,7 @@ class _Reported:
 class JudgeOptions(_Reported):
     """Judge a folder of outputs OUTDIR/<family>/<case>/<name>.npy; exit code 1 if the level is not complete."""
 
-    outdir: Outdir = Path()
+    outdir: Annotated[Path | None, Option("OUTDIR", positional=True)] = None
     again: Annotated[Path | None, Option("DIR")] = None
     """outputs of a second run; level 5 requires them to be bitwise equal"""
 
@@ -122,7 +122,7 @@ def _judge(words: list[str]) -> int:
     from endotsr.port.judge.verdict import judge
 
     options = parse(JudgeOptions, words, "golden judge")
-    if options.outdir == Path():
+    if options.outdir is None:
         raise InputError("golden judge: OUTDIR is missing")
     for folder in filter(None, (options.outdir, options.again)):
         if not folder.is_dir():

@@ -48,7 +48,7 @@ def run(words: list[str]) -> int:
     check_place("sweep", place)
     spec = read_spec(options.spec)
     if options.dry_run:
-        return _list(spec, options.out)
+        return _list(spec, options.out, options.retry)
     return ended(run_spec(spec, options.out, place, options.retry), options.out)
 
 
@@ -78,10 +78,10 @@ def ended(rows: "Rows", out: Path) -> int:
     return 1 if failed else 0
 
 
-def _list(spec: "Spec", out: Path) -> int:
+def _list(spec: "Spec", out: Path, retry: bool) -> int:
     from endotsr.studies.sweeps.sweep import Inputs, planned
 
-    plan = planned(spec, out, Inputs(keep=False), retry=False)
+    plan = planned(spec, out, Inputs(keep=False), retry)
     for job in plan.jobs:
         print(f"{plan.rows[job.name]['status']:<9} {job.config.training.iterations:>7} iterations  {job.name}")
     return 0

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
@@ -53,8 +53,8 @@ def run(words: list[str]) -> int:
 
     budget = None if options.budget is None else parse_budget(options.budget)
     file = options.out / RESULT
-    if budget is None and file.exists():
-        raise InputError(f"{options.out}: already contains a measurement; choose another --out, or use --budget")
+    if file.exists():
+        _refuse_measured(options, given_names(TradeoffOptions, words))
     result = read_measurement(file) if file.exists() else _measure(options)
     if budget is not None:
         advice = frame_advice(result, budget)
@@ -70,6 +70,18 @@ def _refuse(options: TradeoffOptions) -> None:
         raise InputError(f"tradeoff: --json needs --budget; the measurement itself is DIR/{RESULT}")
     if not 0 < options.scale <= 8:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
+
+
+def _refuse_measured(options: TradeoffOptions, given: frozenset[str]) -> None:
+    """Raises InputError for options of a new measurement in a folder that contains one."""
+    if options.budget is None:
+        raise InputError(f"{options.out}: already contains a measurement; choose another --out, or use --budget")
+    for name in ("run", "splats", "scale", "threads"):
+        if name in given:
+            raise InputError(
+                f"{options.out}: already contains a measurement, from which --budget chooses: --{name} has no effect;"
+                f" choose another --out, or omit --{name}"
+            )
 
 
 def _measure(options: TradeoffOptions) -> "DatedMeasurement":

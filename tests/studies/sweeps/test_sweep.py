@@ -225,6 +225,17 @@ def test_a_plan_lists_what_is_left(whole, capsys):
     assert capsys.readouterr().out.count(FINISHED) == 3
 
 
+def test_a_dry_run_with_retry_lists_a_failed_run_as_one_to_execute(tmp_path, capsys):
+    spec, out = write_spec(tmp_path), tmp_path / "out"
+    name = planned(read_spec(spec), out, Inputs(keep=False), retry=False).jobs[0].name
+    out.mkdir()
+    row = {"name": name, "status": FAILED, "reason": "no memory"}
+    (out / "results.json").write_text(json.dumps({"format": 1, "rows": [row]}))
+    for words, count in (([], 1), (["--retry"], 0)):
+        assert main(["sweep", str(spec), "--out", str(out), "--dry-run", *words]) == 0
+        assert capsys.readouterr().out.count(FAILED) == count
+
+
 @pytest.mark.parametrize(
     "words, said",
     [(["--out"], "--out: missing value"), ([], "missing: --out DIR"),

@@ -57,6 +57,8 @@ def test_budget_reads_the_measurement(measured, capsys):
         (["--budget", "5 min"], 'allowed: a time per frame ("10 ms"'),
         (["--run", "a", "--splats", "b"], "--run with --splats is not allowed"),
         (["--scale", "0"], "allowed: a number > 0"),
+        (["--run", "other", "--budget", "1/255"], "already contains a measurement, from which --budget chooses: --run"),
+        (["--scale", "0.5", "--budget", "1/255"], "--scale has no effect; choose another --out, or omit --scale"),
         (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
     ],
 )

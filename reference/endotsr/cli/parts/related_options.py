@@ -65,6 +65,7 @@ MASKS = (
     Excludes(("key-frames",), ("keys",), "the keys and the next frames are shown"),
     Needs(("key-frames",), ("draw",), "it is the number of frames of a page"),
     Needs(("margin",), ("keys",), "proposed masks have a margin of their own"),
+    Needs(("layout",), ("out", "draw"), "without them SEQUENCE is a folder from prepare"),
 )
 TRAIN = (
     Excludes(

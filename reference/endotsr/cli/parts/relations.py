@@ -85,7 +85,7 @@ def missing(first: str, relation: Needs) -> str:
 def shown(term: str) -> str:
     """A term as it is written on the command line: `--kind relative`; a fact as `the layout tum`."""
     name, equals, value = term.partition("=")
-    return f"the {name} {value}" if name in FACTS else f"--{name} {value}" if equals else f"--{name}"
+    return f"the {name} {value}" if equals and name in FACTS else f"--{name} {value}" if equals else f"--{name}"
 
 
 def _value(name: str, line: _Line) -> Any:
