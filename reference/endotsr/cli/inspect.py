@@ -56,7 +56,7 @@ def run(words: list[str]) -> int:
     plan = make_plan(inspection, options.settings)
     print(inspection_text(inspection, plan))
     if options.out:
-        replace_text(options.out, inspection_html(Path(options.sequence).name, inspection, plan))
+        replace_text(options.out, inspection_html(Path(options.sequence).absolute().name, inspection, plan))
         print(f"report: {options.out}")
     if options.json:
         write_json(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})

@@ -119,5 +119,5 @@ def carrying_command(source: Path) -> str:
     """
     from endotsr.clips.sequences.sequence_file import FILE_NAME
 
-    place = "" if (source / FILE_NAME).is_file() else f"--out {shlex.quote(f'{source.stem}_masks')} "
+    place = "" if (source / FILE_NAME).is_file() else f"--out {shlex.quote(f'{source.absolute().stem}_masks')} "
     return f"endotsr masks {shlex.quote(str(source))} --keys keys.json {place}--replace"

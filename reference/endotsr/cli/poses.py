@@ -74,7 +74,7 @@ def _estimate(options: PosesOptions) -> Said:
         report = enter_poses(options.sequence, options.replace, options.force, PoseProgress(bar.begin, bar.step))
     _write(options, report)
     lines = lines_of(report, options.sequence)
-    return report.written, lines, lambda: poses_page(options.sequence.name, report, lines)
+    return report.written, lines, lambda: poses_page(options.sequence.absolute().name, report, lines)
 
 
 def _structure(options: PosesOptions) -> Said:
@@ -88,7 +88,7 @@ def _structure(options: PosesOptions) -> Said:
         report = enter_structure(options.sequence, options.replace, options.force, PoseProgress(bar.begin, bar.step))
     _write_structure(options, report)
     lines = structure_lines(report, options.sequence)
-    return report.written, lines, lambda: structure_page(options.sequence.name, report, lines)
+    return report.written, lines, lambda: structure_page(options.sequence.absolute().name, report, lines)
 
 
 def _movement(moves: "Movement") -> dict[str, Any]:

@@ -223,3 +223,17 @@ def test_the_table_of_the_specification(clip, column):
         scores = [overlap(found.excluded[i], true[i]) for i in range(last) if i not in keys]
         assert np.mean(scores) == pytest.approx(mean, abs=0.002), (distance, np.mean(scores))
         assert np.min(scores) == pytest.approx(worst, abs=0.006), (distance, np.min(scores))
+
+
+def test_a_key_of_another_size_is_refused_also_for_a_single_picture(tmp_path, capsys):
+    for name in ("one", "keys"):
+        (tmp_path / name).mkdir()
+    write_png(tmp_path / "one" / "a.png", np.full((48, 64, 3), 90, np.uint8))
+    write_png(tmp_path / "keys" / "a.png", np.eye(24, 32, dtype=np.uint8) * 255)
+    (tmp_path / "keys" / "._a.png").write_bytes(b"\0\5\x16\7")  # written by macOS beside a file
+    said = "a.png: 32x24 pixels, the pictures of the clip have 64x48"
+    for words in (["--out", str(tmp_path / "o")], ["--draw", str(tmp_path / "a.html")]):
+        assert main(["masks", str(tmp_path / "one"), "--keys", str(tmp_path / "keys"), *words]) == 2
+        assert said in capsys.readouterr().err
+    assert main(["masks", str(tmp_path / "one"), "--layout", "pictures"]) == 2
+    assert "--layout has no effect without --out or --draw" in capsys.readouterr().err

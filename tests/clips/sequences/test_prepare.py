@@ -1,5 +1,7 @@
 """`endotsr prepare`: every layout becomes the common format with the right cameras, and nothing is half-written."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from raw_sources import HEIGHT, WIDTH, colmap, ini, scene_picture, stereomis, tu
 from scipy.spatial.transform import Rotation
 
 from endotsr.cli.main import main
+from endotsr.cli.masks import carrying_command
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.stereo import rectification_maps
 from endotsr.clips.sequences.camera import intrinsics_of_matrix
@@ -126,6 +129,13 @@ def test_rectified_rows_correspond_and_each_camera_has_its_own_distortion():
         for plane, expected in zip((map_.x, map_.y), seen.T):
             found = cv2.remap(plane, *place, cv2.INTER_LINEAR).ravel()
             np.testing.assert_allclose(found, expected, atol=0.05)
+
+
+def test_stereomis_with_the_calibration_of_one_camera_has_its_masks(tmp_path):
+    stereomis(tmp_path / "raw")
+    (tmp_path / "k.txt").write_text("60 0 31\n0 61 24\n0 0 1\n")
+    found = describe(tmp_path / "raw", SourceOptions(calibration=tmp_path / "k.txt"))
+    assert found.calibration is None and found.masks is not None and found.masks(0).shape == (HEIGHT, WIDTH)
 
 
 def test_stereomis_as_it_is_distributed(tmp_path):
@@ -346,3 +356,12 @@ def test_a_pipe_gets_no_carriage_returns(tmp_path, capsys):
     main(["depth", str(tmp_path / "a"), "--given", str(tmp_path / "a/depth"), "--kind", "depth", "--replace"])
     said = capsys.readouterr().out
     assert "depth of 5 frames" in said and "\r" not in said and "\n\n" not in said
+
+
+def test_the_working_folder_as_a_source_has_its_name(tmp_path, monkeypatch):
+    written(tmp_path / "my clip")
+    monkeypatch.chdir(tmp_path / "my clip")
+    assert main(["prepare", ".", "--out", str(tmp_path / "o")]) == 0
+    assert read_sequence_file(tmp_path / "o").source == "my clip (common)"
+    monkeypatch.chdir("images")
+    assert carrying_command(Path()).endswith("--out images_masks --replace")

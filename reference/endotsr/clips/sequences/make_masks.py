@@ -19,7 +19,8 @@ from endotsr.clips.sequences.clip_flows import motion_of
 from endotsr.clips.sequences.clip_pictures import left_pictures
 from endotsr.clips.sequences.drawing import DrawnClip, drawing_of
 from endotsr.clips.sequences.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMasks, key_masks, read_drawn
-from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.files import shortened, visible_files
+from endotsr.clips.sequences.folder_reader import of_size
 from endotsr.clips.sequences.key_checks import polarity_warnings, refuse_no_tissue
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.mask_shapes import shapes_of
@@ -111,20 +112,21 @@ def read_keys(source: Path, clip: Clip, picture: Picture) -> KeyMasks:
     """Masks of key frames from a file of the drawing page or from a folder. Raises: see `from_keys`."""
     height, width = picture.shape[:2]
     if source.is_dir():
-        return KeyMasks(_folder_keys(source, clip))
+        return KeyMasks(_folder_keys(source, clip, width, height))
     return key_masks(read_drawn(source, clip, width, height))
 
 
-def _folder_keys(folder: Path, clip: Clip) -> dict[int, BoolArray]:
-    """Frame -> mask (H, W), True = instrument, of the pictures of a folder."""
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".png")
+def _folder_keys(folder: Path, clip: Clip, width: int, height: int) -> dict[int, BoolArray]:
+    """Frame -> mask (H, W), True = instrument, of the pictures of a folder, which have the size of the clip's."""
+    files = [file for file in visible_files(folder) if file.suffix.lower() == ".png"]
     if not files:
         raise InputError(f"{folder}: no PNG masks of key frames; name each as its frame, such as {clip.names[0]}.png")
     place = {name: i for i, name in enumerate(clip.names)}
     for file in files:
         if file.stem not in place:
             raise InputError(f"{file}: is not the name of a frame; use names such as {clip.names[0]}.png")
-    pictures = [read_png(file) for file in files]
+    said = "the pictures of the clip have"
+    pictures = [of_size(read_png(file), file, (width, height), said) for file in files]
     planes = [picture if picture.ndim == 2 else picture.max(axis=2) for picture in pictures]
     levels = mask_levels(planes, [str(file) for file in files])
     return {place[f.stem]: threshold_masks([p], [str(f)], [], levels=levels)[0] for f, p in zip(files, planes)}
@@ -146,7 +148,7 @@ def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:
     if keys.is_dir():
         found = [
             DrawnKey(frame=i, name=clip.names[i], shapes=shapes_of(mask, "drawn"))
-            for i, mask in sorted(_folder_keys(keys, clip).items())
+            for i, mask in sorted(_folder_keys(keys, clip, width, height).items())
         ]
         drawn = DrawnFile(format=FORMAT, frames=clip.count, width=width, height=height, keys=found)
     else:
@@ -198,8 +200,8 @@ def write_proposal(clip: Clip, out: Path, propose: Propose | None = None, replac
         (place / MASKS).mkdir()
         _write_masks(place / MASKS, clip.names, proposal)
         write_png(place / OVERLAY, overlays(clip, proposal))
-        about = {"source": clip.where.name, "proposed": True, "excluded_value": "white", "found": proposal.reason}
-        about |= {"origin": origin_of(proposal)}
+        about = {"source": clip.where.absolute().name, "proposed": True, "excluded_value": "white"}
+        about |= {"found": proposal.reason, "origin": origin_of(proposal)}
         (place / PROPOSAL).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8", newline="\n")
     return proposal
 

@@ -259,7 +259,7 @@ def _file_of(
         format=FORMAT,
         frames=len(chosen),
         camera=camera_entry(straight.intrinsics, straight.baseline),
-        source=f"{clip.where.name} ({clip.layout})",
+        source=f"{clip.where.absolute().name} ({clip.layout})",
         unit=unit,
         frame_rate=rate,
         times=times,
