@@ -37,6 +37,11 @@ def sequence():
     return endotsr.load_sequence("simulated", simulator=SIMULATOR)
 
 
+def test_settings_of_the_simulator_are_refused_for_a_folder(tmp_path):
+    with pytest.raises(endotsr.InputError, match=r"simulator with the folder .* is not allowed; allowed: 'simulated'"):
+        endotsr.load_sequence(tmp_path, simulator=SIMULATOR)
+
+
 def tiny(sequence, **more):
     """Eight iterations on one thread."""
     given = {"preset": "demo", "iterations": 8, "initialisation": POINTS, "training": {"threads": 1}, **more}

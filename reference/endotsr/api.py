@@ -109,6 +109,8 @@ def load_sequence(
     wanted = dict(simulator or {})
     refuse_unknown_keys(wanted, SimulatorSettings, "simulator")
     shown = checked(wanted, SimulatorSettings, "simulator")
+    if wanted and str(source) != sources.SIMULATED:
+        raise InputError(f"load_sequence: simulator with the folder {source} is not allowed; allowed: 'simulated'")
     sequence = sources.load_sequence(str(source), config, shown)
     return replace(sequence, source=str(source), settings=config.sequence, simulator=shown)
 

@@ -32,9 +32,14 @@ def _table(checked: Checked, level: str) -> str:
     return parts.definitions(
         (
             f"<code>{parts.text(f.code)}</code>{'' if f.frame is None else f' frame {f.frame}'}",
-            f"{parts.text(f.where)}: {parts.text(f.what)}. {parts.text(f.why.capitalize())}."
-            f" <b>{parts.text(f.remedy.capitalize())}.</b>",
+            f"{parts.text(f.where)}: {parts.text(f.what)}. {parts.text(_begun(f.why))}."
+            f" <b>{parts.text(_begun(f.remedy))}.</b>",
         )
         for f in checked.findings
         if f.level == level
     )
+
+
+def _begun(words: str) -> str:
+    """The words as the beginning of a sentence; a command keeps its name, and all other letters stay."""
+    return words if words.startswith("endotsr ") else words[:1].upper() + words[1:]
