@@ -26,6 +26,7 @@ from endotsr.untrusted.sections import (
 from endotsr.untrusted.toml import read_toml, toml_text
 
 LARGEST_SEED = (1 << 53) - 1  # larger integers are not exact in JSON, which records the seed of a run
+NO_DENSIFICATION = 1  # largest `density.until` with which no iteration densifies: they count from 1
 
 
 PERCENTILES = "percent, 0 <= low < 50 < high <= 100"
@@ -193,7 +194,7 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     interval: PositiveCount = 100
     """iterations between two densifications"""
     until: Count = 4000
-    """densify at iterations < until"""
+    """densify at iterations < until; 0 = none"""
     growth: Literal["threshold", "budget"] = "threshold"
     """candidates: all above `gradient_threshold`, or those with the largest gradients, up to `maximum` at the end"""
     gradient_threshold: Positive = 2e-4
@@ -278,6 +279,7 @@ class Config(Section, frozen=True, kw_only=True):
                 f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
                 f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
             )
+        self._refuse_empty(where)
         if not enclose_median(low, high):
             raise InputError(
                 f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: {PERCENTILES}"
@@ -286,6 +288,20 @@ class Config(Section, frozen=True, kw_only=True):
             raise InputError(
                 f"{where}: training.seed = {self.training.seed} is not allowed; allowed: an integer from 0 to"
                 f" {LARGEST_SEED}"
+            )
+
+    def _refuse_empty(self, where: str) -> None:
+        """Raise InputError for a pair of settings whose order leaves nothing between them."""
+        density, (cutoff, largest) = self.density, (self.raster.alpha_cutoff, self.raster.alpha_max)
+        if NO_DENSIFICATION < density.until < density.start:
+            raise InputError(
+                f"{where}: density.until = {density.until} is not allowed; allowed: an integer >= density.start ="
+                f" {density.start}, or 0, with which no iteration densifies"
+            )
+        if isinstance(cutoff, float) and isinstance(largest, float) and largest < cutoff:
+            raise InputError(
+                f"{where}: raster.alpha_max = {largest:g} is not allowed; allowed: a number >= raster.alpha_cutoff ="
+                f" {cutoff:g}, or nothing is drawn"
             )
 
 
@@ -323,7 +339,8 @@ MILESTONES = {
 def with_iterations(config: Config, iterations: int) -> Config:
     """The same schedule over exactly `iterations`: every milestone of `MILESTONES` keeps its fraction of the run.
 
-    The length is then fixed: `visits_per_frame` is 0.
+    Without densification (`density.until` 0 or 1), there is none at any length. The length is then fixed:
+    `visits_per_frame` is 0.
     """
     ratio = iterations / config.training.iterations
     changes = {
@@ -331,6 +348,8 @@ def with_iterations(config: Config, iterations: int) -> Config:
         for section, names in MILESTONES.items()
     }
     changes["training"] |= {"iterations": iterations, "visits_per_frame": 0}
+    if config.density.until <= NO_DENSIFICATION:
+        changes["density"]["until"] = config.density.until
     return with_settings(config, **changes)
 
 

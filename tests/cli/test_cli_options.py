@@ -1,13 +1,15 @@
 """Where a setting comes from, and what is said when it cannot be used."""
 
+import msgspec
 import pytest
 from tiny import assert_refused
 
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
-from endotsr.config import PAPER, SHARP, Config, config_from_dict, load_config
+from endotsr.config import PAPER, SHARP, Config, config_from_dict, load_config, with_iterations
 from endotsr.errors import InputError
+from endotsr.training.fitting.schedules import densify_now
 
 
 def settings(*words: str) -> Config:
@@ -99,6 +101,8 @@ BAD = [
     (["--config", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
     (["--simulator.width", "48"], ["unknown key simulator", "sequence, model"]),
     (["--model.frequency-max", "0.5"], ["model.frequency_max", "model.frequency_min"]),
+    (["--density.until", "200"], ["density.until = 200", "density.start = 500", "or 0"]),
+    (["--raster.alpha-max", "0.1", "--raster.alpha-cutoff", "0.2"], ["raster.alpha_max = 0.1", "alpha_cutoff = 0.2"]),
 ]
 
 
@@ -198,6 +202,17 @@ def test_every_setting_of_every_preset_is_read_back(tmp_path):
         file = tmp_path / "config.toml"
         file.write_text(config_to_toml(config))
         assert load_config(file) == config
+
+
+@pytest.mark.parametrize("until", [0, 1, 500, 501])
+def test_no_densification_is_a_choice_at_any_length(until):
+    """Stored settings are checked again, and a longer run may not make refused ones of them."""
+    for iterations in (1, 30, 6000, 60_000):
+        words = ("--density.until", str(until))
+        found = with_iterations(settings(*words), iterations)
+        assert config_from_dict(msgspec.to_builtins(found)) == found
+        assert not any(densify_now(i, found) for i in range(iterations + 1)) or until > 1
+        assert (found.density.until <= 1) == (until <= 1 or iterations < 30)
 
 
 def test_message_of_a_wrong_section_value():

@@ -61,6 +61,8 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["still", "--stereo.on", "false"], ("without an excluded pixel", "stereo")),
         (["still", "--relief", "30"], ("leaves the field of view",)),
         (["still", "--wdth", "40"], ("--wdth: no such option", "--width")),
+        (["pulling", "--pull.stop", "0.1"], ("pull.stop = 0.1 is not allowed", "above pull.start = 0.15")),
+        (["smoke", "--smoke.start", "0.9", "--smoke.stop", "0.9"], ("smoke.stop = 0.9", "above smoke.start = 0.9")),
         (["still", "--noise.on", "perhaps"], ("perhaps",)),
         (["still", "--noise.of", "1"], ("unknown key noise.of", "on, sigma")),
     ],

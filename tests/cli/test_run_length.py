@@ -163,3 +163,19 @@ def test_a_run_of_an_earlier_version_keeps_its_length(tmp_path):
     assert main([*words, "--resume"]) == 0
     assert main([*words[:-4], "--iterations", "14", "--threads", "1", "--out", str(out), "--resume"]) == 0
     assert endotsr.open_run(out).iteration == 14
+
+
+def test_what_a_short_run_leaves_out_is_printed(tmp_path, capsys):
+    words = [
+        "train",
+        str(written_folder(tmp_path)),
+        "--no-evaluate",
+        "--iterations",
+        "2",
+        "--schedule",
+        "absolute",
+        *TINY,
+    ]
+    assert main([*words, "--density.until", "0", "--out", str(tmp_path / "run")]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("not in these 2 iterations: ")]
+    assert len(lines) == 4 and lines[0].endswith("the residuals of A and S (training.residual_activation = 3000)")

@@ -266,12 +266,16 @@ def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
 
 
 def _print_settings(config: Config, schedule_note: str) -> None:
+    from endotsr.training.fitting.schedules import phases_never_reached
+
     changed = differences(config, with_fixed_length(PRESETS[config.preset]), config.preset)
     print(f"settings: preset {config.preset}{', except' if changed else ''}")
     for line in changed:
         print(f"  {line}")
     if schedule_note:
         print(schedule_note)
+    for phase in phases_never_reached(config):
+        print(f"not in these {config.training.iterations} iterations: {phase}")
 
 
 def _print_sequence(source: str, sequence: "Sequence") -> None:

@@ -5,11 +5,14 @@ import pytest
 
 from endotsr.config import (
     PAPER,
+    PRESETS,
+    QUICK,
     Config,
     LossConfig,
     ModelConfig,
     OptimiserConfig,
     with_iterations,
+    with_settings,
 )
 from endotsr.training.fitting import schedules
 from endotsr.training.fitting.schedules import learning_rates
@@ -165,3 +168,46 @@ def test_tracked_motion_is_trained_from_the_first_iteration_at_a_constant_rate_u
     assert "appearance_coefficients" not in learning_rates(3000, config)
     without = msgspec.structs.replace(config, model=msgspec.structs.replace(config.model, spectral_motion=False))
     assert "motion_coefficients" not in learning_rates(1, without)
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "said"),
+    [
+        ("training", {"residual_activation": 6000}, ["the residuals of A and S (training.residual_activation = 6000)"]),
+        ("loss", {"laplacian_from": 6000, "laplacian_full": 6000}, ["the Laplacian loss (loss.laplacian_from = 6000)"]),
+        ("loss", {"smoothness_from": 6001}, ["the smoothness (loss.smoothness_from = 6001)"]),
+        (
+            "density",
+            {"start": 600, "until": 700},
+            ["a densification (density.start = 600, until = 700, interval = 100)"],
+        ),
+        ("density", {"start": 500, "until": 601}, []),
+        ("density", {"until": 0}, []),
+        ("optimiser", {"annealed_factor": 0.1, "annealing_from": 6000}, ["the annealing (optimiser.annealing_from"]),
+        ("optimiser", {"annealing_from": 6000}, []),
+        (
+            "training",
+            {"harmonics_interval": 6001},
+            ["a harmonic degree above 0 (training.harmonics_interval = 6001)"],
+        ),
+    ],
+)
+def test_what_a_run_is_too_short_for_is_named(section, values, said):
+    found = schedules.phases_never_reached(changed(section, **values))
+    assert len(found) == len(said) and all(a.startswith(b) for a, b in zip(found, said))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_no_preset_is_too_short_for_its_parts(name):
+    assert schedules.phases_never_reached(PRESETS[name]) == []
+
+
+def test_tracked_motion_and_parts_that_are_off_are_not_missed():
+    late = {"training": {"iterations": 100}}
+    tracked = with_settings(PAPER, initialisation={"motion": "flow"}, **late)
+    assert "the residuals of A (training" in schedules.phases_never_reached(tracked)[0]
+    off = {"appearance": False, "spectral_motion": False, "laplacian": False, "harmonics_degree": 0}
+    bare = with_settings(PAPER, model=off, loss={"smoothness_weight": 0.0}, density={"until": 0}, **late)
+    assert schedules.phases_never_reached(bare) == []
+    coarse = with_settings(QUICK, density={"until": 0})
+    assert schedules.phases_never_reached(coarse) == ["the coarse start, which ends at density.until = 0"]

@@ -59,11 +59,17 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     depth_rounding: sections.DepthRounding = sections.DepthRounding()
 
     def refuse_contradictions(self, where: str) -> None:
-        """Raise InputError for pictures that no reader takes."""
+        """Raise InputError for pictures that no reader takes, or an effect that ends before it begins."""
         if self.width * self.height > MOST_PIXELS:
             raise InputError(
                 f"{where}: {self.width}x{self.height} pixels are not allowed; allowed: at most {MOST_PIXELS} in all"
             )
+        for name, part in (("pull", self.pull), ("smoke", self.smoke)):
+            if part.on and part.stop <= part.start:
+                raise InputError(
+                    f"{where}: {name}.stop = {part.stop:g} is not allowed; allowed: a number above {name}.start ="
+                    f" {part.start:g}"
+                )
 
 
 EFFECTS = tuple(

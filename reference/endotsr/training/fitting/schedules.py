@@ -3,7 +3,7 @@
 Without state, the values of a resumed run are the same.
 """
 
-from endotsr.config import Config
+from endotsr.config import NO_DENSIFICATION, Config
 from endotsr.training.fitting.adam import Rate
 from endotsr.training.scene.gaussians import DEFORMATION_CHANNELS, POSITION_CHANNELS
 
@@ -129,3 +129,37 @@ def densify_now(iteration: int, config: Config) -> bool:
     """Whether Gaussians are cloned, split and pruned at this iteration: start < iteration < until, every `interval`."""
     density = config.density
     return density.start < iteration < density.until and iteration % density.interval == 0
+
+
+def phases_never_reached(config: Config) -> list[str]:
+    """The parts of a training that its length leaves out, each with its settings; the length is fixed.
+
+    Parts that a switch or a weight of 0 leaves out are not named.
+    """
+    loss, density, training, last = config.loss, config.density, config.training, config.training.iterations
+    residuals = ["A"] * config.model.appearance
+    residuals += ["S"] * (config.model.spectral_motion and config.initialisation.motion == "none")
+    densifies = any(densify_now(i, config) for i in range(density.interval, last + 1, density.interval))
+    never = {
+        f"the residuals of {' and '.join(residuals)} (training.residual_activation = {training.residual_activation})": (
+            bool(residuals) and training.residual_activation >= last
+        ),
+        f"the Laplacian loss (loss.laplacian_from = {loss.laplacian_from})": (
+            config.model.laplacian and loss.lambda_lap != 0 and loss.laplacian_from >= last
+        ),
+        f"the smoothness (loss.smoothness_from = {loss.smoothness_from})": (
+            loss.smoothness_weight > 0 and loss.smoothness_from > last
+        ),
+        f"a densification (density.start = {density.start}, until = {density.until}, interval = {density.interval})": (
+            density.until > NO_DENSIFICATION and not densifies
+        ),
+        f"the annealing (optimiser.annealing_from = {config.optimiser.annealing_from})": (
+            config.optimiser.annealed_factor < 1 and config.optimiser.annealing_from >= last
+        ),
+        f"a harmonic degree above 0 (training.harmonics_interval = {training.harmonics_interval})": (
+            config.model.harmonics_degree > 0 and training.harmonics_interval > last
+        ),
+        f"the coarse start, which ends at density.until = {density.until}": training.coarse_start
+        and density.until == 0,
+    }
+    return [phase for phase, is_left_out in never.items() if is_left_out]
