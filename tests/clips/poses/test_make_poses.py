@@ -15,7 +15,11 @@ from endotsr.clips.poses.movement import STILL
 from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences import make_poses
 from endotsr.clips.sequences.make_poses import PARTIAL, PoseProgress, enter_poses
+from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import with_settings
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import CameraPose
 
 TRUE = moving_views()[1]
 
@@ -176,3 +180,18 @@ def test_one_frame_is_refused_and_two_are_enough(tmp_path, capsys):
         folder = written(tmp_path / str(frames), few)
         assert main(["poses", str(folder), "--force"]) == code and said in capsys.readouterr().err
     assert "[poses]" in (tmp_path / "2" / "sequence.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize(("width", "height"), [(96, 80), (80, 64)])
+def test_small_pictures_are_estimated_and_smaller_ones_are_refused(width, height, tmp_path):
+    settings = with_effects(SimulatorSettings(width=width, height=height, frames=14), "camera_motion", "noise")
+    path = {"path": "hand", "amplitude": 8.0}
+    found = simulate(with_settings(settings, camera_motion=path)).sequence
+    folder = written(tmp_path / "clip", Views(found.images, found.masks, found.depth, found.cameras[0]))
+    if width < 96:
+        with pytest.raises(InputError, match="80x64 pixels are too small to estimate poses from; allowed: at least 96"):
+            enter_poses(folder)
+        return
+    assert enter_poses(folder).written
+    true = [CameraPose(camera.rotation, camera.translation) for camera in found.cameras]
+    assert path_error(poses_of(folder), true) < 0.5

@@ -20,11 +20,13 @@ from endotsr.clips.sequences.view_frames import views_of
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose
 
+LEAST_WIDTH, LEAST_HEIGHT = 96, 64  # pixels; narrower pictures make a scope that moves look still
+
 
 def open_for_poses(folder: Path, replace: bool) -> tuple[SequenceFile, Clip]:
     """The folder in the common format, for an estimate of its poses.
 
-    Raises:  InputError for poses that may not be replaced, distorted pictures, or a single frame.
+    Raises:  InputError for poses that may not be replaced, distorted or very small pictures, or a single frame.
     """
     file, clip = read_sequence_file(folder), describe_prepared(folder)
     if file.poses and not replace:
@@ -33,6 +35,12 @@ def open_for_poses(folder: Path, replace: bool) -> tuple[SequenceFile, Clip]:
         raise InputError(f"{folder}: the pictures are distorted; endotsr prepare {folder} --out NEW straightens them")
     if clip.count < 2:
         raise InputError(f"{folder}: one frame: there is no motion to estimate")
+    width, height = file.camera.width, file.camera.height
+    if width < LEAST_WIDTH or height < LEAST_HEIGHT:
+        raise InputError(
+            f"{folder}: pictures of {width}x{height} pixels are too small to estimate poses from; allowed: at least"
+            f" {LEAST_WIDTH}x{LEAST_HEIGHT}, with a larger endotsr prepare --scale"
+        )
     return file, clip
 
 
