@@ -80,7 +80,7 @@ def run(words: list[str]) -> int:
         print("  --farthest-over-nearest changes nothing: the clip has depth that fixes scale and shift")
     if report.file.depth.assumed:
         print(f"not metric ({report.file.depth.assumed} of the depth assumed): {KINDS['assumed-depth'].why}")
-    for line in depth_warnings(report, options):
+    for line in depth_warnings(report, options) + _pair_warnings(options):
         print(line)
     print(f"next: endotsr train {options.sequence} --out RUN")
     write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
@@ -103,6 +103,15 @@ def depth_warnings(report: "DepthReport", options: DepthOptions) -> list[str]:
         remedy = remedy or "check the baseline and its unit"
         said += [f"warning: {each.code}: {each.what}; {each.why}; {remedy}" for each in found]
     return said
+
+
+def _pair_warnings(options: DepthOptions) -> list[str]:
+    """Lines on the pairs that were matched."""
+    from endotsr.clips.sequences.checks.stereo import pair_findings
+    from endotsr.clips.sequences.layouts.common import describe_prepared
+
+    found = [] if options.flat or options.given else pair_findings(describe_prepared(options.sequence))
+    return [f"warning: {each.code}: {each.what}; {each.why}; {each.remedy}" for each in found]
 
 
 def _check_ratio(options: DepthOptions) -> None:

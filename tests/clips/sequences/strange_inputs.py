@@ -119,6 +119,8 @@ STRANGE_ROWS = [
     Row("depth, a plane once in millimetres times 100, given", given(100), "told", "the median depth is 5"),
     Row("stereo, a right view from 8 rows lower", matched(lambda i: textured(i, 12, 8)), "told",
         "are the views rectified"),
+    Row("stereo, a right view from 2 rows lower", matched(lambda i: textured(i, 12, 2)), "told", "unrectified-views"),
+    Row("stereo, a right view that stands still", matched(lambda i: textured(0, 12)), "told", "frozen-right-view"),
     Row("stereo, a right view that is mirrored", matched(lambda i: textured(i, 12)[:, ::-1].copy()), "told",
         "are the views rectified"),
     Row("keys, white everywhere", keys(255, 255), "refused", "leave hardly any tissue in all 12 frames"),

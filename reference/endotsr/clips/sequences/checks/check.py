@@ -24,6 +24,7 @@ from endotsr.clips.sequences.checks.depth import (
     light_finding,
     usual_depth,
 )
+from endotsr.clips.sequences.checks.depth_steps import DepthSteps, scale_finding
 from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
 from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
 from endotsr.clips.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
@@ -38,6 +39,7 @@ from endotsr.clips.sequences.checks.frames import (
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
+from endotsr.clips.sequences.checks.stereo import pair_findings
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.field_of_view import FieldOfView
@@ -77,12 +79,13 @@ class Checked(NamedTuple):
 class _Pass:
     """Findings, and facts kept from the frames."""
 
-    def __init__(self) -> None:
+    def __init__(self, count: int) -> None:
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
         self.masks = MaskSteps()
         self.view = FieldOfView()
         self.depth: list[DepthFacts] = []
+        self.steps = DepthSteps(count)
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
         self.light: list[float] = []  # rank correlation of brightness with depth, for the sampled frames
@@ -113,10 +116,10 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
 
     Raises:  InputError only if there is nothing to check: no folder, or a layout that needs `endotsr prepare`.
     """
-    run = _Pass()
     if not Path(path).exists():
         raise InputError(f"{path}: sequence folder not found")
     clip = describe_for_training(path, config.sequence)
+    run = _Pass(len(clip.images))
     run.findings += clip.faults + _stated(clip)
     if not clip.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
@@ -132,7 +135,9 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     if run.depth and clip.depth:
         where, near = str(clip.depth.files[0].parent), config.raster.near
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
+        run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
+    run.findings += pair_findings(clip)
     if run.samples:
         _check_masks(clip, run, config)
     config, frames = _of_length(clip, config, run)
@@ -196,6 +201,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         run.masks.add(i, tissue)
         run.view.add(picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
+        run.steps.add(i, picture, found, tissue)
         if i in sampled:
             if found is not None:
                 run.light.append(light_correlation(picture, found, tissue))

@@ -13,6 +13,7 @@ from endotsr.clips.sequences.checks.agreement import agreement_findings, agreeme
 from endotsr.clips.sequences.checks.cameras import camera_findings
 from endotsr.clips.sequences.checks.dark_border import loaded_border_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
+from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_finding
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
 from endotsr.clips.sequences.checks.masks import mask_findings
@@ -40,7 +41,9 @@ def guarded(
     found += loaded_border_findings(sequence.images, sequence.masks, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
-    found += depth_findings(depth, str(clip.depth.files[0].parent), clip.arbitrary, near, clip.depth.assumed)
+    priors = str(clip.depth.files[0].parent)
+    found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)
+    found += scale_finding(loaded_steps(sequence), priors)
     found += camera_findings(sequence.cameras, usual_depth(depth), folder)
     if (
         clip.layout != COMMON and not sequence.static_camera and not clip.pose_faults

@@ -67,6 +67,15 @@ KINDS: dict[str, Kind] = {
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
     "alternating-views": Kind("warning", "two alternating cameras or kinds of light are not one scene",
                               "prepare each separately: --frames ::2, and --frames 1::2"),
+    "frozen-right-view": Kind("warning", "depth from such a pair joins two moments",
+                              "record or export the right view again, or leave these frames out: endotsr prepare"
+                              " --drop"),
+    "late-right-view": Kind("warning", "depth from such a pair joins two moments, and tissue that moves gets a"
+                            " wrong one",
+                            "pair each left picture with the right one of its moment, and prepare the clip again"),
+    "unrectified-views": Kind("warning", "stereo matching searches along the rows, and depth is missing or wrong where"
+                              " they differ",
+                              "prepare the recording with the calibration of both cameras: --calibration FILE"),
     "blue-pictures": Kind("warning", "tissue is red: red and blue may be exchanged, as OpenCV stores them",
                           "export the pictures again as RGB; none needed for blue light"),
     "colour-profile": Kind("note", "its values are read as sRGB: colours differ from those in a viewer",
@@ -115,6 +124,10 @@ KINDS: dict[str, Kind] = {
                          "store 0 where there is no depth"),
     "still-depth": Kind("note", "the shape of the tissue comes from one moment",
                         "none needed if the scene rests; else supply one file of depth for each frame"),
+    "depth-own-scale": Kind("warning", "every frame pulls the tissue to another distance: the depth of each frame may"
+                            " be normalised on its own",
+                            "store lengths with one scale for all frames; relative depth of a network: endotsr depth"
+                            " --given FOLDER --kind relative --align frame"),
     "constant-depth": Kind("refusal", "the scene would be a flat board", "supply measured depth"),
     "normalised-depth": Kind("warning", "each frame looks stretched to the full range, so its values are not"
                              " lengths", "store lengths with one scale for all frames"),

@@ -1,0 +1,166 @@
+"""Whether the two views of a stereo clip are rectified and of one moment, for `check` and `depth`.
+
+In: the pairs of a clip. Out: findings. The steps of both views from frame to frame show a right view that stands still.
+Features that both views share show the rows: in a rectified pair, a point lies in the same row of both. A right view
+that is late shows a point where it was some frames before, and its rows differ by the motion in between.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv.geometry import Features, features_of, grey_of, matched_features
+from endotsr.clips.poses.views import ViewFrame, side_of, usable_pixels
+from endotsr.clips.sequences.checks.copies import SAME, steps_between
+from endotsr.clips.sequences.checks.frames import SMALL
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.clip import Clip, Picture
+from endotsr.clips.sequences.splits import even_frames
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+
+SAMPLED, WIDEST, STRONGEST = 8, 640, 1500  # frames whose features are matched, columns, and features of a picture
+MOVES = 10 * SAME  # grey levels by which the left view changes where it is said to move
+LEAST_STEPS, PART = 4, 0.3  # repeats of the right view in a row, or of all steps
+OFF_ROW = 0.08  # of the height: a match farther from its row is wrong
+NEAR, ROUNDS = 1.5, 8  # pixels from the fitted rows, and rounds of a fit
+FEWEST, AGREEING = 60, 0.6  # matches that agree, and fraction of all
+APART = 0.75  # pixels between the rows of a point
+CLEAR = 1.0  # pixels up or down from frame to frame
+FEWEST_MOVED, PART_MOVED = 15, 0.1  # points of a frame that move so, and fraction of those that are found again
+LATE, ALIKE = 0.6, 0.75  # frames, and fraction of the sampled frames that show at least half of them
+
+
+class RowMatches(NamedTuple):
+    """M points that both views of a pair show, and their motion since the frame before."""
+
+    place: FloatArray  # (2, M) in the left view, fractions of width and height
+    down: FloatArray  # (M,) rows of the right view below those of the left one, pixels
+    motion: FloatArray  # (M,) downwards since the frame before, pixels; NaN where it is unknown
+
+
+def pair_findings(clip: Clip) -> list[Finding]:
+    """Findings on the pairs of a clip; none without right pictures, or if one of them cannot be read."""
+    if not clip.right or clip.count < 2:
+        return []
+    sampled = {max(1, i) for i in even_frames(clip.count, SAMPLED)}
+    small: tuple[list[NDArray], list[NDArray]] = ([], [])
+    rows: list[RowMatches] = []
+    before: Picture | None = None
+    try:
+        for i, (left, right) in enumerate(clip.pictures(list(range(clip.count)))):
+            if right is None or right.shape != left.shape:
+                return []
+            for kept, picture in zip(small, (left, right)):
+                kept.append(_small(picture))
+            if i in sampled and before is not None:
+                rows.append(row_matches(left, right, before))
+            before = left
+    except InputError:
+        return []  # `depth` names the file; training reads no right picture
+    where = str(clip.right[0].parent)
+    names = [file.name for file in clip.right]
+    frozen = frozen_finding(steps_between(small[0]), steps_between(small[1]), names, where)
+    return frozen or late_finding(rows, where) + row_finding(rows, where)
+
+
+def _small(picture: Picture) -> NDArray[np.int16]:
+    step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
+    return picture[::step, ::step].astype(np.int16)
+
+
+def frozen_finding(left: FloatArray, right: FloatArray, names: list[str], where: str) -> list[Finding]:
+    """A warning on a right view that repeats its picture while the left one moves.
+
+    left, right   (n - 1,) steps between frames, grey levels
+    """
+    still = (right < SAME) & (left > MOVES)
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
+    begins, lengths = ends[::2], ends[1::2] - ends[::2]
+    if not still.any() or (lengths.max() < LEAST_STEPS and still.mean() < PART):
+        return []
+    first = int(begins[lengths.argmax()])
+    last = first + int(lengths.max())
+    what = (
+        f"the right view repeats its picture in {still.sum()} of {len(still)} steps, from {names[first]} to"
+        f" {names[last]} without a break, while the left one changes by {np.median(left[still]):.1f} grey levels"
+    )
+    return [finding("frozen-right-view", where, what, first + 1)]
+
+
+def row_matches(left: Picture, right: Picture, before: Picture) -> RowMatches:
+    """The matches of a pair, and of its left view with the frame before."""
+    side = side_of(left.shape[1], WIDEST)
+    here, there, past = (_features(picture, side) for picture in (left, right, before))
+    one, other = matched_features(here, there)
+    down = side * (there.place[other, 1] - here.place[one, 1])
+    height, width = (size // side for size in left.shape[:2])
+    near = np.abs(down) < OFF_ROW * left.shape[0]
+    motion = np.full(len(here.place), np.nan)
+    moved, came = matched_features(here, past)
+    motion[moved] = side * (here.place[moved, 1] - past.place[came, 1])
+    place = here.place[one[near]].T / np.array([[width], [height]])
+    return RowMatches(place, down[near], motion[one[near]])
+
+
+def _features(picture: Picture, side: int) -> Features:
+    planes = np.ascontiguousarray(picture.transpose(2, 0, 1))
+    whole: BoolArray = np.ones(picture.shape[:2], bool)
+    image = ViewFrame(planes, whole, np.zeros(whole.shape, np.float32)).reduced(side).image
+    return features_of(grey_of(image), usable_pixels(image, np.ones(image.shape[1:], bool))).first(STRONGEST)
+
+
+def row_finding(rows: list[RowMatches], where: str) -> list[Finding]:
+    """A warning on pairs whose rows are apart: a fit that is linear in the place, robust, over all sampled frames."""
+    place, down = np.concatenate([r.place for r in rows], axis=1), np.concatenate([r.down for r in rows])
+    if down.size < FEWEST:
+        return []
+    design = np.column_stack([np.ones(down.size), *(place - 0.5)])
+    offset, near = np.full(down.size, np.median(down)), 4 * NEAR
+    for _ in range(ROUNDS):
+        kept = np.abs(down - offset) < near
+        if kept.sum() < FEWEST:
+            return []
+        offset, near = design @ np.linalg.lstsq(design[kept], down[kept], rcond=None)[0], NEAR
+    kept = np.abs(down - offset) < NEAR
+    apart = np.abs(offset[kept])
+    if kept.sum() < max(FEWEST, AGREEING * down.size) or np.median(apart) < APART:
+        return []
+    what = (
+        f"points lie {np.median(apart):.1f} pixels (at most {apart.max():.1f}) above or below their row in the left"
+        f" view: {kept.sum()} matches in {len(rows)} frames; allowed: less than {APART:g}"
+    )
+    return [finding("unrectified-views", where, what)]
+
+
+def late_finding(rows: list[RowMatches], where: str) -> list[Finding]:
+    """A warning on a right view of another frame: its rows differ by the motion of the points up or down.
+
+    Edges:   none where few points move by a pixel a frame.
+    """
+    known = [np.isfinite(found.motion) for found in rows]
+    moving = [(r.down[k], r.motion[k]) for r, k in zip(rows, known) if _many_move(r.motion[k])]
+    if len(moving) < LEAST_STEPS - 1:
+        return []
+    down, motion = (np.concatenate(values) for values in zip(*moving))
+    far, frames = np.abs(motion) > CLEAR, 0.0
+    for _ in range(ROUNDS):  # down = usual - frames * motion
+        usual = np.median(down + frames * motion)
+        frames = float(np.median((usual - down[far]) / motion[far]))
+    by_frame = [np.median((usual - d[far]) / m[far]) for d, m in moving for far in [np.abs(m) > CLEAR]]
+    if abs(frames) < LATE or np.mean(np.array(by_frame) / frames > 0.5) < ALIKE:
+        return []
+    whole, side = max(1, round(abs(frames))), "late" if frames > 0 else "early"
+    what = (
+        f"the right view is about {whole} frame{'s' * (whole > 1)} {side}: points that move up or"
+        f" down lie where the left view {'showed' if frames > 0 else 'will show'} them (estimate"
+        f" {abs(frames):.1f}, from {len(moving)} frames)"
+    )
+    return [finding("late-right-view", where, what)]
+
+
+def _many_move(motion: FloatArray) -> bool:
+    """Whether many points move; of points at rest, wrong matches seem to."""
+    far = np.abs(motion) > CLEAR
+    return bool(far.sum() >= FEWEST_MOVED and far.mean() >= PART_MOVED)

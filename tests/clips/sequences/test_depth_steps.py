@@ -1,0 +1,103 @@
+"""Depth with a scale of its own in each frame is named; tissue and scopes that move are not."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from scipy.ndimage import zoom
+
+from data_folder import data_folder
+from endonerf_writer import write_endonerf
+from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.checks.depth_steps import DepthStep, DepthSteps, loaded_steps, scale_finding
+from endotsr.clips.sequences.read import read_sequence
+from endotsr.clips.simulator.scenes import named_scene
+from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import PAPER, SequenceConfig, with_settings
+
+SIZE = {"width": 160, "height": 128, "frames": 16}
+
+
+def scaled(sequence, spread: float, seed: int = 0):
+    """The sequence with the depth of every frame times a factor of its own."""
+    factors = np.exp(np.random.default_rng(seed).normal(0, spread, sequence.count)).astype(np.float32)
+    return replace(sequence, depth=sequence.depth * factors[:, None, None])
+
+
+def codes(sequence) -> list[str]:
+    return [found.code for found in scale_finding(loaded_steps(sequence), "depth")]
+
+
+@pytest.mark.parametrize("name", ["still", "breathing", "pulling", "cutting", "smoke", "moving-camera", "everything"])
+def test_a_scene_that_moves_has_one_scale(name):
+    sequence = simulate(msgspec.structs.replace(named_scene(name), **SIZE)).sequence
+    assert codes(sequence) == []
+    assert codes(scaled(sequence, 0.1)) == ["depth-own-scale"]
+
+
+def test_a_hand_held_scope_that_comes_near_has_one_scale():
+    settings = with_effects(SimulatorSettings(**SIZE), "camera_motion", "noise")
+    path = {"path": "hand", "amplitude": 12.0, "cycles": 2.0}
+    assert codes(simulate(with_settings(settings, camera_motion=path)).sequence) == []
+
+
+def test_one_frame_of_another_scale_is_no_scale_of_every_frame():
+    sequence = simulate(SimulatorSettings(**SIZE)).sequence
+    depth = sequence.depth.copy()
+    depth[7] *= 1.3
+    assert codes(replace(sequence, depth=depth)) == []
+
+
+def test_the_picture_has_to_grow_as_the_depth_falls():
+    """A plane that comes nearer by 5 % a frame: named if its picture does not grow."""
+    rough = np.random.default_rng(2).integers(0, 255, (16, 20, 3)).astype(np.uint8)
+    texture = zoom(rough, (12, 12, 1), order=1)
+    growing, resting = DepthSteps(10), DepthSteps(10)
+    for i in range(10):
+        near = 1.05 ** (i - 9)
+        height, width = (round(side * near) for side in (128, 160))
+        crop = np.s_[96 - height // 2 : 96 - height // 2 + height, 120 - width // 2 : 120 - width // 2 + width]
+        shown = zoom(texture[crop], (128 / height, 160 / width, 1), order=1)[:128, :160]
+        depth = np.full((128, 160), 60 * near, np.float32)
+        growing.add(i, shown, depth, None)
+        resting.add(i, texture[:128, :160], depth, None)
+    assert scale_finding(growing.found, "depth") == []
+    (found,) = scale_finding(resting.found, "depth")
+    assert "the depth changes by 4.9%" in found.what and "(medians over 9 steps)" in found.what
+
+
+def test_what_a_motion_allows():
+    assert DepthStep(-0.1, 0.0).unexplained == pytest.approx(0.1)
+    assert DepthStep(0.1, 0.02).unexplained == pytest.approx(0.02) and DepthStep(0.1, 0.5).unexplained == 0.0
+    few = [DepthStep(0.2, 0.0)] * 5
+    assert scale_finding(few, "depth") == [] and len(scale_finding([*few, few[0]], "depth")) == 1
+
+
+def test_steps_are_between_neighbours_and_at_most_48():
+    picture, depth = np.zeros((16, 16, 3), np.uint8), np.full((16, 16), 50.0, np.float32)
+    steps = DepthSteps(300)
+    for i in range(300):
+        steps.add(i, picture, depth, None)
+    assert len(steps.found) == 48
+    gap = DepthSteps(6)
+    for i in (0, 1, 3, 4):
+        gap.add(i, picture, depth if i != 1 else None, None)
+    assert len(gap.found) == 1  # from 3 to 4
+
+
+def test_check_and_training_both_name_it(tmp_path):
+    sequence = simulate(SimulatorSettings(**SIZE)).sequence
+    write_endonerf(scaled(sequence, 0.1), tmp_path / "clip")
+    assert "depth-own-scale" in [f.code for f in check_sequence(tmp_path / "clip", PAPER).findings]
+    notes = read_sequence(tmp_path / "clip", PAPER.sequence).notes
+    assert any(note.startswith("warning: depth-own-scale: from frame to frame the depth changes by") for note in notes)
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting"])
+def test_recorded_depth_has_one_scale(name):
+    sequence = read_sequence(data_folder(name), SequenceConfig(frames="0:60", scale=0.5))
+    assert codes(sequence) == []
+    assert codes(scaled(sequence, 0.05)) == ["depth-own-scale"]
