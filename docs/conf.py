@@ -1,4 +1,4 @@
-"""Sphinx configuration. Build: sphinx-build -W -b html docs docs/_build/html (extra `docs`)."""
+"""Sphinx configuration. Build: sphinx-build -W -j auto -b html docs docs/_build/html (extra `docs`)."""
 
 import os
 import shutil

@@ -1,5 +1,6 @@
 """`endotsr depth`: depth of a sequence, from its stereo pairs or from another program."""
 
+import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +83,7 @@ def run(words: list[str]) -> int:
         print(f"not metric ({report.file.depth.assumed} of the depth assumed): {KINDS['assumed-depth'].why}")
     for line in depth_warnings(report, options) + _pair_warnings(options):
         print(line)
-    print(f"next: endotsr train {options.sequence} --out RUN")
+    print(f"next: endotsr train {shlex.quote(str(options.sequence))} --out RUN")
     write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
     return 0
 

@@ -1,5 +1,6 @@
 """`endotsr poses`: poses of a moving scope, from pictures and depth, or from pictures alone."""
 
+import shlex
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +55,7 @@ def run(words: list[str]) -> int:
     for line in lines:
         print(line)
     if written:
-        print(f"written: {options.sequence}; next: endotsr train {options.sequence} --out RUN")
+        print(f"written: {options.sequence}; next: endotsr train {shlex.quote(str(options.sequence))} --out RUN")
     if options.html is not None:
         replace_text(options.html, page())
         print(f"report: {options.html}")

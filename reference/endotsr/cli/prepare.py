@@ -1,5 +1,6 @@
 """`endotsr prepare`: convert a recording to a folder in the common format."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -203,18 +204,19 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
 
 
 def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
+    folder = shlex.quote(str(out))  # as a shell takes it
     if depth:
-        return f"next: endotsr train {out} --out RUN"
+        return f"next: endotsr train {folder} --out RUN"
     if pair and not stereo:
         from endotsr.clips.sequences.sequence_file import FILE_NAME
 
         return (
             "next: set the baseline of the two cameras, [camera] baseline in"
-            f" {out / FILE_NAME} (or prepare --baseline MM), then endotsr depth {out}"
+            f" {out / FILE_NAME} (or prepare --baseline MM), then endotsr depth {folder}"
         )
     if stereo and pair:
-        return f"next: endotsr depth {out}"
+        return f"next: endotsr depth {folder}"
     return (
-        f"next: endotsr poses {out} --sfm (a moving camera), or endotsr depth {out} --given FILES --kind relative"
+        f"next: endotsr poses {folder} --sfm (a moving camera), or endotsr depth {folder} --given FILES --kind relative"
         " (inverse depth of a network), or --flat; training needs depth"
     )

@@ -1,5 +1,6 @@
 """`endotsr simulate`: write a simulated sequence and its ground truth as a folder."""
 
+import shlex
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -65,7 +66,7 @@ def run(words: list[str]) -> int:
         settings=msgspec.to_builtins(settings),
     )
     advice = "train with: endotsr train {} --out RUN" if options.layout == "endonerf" else PREPARE
-    print(f"truth in {options.out}/truth; {advice.format(options.out)}")
+    print(f"truth in {options.out}/truth; {advice.format(shlex.quote(str(options.out)))}")
     return 0
 
 

@@ -323,15 +323,14 @@ def test_the_step_of_the_depth_is_a_round_number_and_large_enough():
 
 
 def test_the_command(tmp_path, capsys):
+    out = tmp_path / "my clip"
     stereomis(tmp_path / "raw")
-    assert (
-        main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "out"), "--frames", "0:4", "--scale", "0.5"])
-        == 0
-    )
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(out), "--frames", "0:4", "--scale", "0.5"]) == 0
     said = capsys.readouterr().out
-    assert "layout stereomis, 6 frames" in said and "4 frames of 32x24" in said and "next: endotsr depth" in said
-    assert read_sequence_file(tmp_path / "out").frames == 4
-    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "out")]) == 2
+    assert "layout stereomis, 6 frames" in said and "4 frames of 32x24" in said
+    assert f"next: endotsr depth '{out}'" in said
+    assert read_sequence_file(out).frames == 4
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(out)]) == 2
     assert "exists already" in capsys.readouterr().err
     assert main(["prepare", str(tmp_path / "none"), "--out", str(tmp_path / "x")]) == 2
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "x"), "--camera", "1", "2"]) == 2

@@ -143,18 +143,19 @@ def stereo_folder(folder: Path) -> None:
 
 
 def test_the_command_makes_a_sequence_that_can_be_trained_on(tmp_path, capsys):
-    stereo_folder(tmp_path / "clip")
-    words = ["depth", str(tmp_path / "clip"), "--nearest", "25", "--farthest", "120"]
+    clip = tmp_path / "my clip"
+    stereo_folder(clip)
+    words = ["depth", str(clip), "--nearest", "25", "--farthest", "120"]
     assert main(words) == 0
-    assert "next: endotsr train" in capsys.readouterr().out
-    sequence = read_sequence(tmp_path / "clip", SequenceConfig(), 0.2)
+    assert f"next: endotsr train '{clip}' --out RUN" in capsys.readouterr().out
+    sequence = read_sequence(clip, SequenceConfig(), 0.2)
     assert np.median(sequence.depth[sequence.depth > 0]) == pytest.approx(53, abs=3)
     assert main(words) == 2 and "--replace" in capsys.readouterr().err
-    before = read_png(tmp_path / "clip/depth/000001.png")
+    before = read_png(clip / "depth/000001.png")
     assert main([*words, "--replace", "--temporal"]) == 0
-    after = read_png(tmp_path / "clip/depth/000001.png")
+    after = read_png(clip / "depth/000001.png")
     assert ((after > 0) == (before > 0)).all()
-    assert not [p for p in (tmp_path / "clip").iterdir() if p.name.startswith(".")]
+    assert not [p for p in clip.iterdir() if p.name.startswith(".")]
 
 
 @pytest.mark.parametrize("case", ["mono", "no baseline", "wrong baseline"])
