@@ -133,8 +133,9 @@ def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys)
 
 
 def test_the_working_folder_is_judged(tmp_path, capsys, monkeypatch):
+    golden = str(Path(__file__).parents[2] / "golden")
     monkeypatch.chdir(tmp_path)
-    assert main(["golden", "judge", ".", "--level", "0", "--search", "0"]) == 1
+    assert main(["golden", "judge", ".", "--level", "0", "--search", "0", "--golden", golden]) == 1
     assert "no level is complete" in capsys.readouterr().out
     assert_refused(capsys, ["golden", "judge"], "OUTDIR is missing")
 
