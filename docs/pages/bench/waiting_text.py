@@ -3,7 +3,7 @@
 from typing import Any
 
 from endotsr.clips.sequences.checks import duration as forecasts
-from endotsr.config import PRESETS, lengthened, with_iterations
+from endotsr.config import PRESETS, with_iterations
 from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import duration, markdown
 from pages.store import figures
@@ -32,13 +32,10 @@ def today(row: dict[str, Any]) -> str:
     start, register = row["said"]["start"], row["register_bytes"]
     if start["speed"] != "assumed" or not register:
         return "-"
-    config = PRESETS[row["preset"]]
+    config = with_iterations(PRESETS[row["preset"]], row["iterations"])
     frames = forecasts.expected_frames(row["frames"], config)
     if row["clip"].startswith("simulated"):
         frames = frames.with_true_motion()
-    config = lengthened(config, frames.training)
-    if config.training.iterations != row["iterations"]:
-        config = with_iterations(config, row["iterations"])
     width, height = map(int, row["size"].split("x"))
     factor = forecasts.vector_factor(register)
     plan = forecasts.TimedCommand(config, frames, width * height, row["threads"], "lpips" in row["held_out"], factor)

@@ -3,8 +3,9 @@
 import numpy as np
 
 from endotsr.clips.poses.views import ViewFrame, Views
-from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 
 
@@ -22,9 +23,14 @@ def view_frame(clip: Clip, k: int) -> ViewFrame:
                 f"{clip.where}: frame {clip.names[k]}: the {what} has {plane.shape[1]}x{plane.shape[0]} pixels, the"
                 f" picture {size[1]}x{size[0]}"
             )
-    image = np.ascontiguousarray(picture.transpose(2, 0, 1))
+    return frame_of(picture, tissue, depth)
+
+
+def frame_of(picture: Picture, tissue: BoolArray | None = None, depth: FloatArray | None = None) -> ViewFrame:
+    """A frame from its picture (H, W, 3), tissue and depth (H, W); all tissue without a mask, 0 without depth."""
+    size, planes = picture.shape[:2], np.ascontiguousarray(picture.transpose(2, 0, 1))
     mask = np.ones(size, bool) if tissue is None else tissue
-    return ViewFrame(image, mask, np.zeros(size, np.float32) if depth is None else depth.astype(np.float32))
+    return ViewFrame(planes, mask, np.zeros(size, np.float32) if depth is None else depth.astype(np.float32))
 
 
 def views_of(clip: Clip, camera: Camera) -> Views:

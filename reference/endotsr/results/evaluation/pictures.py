@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv import pictures as stored
-from endotsr.clips.sequences.files import frame_numbers, shortened
+from endotsr.clips.sequences.files import frame_numbers, shortened, visible_files
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
@@ -99,7 +99,7 @@ def _listed(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise InputError(f"{folder}: folder of pictures, or video, not found")
     for kind in KINDS:
-        files = sorted(f for f in folder.iterdir() if f.suffix.lower() == kind and not f.name.startswith("."))
+        files = [file for file in visible_files(folder) if file.suffix.lower() == kind]
         if files:
             return files
     raise InputError(f"{folder}: contains no picture; allowed: one file per frame, {', '.join(KINDS)}")

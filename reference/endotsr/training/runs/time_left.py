@@ -21,7 +21,7 @@ from endotsr.clips.sequences.checks.duration import (
 from endotsr.training.fitting.records import NOTHING_MADE, Making
 
 LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
-# Of a long run, this fraction is remembered instead: other programs slow a machine for half a minute at a time, and 200
+# Of a long run, this fraction is remembered instead: other programs can slow a machine for half a minute, and 200
 # iterations of a large scene take no longer than that.
 REMEMBERED = 0.125
 SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left out; a coarse check takes three

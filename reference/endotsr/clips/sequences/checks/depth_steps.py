@@ -16,6 +16,7 @@ from endotsr.clips.poses.views import ViewFrame, side_of
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.method.kernels.arrays import BoolArray
 
 WIDEST = 160  # columns of the pictures whose flow is computed
@@ -51,9 +52,7 @@ class DepthSteps:
         """Frame i: picture (H, W, 3), depth (H, W), 0 = none, or None; tissue (H, W), or None without masks."""
         if depth is None or not {i, i + 1} & self._sampled:
             return
-        planes = np.ascontiguousarray(picture.transpose(2, 0, 1))
-        mask = np.ones(depth.shape, bool) if tissue is None else tissue
-        frame = ViewFrame(planes, mask, depth).reduced(side_of(depth.shape[1], WIDEST))
+        frame = frame_of(picture, tissue, depth).reduced(side_of(depth.shape[1], WIDEST))
         if i in self._sampled and self._last is not None and self._last[0] == i - 1:
             self.found += _steps(self._last[1], frame)
         self._last = i, frame

@@ -40,9 +40,14 @@ class FrameFacts(NamedTuple):
 
 def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
     """The facts on a picture (H, W, 3)."""
-    step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
-    small = picture[::step, ::step].astype(np.int16)
+    small = small_picture(picture)
     return FrameFacts(name, small, float((small == 255).all(axis=2).mean()), _comb(picture))
+
+
+def small_picture(picture: NDArray[np.uint8]) -> NDArray[np.int16]:
+    """Every eighth pixel (h, w, 3) of a picture (H, W, 3); of one below 64 pixels, every second or each."""
+    step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
+    return picture[::step, ::step].astype(np.int16)
 
 
 def _comb(picture: NDArray[np.uint8]) -> float:

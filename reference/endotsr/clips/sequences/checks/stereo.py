@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.geometry import Features, features_of, grey_of, matched_features
-from endotsr.clips.poses.views import ViewFrame, side_of, usable_pixels
+from endotsr.clips.poses.views import side_of, usable_pixels
 from endotsr.clips.sequences.checks.copies import SAME, steps_between
-from endotsr.clips.sequences.checks.frames import SMALL
+from endotsr.clips.sequences.checks.frames import small_picture
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.errors import InputError
-from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.method.kernels.arrays import FloatArray
 
 SAMPLED, WIDEST, STRONGEST = 8, 640, 1500  # frames whose features are matched, columns, and features of a picture
 MOVES = 10 * SAME  # grey levels by which the left view changes where it is said to move
@@ -53,7 +54,7 @@ def pair_findings(clip: Clip) -> list[Finding]:
             if right is None or right.shape != left.shape:
                 return []
             for kept, picture in zip(small, (left, right)):
-                kept.append(_small(picture))
+                kept.append(small_picture(picture))
             if i in sampled and before is not None:
                 rows.append(row_matches(left, right, before))
             before = left
@@ -63,11 +64,6 @@ def pair_findings(clip: Clip) -> list[Finding]:
     names = [file.name for file in clip.right]
     frozen = frozen_finding(steps_between(small[0]), steps_between(small[1]), names, where)
     return frozen or late_finding(rows, where) + row_finding(rows, where)
-
-
-def _small(picture: Picture) -> NDArray[np.int16]:
-    step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
-    return picture[::step, ::step].astype(np.int16)
 
 
 def frozen_finding(left: FloatArray, right: FloatArray, names: list[str], where: str) -> list[Finding]:
@@ -105,9 +101,7 @@ def row_matches(left: Picture, right: Picture, before: Picture) -> RowMatches:
 
 
 def _features(picture: Picture, side: int) -> Features:
-    planes = np.ascontiguousarray(picture.transpose(2, 0, 1))
-    whole: BoolArray = np.ones(picture.shape[:2], bool)
-    image = ViewFrame(planes, whole, np.zeros(whole.shape, np.float32)).reduced(side).image
+    image = frame_of(picture).reduced(side).image
     return features_of(grey_of(image), usable_pixels(image, np.ones(image.shape[1:], bool))).first(STRONGEST)
 
 

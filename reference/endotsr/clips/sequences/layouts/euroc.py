@@ -19,7 +19,7 @@ from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import StereoCalibration, checked_rotation, inverse_pose, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import shortened
+from endotsr.clips.sequences.files import shortened, visible_files
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -86,8 +86,9 @@ def listed_pictures(camera: Path, notes: list[str]) -> list[TimedFile]:
     if not found:
         raise InputError(f"{camera / LIST}: none of its pictures is in {camera / 'data'}, such as {rows[0].file.name}")
     lacking = [row.file.name for row in rows if not row.file.is_file()]
-    stored = {file for file in (camera / "data").iterdir() if file.suffix.lower() in PICTURE_ENDINGS}
-    unlisted = sorted(file.name for file in stored - {row.file for row in rows} if not file.name.startswith("."))
+    stored = [file for file in visible_files(camera / "data") if file.suffix.lower() in PICTURE_ENDINGS]
+    listed = {row.file for row in rows}
+    unlisted = [file.name for file in stored if file not in listed]
     if lacking:
         notes.append(f"{camera.name}/{LIST}: without a picture, left out: {shortened(lacking)}")
     if unlisted:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import check_pairing, frame_numbers
+from endotsr.clips.sequences.files import check_pairing, frame_numbers, visible_files
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
 from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -66,8 +66,7 @@ def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
 
 def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
     """The left and the right files of one folder by their names; None unless every name states its side."""
-    shown = (file for file in path.iterdir() if not file.name.startswith("."))
-    files = sorted(file for file in shown if file.suffix.lower() in PICTURE_ENDINGS)
+    files = [file for file in visible_files(path) if file.suffix.lower() in PICTURE_ENDINGS]
     found: dict[str, list[Path]] = {"l": [], "r": []}
     for file in files:
         side = SIDE.search(file.stem)
