@@ -23,7 +23,7 @@ from endotsr.clips.sequences.checks.duration import (
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened
 from endotsr.training.fitting.records import Making
-from endotsr.training.runs.time_left import unit_seconds
+from endotsr.training.runs.time_left import SLOWED, Timed, unit_seconds
 
 PIXELS, GAP = 640 * 512, 0.15  # of a frame; seconds on one thread for the targets of a gap at full size
 UNIT = 0.1
@@ -46,7 +46,8 @@ def plan_of(preset, count, threads):
 class Told:
     """A training on a made-up machine, what it says, and the time left that it shows at every iteration.
 
-    One thread makes the targets of a gap at its first visit, a second one makes one gap in each iteration beside it.
+    One thread makes the targets of a gap at its first visit. A second one makes one gap in each iteration beside it; in
+    every third one, the training makes another gap and waits for it meanwhile.
     The kernels compile for three minutes in the first iteration, and for 40 s in the ninth. A coarse start lasts to
     `ends`, by default to the end of density control; from iteration 50 on, it is expected to end an eighth later.
     Another program makes the iterations of `slow` take 1.4 times as long.
@@ -79,9 +80,17 @@ class Told:
             if bridged and gap not in made and gap < plan.frames.gaps:
                 made.add(gap)
                 gaps, waited, beside = state.making
-                clock.now += GAP * size / plan.threads
-                alone = plan.threads == 1
-                state.making = Making(gaps + 1, waited + GAP * size * alone, beside + GAP * size * (not alone))
+                each = GAP * size
+                if plan.threads == 1:
+                    clock.now += each
+                    state.making = Making(gaps + 1, waited + each, beside)
+                elif iteration % 3 == 0:
+                    clock.now += each
+                    made.add(gap + 1)
+                    state.making = Making(gaps + 2, waited + each, beside + each)
+                else:
+                    clock.now += SLOWED / plan.threads * each
+                    state.making = Making(gaps + 1, waited, beside + each)
             shown.update({"iteration": iteration, "loss": 0.5, "psnr": None, "gaussians": count})
             left = shown.time_left.seconds(progress.Standing(iteration, count, state.coarse, state.coarse_until))
             if left is not None and iteration > 9:
@@ -151,11 +160,23 @@ def seconds(shown):
     return sum(n * 60**k for k, n in enumerate(reversed(numbers)))
 
 
+def iterations(*seconds, waited=0.0, beside=0.0):
+    return [Timed(one, 1.0, waited, beside) for one in seconds]
+
+
 def test_the_unit_follows_the_latest_iterations():
-    assert unit_seconds([0.1] * 100) == pytest.approx(0.1)
-    assert unit_seconds([0.1] * 50 + [0.3] * 50) == pytest.approx(0.2)
-    assert unit_seconds([5.0, *[0.1] * 99]) == pytest.approx(0.1), "one that compiled is left out"
-    assert unit_seconds([9.0] * 4) is None
+    assert unit_seconds(iterations(*[0.1] * 100), 0.8) == pytest.approx(0.1)
+    assert unit_seconds(iterations(*[0.1] * 50 + [0.3] * 50), 0.8) == pytest.approx(0.2)
+    assert unit_seconds(iterations(5.0, *[0.1] * 99), 0.8) == pytest.approx(0.1), "one that compiled is left out"
+    assert unit_seconds(iterations(*[9.0] * 4), 0.8) is None
+
+
+def test_what_the_second_thread_costs_the_iterations_is_no_part_of_their_unit():
+    plain, slowed = iterations(*[0.1] * 50), iterations(*[0.18] * 50, beside=0.1)
+    assert unit_seconds(plain + slowed, 0.8) == pytest.approx(0.1)
+    waiting = iterations(*[0.1] * 50, waited=0.1, beside=0.1)
+    assert unit_seconds(plain + waiting, 0.8) == pytest.approx(0.1), "nothing is slowed while the training waits"
+    assert unit_seconds(iterations(*[0.1] * 50, beside=1.0), 0.8) == pytest.approx(0.05), "half at least"
 
 
 def test_the_first_line_adds_up_and_names_what_comes_first():

@@ -132,7 +132,7 @@ def prepare_options(folder: Path) -> dict[str, list[str]]:
         "drop": ["2"], "crop": ["8", "8", "32", "32"], "unite-masks": [str(folder / "more")], "rate": ["12"],
         "source-rate": ["50"], "orientation": ["stored"], "scale": ["0.5"], "gaps": ["drop"],
         "border": ["keep"], "pictures": ["jpg"], "also": ["nerfstudio"], "layout": ["auto"],
-        "model": ["sparse/0"], "right": [str(folder / "right.mkv")],
+        "model": ["sparse/0"], "right": [str(folder / "right.mkv")], "right-late": ["-1"],
     }  # fmt: skip
     return {name: [f"--{name}", *words] for name, words in values.items()}
 

@@ -10,7 +10,11 @@ To measure, on an otherwise idle machine (each command continues where it was in
         --json docs/results/ablation_cutting.json
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_half --lpips LPIPS.npz --scale 0.5 \
         --iterations 1750 --splits every_second --configurations base A+S+L --no-fixed-count \
-        --measures right_view --json docs/results/ablation_pulling_half.json
+        --json docs/results/ablation_pulling_half.json
+    endotsr prepare ../shared/data/endonerf_pulling --out runs/pulling_pairs --right-late -1
+    endotsr ablate runs/pulling_pairs --out runs/ablation_pairs --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --splits every_second --configurations base A+S+L --no-fixed-count \
+        --measures right_view --json docs/results/ablation_pulling_pairs.json
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_blocks --lpips LPIPS.npz --scale 0.5 \
         --iterations 1750 --splits "blocks 2" "end 8" --configurations base A+S+L --no-fixed-count \
         --json docs/results/ablation_pulling_half_blocks.json
@@ -46,6 +50,7 @@ FILES = {
     "pulling_half": "ablation_pulling_half.json",
     "pulling_half_blocks": "ablation_pulling_half_blocks.json",
     "pulling_half_fixed": "ablation_pulling_half_fixed.json",
+    "pulling_pairs": "ablation_pulling_pairs.json",
     "simulated": "ablation_simulated.json",
     "simulated_paper": "ablation_simulated_paper.json",
 }
@@ -92,16 +97,17 @@ def read_runs(folder: Path, name: str = RUNS) -> list[dict[str, Any]]:
 def parts(folder: Path = RESULTS) -> dict[str, str]:
     """Every generated part of both pages by name."""
     found, runs, cost = read(folder), read_runs(folder), folder / COST
+    gain = claims_protocols.gain_of_the_right_eye(found["pulling_pairs"])
     half = [found[name] for name in FILES if name.startswith("pulling_half")]
     return {
         **{f"verdicts_{clip}": claims_verdicts.verdicts(found[clip], clip) for clip in claims_verdicts.CLIPS},
         "verdicts_both": claims_verdicts.verdicts_of_both(found),
         "cutting_without": without_73(found["cutting"]),
-        "ours": claims_protocols.ours(found, half),
+        "ours": claims_protocols.ours(found, half, found["pulling_pairs"]),
         "visits": claims_protocols.visits(),
-        "answer": claims_answer.answer(folder, found_clips(found), half, claims_protocols.gain_of_the_right_eye(half)),
+        "answer": claims_answer.answer(folder, found_clips(found), half, gain),
         "spread": " ".join(claims_power.common_spread(found[clip], clip) for clip in claims_verdicts.CLIPS),
-        "right_eye": claims_protocols.right_eye(found["pulling_half"]),
+        "right_eye": claims_protocols.right_eye(found["pulling_pairs"]),
         "power": claims_power.sentences(found["pulling"]),
         **{name: claims_parts.tables(record) for name, record in found.items()},
         "cutting": (PICTURE if found["cutting"] else "") + claims_parts.tables(found["cutting"]),

@@ -3,7 +3,8 @@
 Those on other frames come from ablations at half size (`ablation_pulling_half*.json`), paired by seed: the whole method
 minus the base, and at a fixed count the whole method minus the method without the detail loss.
 `endotsr evaluate --measures right_view` measures the right camera on two sets of frames: held-out frames, with a new
-time and view, and training frames, with only a new view.
+time and view, and training frames, with only a new view. Its runs are those of `ablation_pulling_pairs.json`, on the
+clip that `endotsr prepare --right-late -1` writes: the right pictures of the source are one frame early.
 """
 
 from typing import Any
@@ -31,6 +32,7 @@ PROTOCOLS = (  # what is held out, comparison, split, metric
     ("Blocks of 2 frames held out", WHOLE, "blocks 2", "psnr_full"),
     ("The end of the clip held out", WHOLE, "end 8", "psnr_full"),
 )
+RIGHT_EYE = ("held_out_psnr", "training_psnr")  # metrics of the right camera
 SINGLE = (  # statement, coefficients, with a common spread of the configurations
     ("A against S, each alone on the base", {"A": 1, "S": -1}),
     ("A alone improves on the base", {"A": 1, "base": -1}),
@@ -43,10 +45,14 @@ UNMEASURED = ["not measured", "-", "-", "-"]
 HEADS = ("ours", "compared", "verdict", "mean", "95 % interval", "detectable with 80 % power")
 
 
-def ours(found: dict[str, Record | None], half: list[Record | None]) -> str:
-    """Every row that the paper does not contain."""
+def ours(found: dict[str, Record | None], half: list[Record | None], pairs: Record | None) -> str:
+    """Every row that the paper does not contain.
+
+    half    the ablations at half size
+    pairs   that of the clip whose views are of one moment
+    """
     rows = [_single_row(found[clip], clip, *one) for clip in CLIPS for one in SINGLE]
-    rows += protocol_rows(half)
+    rows += protocol_rows(half, pairs)
     rows += [_motion_row(found[clip], clip) for clip in CLIPS]
     return markdown(HEADS, rows)
 
@@ -96,16 +102,17 @@ def visits() -> str:
     return f"{length} iterations make {'; '.join(shown)}. A full run makes {published:.0f} visits to each frame."
 
 
-def protocol_rows(half: list[Record | None]) -> list[list[str]]:
+def protocol_rows(half: list[Record | None], pairs: Record | None) -> list[list[str]]:
     """Statement, configurations, verdict, mean, 95 % interval, smallest resolved difference."""
-    rows = [with_right_eye(row) for found in half if found is not None for row in found["rows"]]
-    return [_row(rows, *protocol) for protocol in PROTOCOLS]
+    left = [{**row, "status": FINISHED} for found in half if found is not None for row in found["rows"]]
+    right = [] if pairs is None else [with_right_eye(row) for row in pairs["rows"]]
+    return [_row(right if protocol[3] in RIGHT_EYE else left, *protocol) for protocol in PROTOCOLS]
 
 
-def gain_of_the_right_eye(half: list[Record | None]) -> str:
+def gain_of_the_right_eye(pairs: Record | None) -> str:
     """Mean and interval of the gain on the right camera at held-out times, or ""."""
-    label = next(protocol[0] for protocol in PROTOCOLS if protocol[3] == "held_out_psnr")
-    _, _, verdict, mean, limits, _ = next(row for row in protocol_rows(half) if row[0] == label)
+    label = next(protocol[0] for protocol in PROTOCOLS if protocol[3] == RIGHT_EYE[0])
+    _, _, verdict, mean, limits, _ = next(row for row in protocol_rows([], pairs) if row[0] == label)
     return "" if verdict == UNMEASURED[0] else f"{mean} (95 % interval {limits})"
 
 
@@ -113,7 +120,7 @@ def with_right_eye(row: Record) -> Record:
     """A row with the PSNR of the right camera among its metrics, if measured."""
     measured = row.get("measures", {}).get("right_view", {}).get("rows", [])
     model = next((found for found in measured if found["label"] == "this model"), {})
-    return {**row, "status": FINISHED, **{key: model.get(key) for key in ("held_out_psnr", "training_psnr")}}
+    return {**row, "status": FINISHED, **{key: model.get(key) for key in RIGHT_EYE}}
 
 
 def _row(rows: list[Record], label: str, of: Contrast, split: str, metric: str) -> list[str]:
@@ -135,9 +142,9 @@ def _differences(rows: list[Record], of: Contrast, split: str, metric: str) -> l
     return [pair.difference for pair in paired(rows, of, split, metric, unrecorded=True)]
 
 
-def right_eye(half: Record | None) -> str:
+def right_eye(pairs: Record | None) -> str:
     """PSNR in the right camera at training times: both configurations, and the left picture moved by the depth."""
-    measured = [] if half is None else [row for row in half["rows"] if "right_view" in row.get("measures", {})]
+    measured = [] if pairs is None else [row for row in pairs["rows"] if "right_view" in row.get("measures", {})]
     if not measured:
         return "The right camera is not measured yet."
     rows = [with_right_eye(row) for row in measured]

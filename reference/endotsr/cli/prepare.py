@@ -49,6 +49,8 @@ class PrepareOptions:
     """stereo pairs in one picture: side_by_side = left on the left, stacked = left on top; half = squeezed to half"""
     right: Annotated[Path | None, Option("PATH")] = None
     """right view of a pair: a second video, or a folder of pictures"""
+    right_late: Annotated[int, Option("N")] = 0
+    """frames of the source by which the right view is late, negative: early; each pair is joined from one moment"""
     camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
     """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
     field_of_view: Annotated[float | None, Option("DEGREES")] = None
@@ -126,8 +128,8 @@ def run(words: list[str]) -> int:
 
     _check_options(options, words)
     settings = PrepareSettings(
-        options.frames, options.drop, options.rate, options.scale, options.gaps, options.border, options.pictures,
-        options.points,
+        options.frames, options.drop, options.rate, options.right_late, options.scale, options.gaps, options.border,
+        options.pictures, options.points,
     )  # fmt: skip
     clip = describe(options.source, _stated(options))
     _refuse_two_baselines(options, clip.calibration is not None)

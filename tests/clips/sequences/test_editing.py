@@ -1,6 +1,7 @@
 """Editing a clip: frames by number and second, frames left out, a crop, masks united, a folder replaced."""
 
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
-from endotsr.clips.sequences.editing import chosen_frames, cropped, thinned, without
+from endotsr.clips.sequences.editing import chosen_frames, cropped, of_one_moment, thinned, with_partner, without
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
@@ -189,3 +190,43 @@ def test_frames_of_a_lower_rate_are_the_nearest_without_a_table_of_all_pairs():
         assert tracemalloc.get_traced_memory()[1] < 10e6  # bytes; the table has 256 million
     finally:
         tracemalloc.stop()
+
+
+def stereo(count=20):
+    """A recording whose pixels are the frame number in the left view and 100 more in the right one."""
+    read = []
+
+    def pictures(wanted):
+        assert wanted == sorted(set(wanted))
+        for i in wanted:
+            read.append(i)
+            yield PicturePair(np.full((2, 2, 3), i, np.uint8), np.full((2, 2, 3), 100 + i, np.uint8))
+
+    return Clip("test", Path("clip"), [str(i) for i in range(count)], pictures), read
+
+
+@pytest.mark.parametrize("late", [1, -1, 3, -4, 19])
+@pytest.mark.parametrize("wanted", [range(20), range(2, 20, 5), [0, 1, 7, 8, 19]])
+def test_a_right_view_that_lags_is_paired_by_moment(late, wanted):
+    """Every picture that is needed is decoded once, in the order of the recording."""
+    clip, read = stereo()
+    notes: list[str] = []
+    kept = with_partner(clip, list(wanted), late, notes)
+    assert kept == [i for i in wanted if i + late in range(20)]
+    found = [(int(pair.left[0, 0, 0]), int(pair.right[0, 0, 0])) for pair in of_one_moment(clip, late).pictures(kept)]
+    assert found == [(i, 100 + i + late) for i in kept]
+    assert read == sorted({*kept, *(i + late for i in kept)})
+    assert bool(notes) == (len(kept) < len(wanted))
+
+
+def test_pairs_of_one_moment_keep_no_more_pictures_than_the_lag():
+    clip, read = stereo(100)
+    for turn, pair in enumerate(of_one_moment(clip, 3).pictures(list(range(97)))):
+        assert pair.left[0, 0, 0] == turn and len(read) <= turn + 4
+
+
+def test_a_lag_needs_right_pictures_and_a_longer_clip():
+    with pytest.raises(InputError, match="--right-late 20: allowed: -19 to 19 for 20 frames"):
+        of_one_moment(recording(), 20)
+    with pytest.raises(InputError, match="no right pictures"):
+        next(of_one_moment(recording(), 1).pictures([3]))

@@ -46,6 +46,21 @@ def test_a_right_view_of_another_frame_is_named(late, words, tmp_path):
     assert code == "late-right-view" and f"about {words}: points that move" in what
 
 
+@pytest.mark.parametrize("late", [2, -1])
+def test_prepare_pairs_the_views_of_one_moment(late, tmp_path, capsys):
+    clip, out = stereo_clip(tmp_path / "clip", pairs(late=late)), tmp_path / "out"
+    assert main(["prepare", str(clip), "--out", str(out), "--right-late", str(late)]) == 0
+    first, said = max(0, -late), capsys.readouterr().out
+    assert f"frame i is paired with right picture i {late:+d}" in said
+    assert f"{abs(late)} frame{'s' * (late > 1)} without a right picture of their moment omitted" in said
+    assert pair_findings(describe_prepared(out)) == []
+    for name, files in [("images", out / "images"), ("images_right", out / "images_right")]:
+        shift = late if name == "images_right" else 0
+        for k, file in enumerate(sorted(files.iterdir())):
+            np.testing.assert_array_equal(read_png(file), read_png(clip / name / f"{first + k + shift:06d}.png"))
+        assert len(list(files.iterdir())) == FRAMES - abs(late)
+
+
 def test_without_motion_up_or_down_a_late_view_looks_like_another_depth(tmp_path):
     assert said(pairs(late=1, moves=lambda i: 0.0), tmp_path) == []
 

@@ -1,9 +1,9 @@
-"""Editing a clip before it is written: frame selection by number or time, cropping, and union of masks.
+"""Editing a clip before it is written: frame selection by number or time, pairing of views, cropping, union of masks.
 
 In: a `Clip` and option values. Out: frame numbers, or an edited `Clip`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -177,6 +177,51 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
         else calibration._replace(left=intrinsics(calibration.left), right=intrinsics(calibration.right)),
         notes=[*clip.notes, f"cropped to {width}x{height} pixels from ({x}, {y}); the intrinsics follow"],
     )
+
+
+def of_one_moment(clip: Clip, late: int) -> Clip:
+    """The clip with the left picture of frame i beside the right one of frame i + late, for a view that lags.
+
+    late     frames of the source by which the right view is late; negative: early
+
+    Edges:   a frame whose partner is outside the clip has no pictures; `with_partner` omits it.
+    Raises:  InputError for a lag as long as the clip. A clip without right pictures is refused when one is read.
+    """
+    if abs(late) >= clip.count:
+        raise InputError(f"--right-late {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {clip.count} frames")
+
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
+        left: dict[int, Picture] = {}  # of wanted frames whose partner is still to come, and the other way round
+        right: dict[int, Picture] = {}
+        owners, waiting = set(wanted), iter(wanted)
+        turn = next(waiting, None)
+        needed = sorted(owners | {i + late for i in wanted})
+        for i, pair in zip(needed, clip.pictures(needed)):
+            if pair.right is None:
+                raise InputError(f"{clip.where}: no right pictures; --right-late is allowed for a stereo clip alone")
+            if i in owners:
+                left[i] = pair.left
+            if i - late in owners:
+                right[i - late] = pair.right
+            while turn in left and turn in right:
+                yield PicturePair(left.pop(turn), right.pop(turn))
+                turn = next(waiting, None)
+
+    way = "late" if late > 0 else "early"
+    note = f"right view taken as {_frames(abs(late))} {way}: frame i is paired with right picture i {late:+d}"
+    return replace(clip, pictures=pictures, right=[], notes=[*clip.notes, note])
+
+
+def with_partner(clip: Clip, frames: list[int], late: int, notes: list[str]) -> list[int]:
+    """The frames whose right picture, that of frame i + late, is in the clip. The others are noted."""
+    kept = [i for i in frames if 0 <= i + late < clip.count]
+    if len(kept) < len(frames):
+        notes.append(f"{_frames(len(frames) - len(kept))} without a right picture of their moment omitted")
+    return kept
+
+
+def _frames(count: int) -> str:
+    return f"{count} frame{'s' * (count != 1)}"
 
 
 def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Clip:

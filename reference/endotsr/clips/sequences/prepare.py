@@ -23,7 +23,14 @@ from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.choices import Border, DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
-from endotsr.clips.sequences.editing import chosen_frames, thinned, without, written_times
+from endotsr.clips.sequences.editing import (
+    chosen_frames,
+    of_one_moment,
+    thinned,
+    with_partner,
+    without,
+    written_times,
+)
 from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.points import depth_from_points
@@ -59,6 +66,7 @@ class PrepareSettings:
     frames: str = ""  # of the source; see `editing.chosen_frames`
     drop: str = ""  # frames to omit, in the same syntax
     rate: float | None = None  # frames per second to keep
+    right_late: int = 0  # frames of the source by which the right view is late; negative: early
     scale: float = 1.0
     gaps: Gaps = "refuse"  # frames without mask or pose where others have one
     border: Border = "auto"  # outside of the field of view; auto: excluded if the clip has no masks
@@ -80,9 +88,11 @@ def prepare(
 
     Raises:  InputError, leaving nothing behind.
     """
+    if settings.right_late:
+        clip = of_one_moment(clip, settings.right_late)
     notes = [*clip.notes, *(part.paired for part in (clip.masks, clip.depth) if part is not None and part.paired)]
     frames = without(chosen_frames(settings.frames, clip), settings.drop, clip)
-    chosen = thinned(clip, frames, settings.rate, notes)
+    chosen = thinned(clip, with_partner(clip, frames, settings.right_late, notes), settings.rate, notes)
     chosen, poses = _poses_and_masks(clip, chosen, settings.gaps, notes)
     refuse_no_lengths(clip, chosen)
     if not chosen:

@@ -1,11 +1,13 @@
 """Seconds of the parts of `endotsr train`, estimated from the settings, the frames and the speed of the machine.
 
-    work(N, P, u) = (0.1 + p P / (640 * 512) + n N / 60 000) (0.77 + 0.23 min(u / 0.35, 1))
+    work(N, P, u) = (b + p P / (640 * 512) + n N / 60 000) (0.77 + 0.23 min(u / 0.35, 1))
 
 is the work of an iteration with N Gaussians and P pixels at the fraction u of the run. Its unit is a late iteration of
 the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing.
-p = 0.4 and n = 0.5 were measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256 pixels on
-processors with AVX-512. Without it, p = 0.3 and n = 0.6 fit `sharp` on two clips and `quick` on both EndoNeRF clips.
+b = 0.1, p = 0.4 and n = 0.5 were measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256
+pixels on processors with AVX-512. Without it, 0.02, 0.36 and 0.62 follow from the times of a `quick` run on pulling
+before and after the end of its coarse start, and from those of a `sharp` run on cutting with 36 900 and with 80 000
+Gaussians.
 The second factor was measured on `quick` with and without its coarse start, on both EndoNeRF clips: early iterations
 have small Gaussians, colours of degree 0 and mostly inactive time bases.
 
@@ -24,9 +26,8 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import IndexArray
 
 PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
-BASE = 0.1  # part of its iteration
-OF_PIXELS, OF_GAUSSIANS = 0.4, 0.5  # other parts, on a processor with AVX-512
-WITHOUT_OF_PIXELS, WITHOUT_OF_GAUSSIANS = 0.3, 0.6  # and on one without
+PARTS = (0.1, 0.4, 0.5)  # of its iteration: constant, of the pixels, of the Gaussians; on a processor with AVX-512
+PARTS_WITHOUT = (0.02, 0.36, 0.62)  # and on one without
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
 # Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.14 s were measured on one
@@ -90,9 +91,8 @@ def iteration_work(
 ) -> float | NDArray:
     """Work of one iteration; `progress` is the completed fraction of the run, `vectors` the `vector_factor`."""
     early = EARLY + (1 - EARLY) * np.minimum(progress / LATE_FROM, 1.0)
-    long = (OF_PIXELS, OF_GAUSSIANS)
-    of_pixels, of_gaussians = long if vectors == 1.0 else (WITHOUT_OF_PIXELS, WITHOUT_OF_GAUSSIANS)
-    return (BASE + of_pixels * pixels / PIXELS + of_gaussians * gaussians / GAUSSIANS) * early
+    constant, of_pixels, of_gaussians = PARTS if vectors == 1.0 else PARTS_WITHOUT
+    return (constant + of_pixels * pixels / PIXELS + of_gaussians * gaussians / GAUSSIANS) * early
 
 
 def gaussians_at_end(config: Config) -> int:

@@ -72,7 +72,7 @@ KINDS: dict[str, Kind] = {
                               " --drop"),
     "late-right-view": Kind("warning", "depth from such a pair joins two moments, and tissue that moves gets a"
                             " wrong one",
-                            "pair each left picture with the right one of its moment, and prepare the clip again"),
+                            "join pairs of one moment: endotsr prepare --right-late N; -N for an early view"),
     "unrectified-views": Kind("warning", "stereo matching searches along the rows, and depth is missing or wrong where"
                               " they differ",
                               "prepare the recording with the calibration of both cameras: --calibration FILE"),
