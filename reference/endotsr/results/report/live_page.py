@@ -12,6 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config
 from endotsr.errors import InputError
@@ -108,7 +110,7 @@ class LivePage:
         out = render_at(state.gaussians, self._spectral, self._config, camera, time_, frames=state.frames)
         truth, mask = self._sequence.frame(index).image, self._sequence.masks[index]
         self._psnr.x.append(float(state.iteration))
-        self._psnr.y.append(psnr_tissue(out.colour, truth, mask))
+        self._psnr.y.append(psnr_tissue(np.clip(out.colour, 0, 1), truth, mask))  # as in the log and the report
         shown = "".join(
             parts.figure(label, parts.image(bytes_image(colour), label))
             for label, colour in (("Render", out.colour), ("Truth", truth))
