@@ -104,6 +104,12 @@ def test_every_held_out_frame_is_measured_once_with_the_blended_picture(scene, r
         assert row["psnr_tissue"] == pytest.approx(found["psnr_tissue"], abs=1e-6)
 
 
+def test_totals_count_a_frame_of_two_windows_once(metrics, recording):
+    whole, frames = endotsr.load_sequence(recording), metrics["frames"]
+    assert (frames["total"], frames["training"]) == (FRAMES, len(whole.train_index))
+    assert frames["tissue_fraction"] == pytest.approx(whole.tissue_fraction)
+
+
 def test_training_frames_are_none_that_are_held_out(metrics):
     sample = metrics["frames"]["training_sample"]
     assert len(set(sample)) == len(sample) and not set(sample) & set(metrics["frames"]["held_out"])
