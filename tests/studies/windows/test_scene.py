@@ -167,6 +167,22 @@ def test_commands_take_a_run_of_windows(cold_run, tmp_path, capsys):
     assert json.loads((cold_run / "metrics.json").read_text())["seams"]["seam_frames"] == 10
 
 
+def test_a_run_of_windows_is_compared_with_the_pictures_of_another_method(cold_run, recording, tmp_path, capsys):
+    from endotsr.cli.main import main
+
+    whole = endotsr.load_sequence(recording)
+    (tmp_path / "blend").mkdir()
+    for i in whole.test_index:
+        np.save(tmp_path / "blend" / f"{whole.names[i]}.npy", two_neighbours(whole, int(i)))
+    assert main(["evaluate", str(cold_run)]) == 0
+    assert main(["evaluate", "--compare", str(cold_run)]) == 0
+    words = ["evaluate", f"windows={cold_run}", str(tmp_path / "blend"), "--sequence", str(recording)]
+    assert main([*words, "--json", str(tmp_path / "found.json")]) == 0
+    assert "differences to windows, frame by frame" in capsys.readouterr().out
+    rows = {row["label"]: row for row in json.loads((tmp_path / "found.json").read_text())["rows"]}
+    assert rows["blend"]["mean"] == pytest.approx(rows["Blend of the two neighbouring training frames"]["mean"])
+
+
 def test_one_time_is_exported_and_what_holds_one_set_of_gaussians_is_refused(cold_run, tmp_path, capsys):
     from endotsr.cli.main import main
 

@@ -52,8 +52,8 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
     Raises: InputError if the dictionary is not from `endotsr evaluate`.
     """
     try:
-        about: Any = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
-        digests = {name: str(about["arrays_sha256"][name]) for name in ("images", "masks")}
+        hashes = _hashes(metrics)
+        digests = {name: str(hashes[name]) for name in ("images", "masks")}
         rows = {label: metrics["held_out"]["per_frame"]}
         if baselines:
             rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
@@ -64,6 +64,14 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
     return methods
+
+
+def _hashes(metrics: EvaluationRecord) -> Any:
+    """SHA-256 by name of an array; a run of windows has them beside its windows."""
+    found: Any = metrics
+    if "windows" not in metrics:
+        found = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
+    return found["arrays_sha256"]
 
 
 def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:

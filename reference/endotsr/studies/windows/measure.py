@@ -13,6 +13,7 @@ The root mean square of d over the tissue is reported for frames in an overlap (
 the model and for the recorded frames. Unlike `evaluation.measures.flicker`, it also applies to a moving camera.
 """
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import cast
@@ -64,19 +65,22 @@ def measure_windows(
         for window, folder, entry in zip(scene.plan.windows, scene.folders, found)
     ]
     gaps: list[LeftOutRow] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
-    return {**joined, "windows": rows, "left_out": gaps, "seams": _seams(scene, frames)}
+    return {**joined, "windows": rows, "left_out": gaps, "seams": _seams(scene, frames), "arrays_sha256": shown.digests}
 
 
 class _Covered:
-    """The tissue of the frames that the windows cover, each of them once."""
+    """The frames that the windows cover, each of them once: SHA-256 of pictures and masks, and the tissue."""
 
     def __init__(self) -> None:
+        self._hashes = {name: hashlib.sha256() for name in ("images", "masks")}
         self._tissue: list[float] = []
         self._end = 0  # of the windows that were added
 
     def add(self, window: Window, sequence: Sequence) -> None:
         """Add the frames of a window that no earlier one shares with it."""
         for i in range(max(0, self._end - window.first), sequence.count):
+            for name, found in self._hashes.items():
+                found.update(getattr(sequence, name)[i].tobytes())  # as `runs.sources.digest` of the whole recording
             self._tissue.append(float(sequence.masks[i].mean()))
         self._end = window.end
 
@@ -84,6 +88,11 @@ class _Covered:
     def tissue(self) -> float:
         """Fraction of the pixels."""
         return float(np.mean(self._tissue))
+
+    @property
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of `images` and `masks`."""
+        return {name: found.hexdigest() for name, found in self._hashes.items()}
 
 
 def _measured(
