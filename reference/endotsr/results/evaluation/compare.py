@@ -54,10 +54,10 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
     try:
         hashes = _hashes(metrics)
         digests = {name: str(hashes[name]) for name in ("images", "masks")}
-        rows = {label: metrics["held_out"]["per_frame"]}
+        rows = [(label, metrics["held_out"]["per_frame"])]  # no dictionary: a baseline may have the label
         if baselines:
-            rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
-        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
+            rows += [(entry["label"], entry["per_frame"]) for entry in metrics["baselines"].values()]
+        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows]
         for method in methods:
             _frames(method)
             _about(method)
