@@ -86,6 +86,16 @@ def test_a_method_with_the_name_of_a_baseline_keeps_its_own_numbers():
         compare(methods_of(metrics, "X", "found.json", baselines=True), ("psnr_tissue",))
 
 
+def test_a_single_frame_has_no_interval():
+    """Of a clip of three frames one is held out; limits that equal the difference would claim that it is certain."""
+    rows = compare([method("a", [10.0]), method("b", [11.0])], ("psnr_tissue",))
+    assert (rows[1].difference.mean, rows[1].difference.low, rows[1].difference.high) == (1.0, None, None)
+    line = comparison_table(rows).splitlines()[-1].split()
+    assert line == ["b", "PSNR", "tissue", "+1.00", "-", "1", "of", "1", "frames"]
+    (_, cells) = csv.DictReader(io.StringIO(comparison_csv(rows)))
+    assert (cells["difference"], cells["low"], cells["high"]) == ("1.0", "", "")
+
+
 def test_tables_hold_every_method_and_every_digit():
     rows = compare([method("a", [10.0, 30.0]), method("b", [11.0, 31.1])], ("psnr_tissue",))
     table = comparison_table(rows)

@@ -30,8 +30,8 @@ class PairedDifference(NamedTuple):
     """A paired difference to the first method, over the frames with both values."""
 
     mean: float
-    low: float  # of the interval
-    high: float
+    low: float | None  # of the interval; None for a single frame
+    high: float | None
     better: int  # number of frames on which this method is better
     frames: int
 
@@ -130,7 +130,7 @@ def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference 
     known = difference[np.isfinite(difference)]
     if not known.size:
         return None
-    low, high = interval(known, seed)
+    low, high = interval(known, seed) if known.size > 1 else (None, None)
     better = int(np.count_nonzero(known < 0 if metric in SMALLER_IS_BETTER else known > 0))
     return PairedDifference(float(known.mean()), low, high, better, known.size)
 
