@@ -87,6 +87,8 @@ def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
         assert main(["render", str(run), "--film", str(tmp_path / "a.mp4"), *words]) == 0
         assert said in capsys.readouterr().out
     assert len(read_video(tmp_path / "a.mp4")) == 9
+    assert main(["render", str(run), "--film", str(tmp_path / "a.gif"), "--rate", "30"]) == 0
+    assert "9 pictures, 0.3 s, 3.33 times the speed" in capsys.readouterr().out, "its pictures last 0.03 s"
     assert_refused(capsys, ["render", str(run), "--film", str(tmp_path / "a.mp4"), "--slow", "2", "--rate", "9"], "one")
 
 
