@@ -91,7 +91,7 @@ def run(words: list[str]) -> int:
             count = write_film(options.film, pictures.film_pictures(shown, look, sequence), rate)
             print(f"{options.film}: {count} pictures, {count / rate:.1f} s{speed_in_words(shown_at, duration, rate)}")
         else:
-            list(shown)
+            pictures.dropped(shown)
 
     if options.out:
         count = pictures.write_pictures(options.out, scene, made, look, options.npy, film)
