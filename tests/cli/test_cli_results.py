@@ -266,3 +266,14 @@ def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
 
 def test_check_command_names_what_it_does_not_know(capsys):
     assert_refused(capsys, ["gradcheck", "no_such_stage"], "no_such_stage")
+
+
+def test_tradeoff_takes_a_run_without_held_out_frames(run_copy):
+    """As a training in Python on a sequence without a split leaves it."""
+    from endotsr.studies.tradeoff.scenes import run_scene
+
+    assert run_scene(run_copy).about.endswith("held-out frame 1")
+    file = run_copy / "sequence.json"
+    record = json.loads(file.read_text(encoding="utf-8"))
+    file.write_text(json.dumps(record | {"test_index": []}), encoding="utf-8")
+    assert run_scene(run_copy).about.endswith(f"training frame {record['train_index'][4]}")
