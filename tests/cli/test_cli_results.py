@@ -277,3 +277,10 @@ def test_tradeoff_takes_a_run_without_held_out_frames(run_copy):
     record = json.loads(file.read_text(encoding="utf-8"))
     file.write_text(json.dumps(record | {"test_index": []}), encoding="utf-8")
     assert run_scene(run_copy).about.endswith(f"training frame {record['train_index'][4]}")
+
+
+def test_a_slim_model_of_the_previous_checkpoint_is_written_and_said(run_copy, tmp_path, capsys):
+    """A kill between two renames leaves it alone, where the file system has no hard links."""
+    (run_copy / "checkpoint.npz").replace(run_copy / "checkpoint.previous.npz")
+    assert main(["export", str(run_copy), "--out", str(tmp_path / "a.npz")]) == 0
+    assert "of the checkpoint" in capsys.readouterr().out
