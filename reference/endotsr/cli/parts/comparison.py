@@ -111,6 +111,8 @@ def compare_methods(asked: EvaluateOptions) -> None:
     for label, path in named:
         metrics, sequence = _metrics(label, path, asked, [p for _, p in named], sequence)
         methods += methods_of(metrics, label, path, baselines=asked.baselines and not methods)
+    if sequence is None:
+        _refuse_options_of_pictures(asked)
     methods[1:] = sorted(methods[1:], key=lambda method: method.label not in dict(named))  # baselines at the end
     rows = compare(methods, tuple(METRICS), asked.seed)
     print(comparison_table(rows))
@@ -118,6 +120,17 @@ def compare_methods(asked: EvaluateOptions) -> None:
         write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
         replace_text(asked.csv, comparison_csv(rows))
+
+
+def _refuse_options_of_pictures(asked: EvaluateOptions) -> None:
+    """Raises InputError for an option that only pictures need, because every METHOD has its metrics already."""
+    unused = [name for name, given in (("lpips", asked.lpips), ("sequence", asked.sequence)) if given is not None]
+    unused += ["sequence.*"] if asked.settings != SHOWN else []
+    if unused:
+        raise InputError(
+            f"evaluate: --{unused[0]} has no effect: no METHOD is a folder of pictures or a video; `endotsr evaluate"
+            f" RUN` measures a run again, or omit --{unused[0]}"
+        )
 
 
 def _named(word: str) -> tuple[str, Path]:
