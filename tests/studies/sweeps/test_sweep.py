@@ -128,11 +128,19 @@ def test_a_run_that_was_killed_before_its_last_record_is_finished_without_traini
     assert run.record()["status"] == FINISHED and iterations(run.path) == list(range(1, 31))
 
 
-def test_a_finished_run_of_other_settings_is_refused(whole):
+@pytest.mark.parametrize(
+    "before, after, said",
+    [
+        ("other_frame_points = 40", "other_frame_points = 41", "other_frame_points = 40, but the sweep has 41"),
+        ("height = 32", "height = 40", "simulator.height = 32, but the sweep has 40"),
+        ("iteration = 15", "iteration = 12", "start.iteration = 15, but the sweep has 12"),
+    ],
+)
+def test_a_finished_run_of_other_settings_is_refused(whole, before, after, said):
     spec, out, _, _ = whole
     other = spec.parent / "other.toml"
-    other.write_text(spec.read_text().replace("other_frame_points = 40", "other_frame_points = 41"))
-    with pytest.raises(InputError, match=r"other_frame_points = 40, but the sweep has 41; allowed: .* another --out"):
+    other.write_text(spec.read_text().replace(before, after))
+    with pytest.raises(InputError, match=rf"{said}; allowed: .* another --out"):
         sweep(other, out)
 
 
