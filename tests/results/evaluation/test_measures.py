@@ -78,6 +78,9 @@ def test_errors_of_depth_are_those_of_pixels_that_every_row_covers():
 def test_a_render_of_background_has_no_depth():
     sequence = sequence_of(textured(0.0))
     found = held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 50.0, 0.3))
+    assert found["reason"].startswith("no pixel of the held-out priors has a depth in the model and in the training")
+    sequence.depth[[1, 5]] = 0.0
+    found = held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 50.0))
     assert found == {"reason": "no held-out frame has a prior depth on tissue"}
 
 
