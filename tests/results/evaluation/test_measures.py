@@ -176,6 +176,14 @@ def test_without_a_right_picture_there_is_a_reason(tmp_path):
     assert "no images_right/" in found["reason"]
 
 
+def test_a_folder_of_the_name_of_the_simulated_sequence_is_not_its_source(tmp_path, monkeypatch):
+    (tmp_path / "simulated" / "images_right").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    sequence, render = sequence_of(textured(0.0)), lambda i, camera: pytest.fail("rendered")
+    found = right_view(sequence, "simulated", SequenceConfig(), render)
+    assert "no images_right/" in found["reason"]
+
+
 def test_a_pair_without_one_baseline_is_not_measured(pair):
     folder, sequence, _ = pair
     wrong = msgspec.structs.replace(SequenceConfig(), scale=1.0)
