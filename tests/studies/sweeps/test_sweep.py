@@ -4,12 +4,14 @@ import csv
 import errno
 import json
 import os
+from types import SimpleNamespace
 
 import pytest
 from tiny_sweep import BASE, CONFIGURATIONS, assert_same_arrays, iterations, rows_of, write_spec
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError
+from endotsr.studies.sweeps import cluster, local
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, INTERRUPTED, Outcome, execute
 from endotsr.studies.sweeps.jobs import jobs_of
 from endotsr.studies.sweeps.locks import file_lock, run_lock
@@ -214,6 +216,14 @@ def test_errors_are_outcomes_of_one_line(tmp_path, monkeypatch, error, said):
     outcome = execute(first_job(tmp_path), 1)
     assert outcome.status == FAILED and said in outcome.reason and "\n" not in outcome.reason
     assert not outcome.ends_sweep
+
+
+@pytest.mark.parametrize("module", [local, cluster])
+def test_an_error_of_a_worker_is_one_line_even_without_words(module):
+    errors = ((AssertionError(), "AssertionError:"), (RuntimeError("two\nlines"), "RuntimeError: two lines"))
+    for error, said in errors:
+        future = SimpleNamespace(status="error", exception=lambda error=error: error)
+        assert module._outcome(SimpleNamespace(name="run"), future) == Outcome("run", FAILED, said)
 
 
 def test_the_lock_of_a_run_is_waited_for_as_long_as_its_log_grows(whole):
