@@ -15,6 +15,7 @@ from endotsr.studies.sweeps import cluster, local
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, INTERRUPTED, Outcome, execute
 from endotsr.studies.sweeps.jobs import jobs_of
 from endotsr.studies.sweeps.locks import file_lock, run_lock
+from endotsr.studies.sweeps.results import results_markdown
 from endotsr.studies.sweeps.spec import read_spec
 from endotsr.studies.sweeps.sweep import Inputs, planned, run_sweep
 from endotsr.training.runs.folder import open_run
@@ -78,6 +79,11 @@ def test_the_table_has_three_forms_with_the_same_numbers(whole):
     assert [float(line["psnr_full"]) for line in lines] == [row["psnr_full"] for row in stored.values()]
     text = (out / "results.md").read_text()
     assert text.startswith("3 of 3 runs finished, 0 failed.") and all(f"| {r['configuration']} |" in text for r in rows)
+
+
+def test_a_bar_in_the_name_of_a_clip_begins_no_cell():
+    row = {"name": "x", "sequence": "a|b", "split": "every_eighth", "configuration": "A", "seed": 0, "psnr_full": 30.0}
+    assert results_markdown([row | {"status": FINISHED}]).splitlines()[-1].startswith("| a\\|b | every_eighth | A |")
 
 
 def test_a_run_with_a_start_begins_with_that_state_and_keeps_its_gaussians(whole):
