@@ -284,3 +284,9 @@ def test_a_slim_model_of_the_previous_checkpoint_is_written_and_said(run_copy, t
     (run_copy / "checkpoint.npz").replace(run_copy / "checkpoint.previous.npz")
     assert main(["export", str(run_copy), "--out", str(tmp_path / "a.npz")]) == 0
     assert "of the checkpoint" in capsys.readouterr().out
+
+
+def test_a_run_folder_that_cannot_be_written_is_refused_before_it_is_evaluated(finished_run, monkeypatch, capsys):
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    monkeypatch.setattr("endotsr.results.evaluation.run.measure_model", pytest.fail)
+    assert_refused(capsys, ["evaluate", str(finished_run)], f"{finished_run}: cannot be written: no permission")

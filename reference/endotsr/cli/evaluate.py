@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 from endotsr.cli.parts.comparison import EvaluateOptions, compare_methods, shown_sequence
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.errors import InputError
-from endotsr.training.runs.files import write_json
+from endotsr.training.runs.files import refuse_read_only, write_json
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
@@ -134,6 +134,7 @@ def evaluate_run(
     from endotsr.training.runs.sources import run_source
 
     check_measures(measures, "--measures")
+    refuse_read_only(folder.path)
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
     model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
     scene = MovingScene(folder.sequence_record(), model, folder)
