@@ -113,6 +113,15 @@ def test_what_is_finished_is_not_run_again(whole):
     assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows]
 
 
+def test_measurements_that_finished_runs_lack_are_named(whole):
+    """New `measures` do not apply to finished runs."""
+    spec, out, _, _ = whole
+    other, told = spec.parent / "measured.toml", Told()
+    other.write_text('measures = ["depth"]\n' + spec.read_text())
+    sweep(other, out, make=lambda job: pytest.fail(f"made {job.name} again"), told=told)
+    assert told.lines == ["depth: 3 finished runs are without it; a finished run is not measured again"]
+
+
 def test_a_run_that_was_killed_before_its_last_record_is_finished_without_training(whole, tmp_path):
     """The last checkpoint is there, run.json still says running, and metrics.json is that of an earlier checkpoint."""
     import shutil
