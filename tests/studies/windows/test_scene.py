@@ -1,6 +1,7 @@
 """One scene to the outside: what renders, is measured and is opened is the recording, not its windows."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -33,6 +34,16 @@ def test_the_record_is_that_of_the_recording(scene):
     np.testing.assert_allclose(record.times, np.arange(FRAMES) / FRAMES)
     assert record.test_index == list(range(1, FRAMES, 8))
     assert sorted(record.test_index + record.train_index) == list(range(FRAMES))
+
+
+def test_cameras_that_rest_at_two_places_are_not_one_camera(scene, cold_run, tmp_path):
+    """After a cut a mesh would otherwise be that of the first place."""
+    run = shutil.copytree(cold_run, tmp_path / "run")
+    file = run / "windows" / "001" / "sequence.json"
+    record = json.loads(file.read_text(encoding="utf-8"))
+    record["cameras"][0]["translation"] = [30.0, 0.0, 0.0]
+    file.write_text(json.dumps(record), encoding="utf-8")
+    assert scene.record.static_camera and not open_windows(run).record.static_camera
 
 
 @pytest.mark.parametrize(

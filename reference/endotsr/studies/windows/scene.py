@@ -190,7 +190,7 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
     return SequenceRecord(
         unit=records[0].unit,
         largest_depth=max(record.largest_depth for record in records),
-        static_camera=all(record.static_camera for record in records),
+        static_camera=all(record.static_camera and record.cameras == records[0].cameras for record in records),
         names=[names[g] for g in frames],
         times=[g / plan.frames for g in frames],
         train_index=[j for j, g in enumerate(frames) if g in trained],
