@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -98,6 +99,9 @@ def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp
     assert_refused(capsys, ["evaluate", "--compare", pictures], "--sequence is missing")
     assert_refused(capsys, ["evaluate", run, run], "two methods are called 'run'")
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "none.json")], "none.json: cannot be read")
+    fresh = shutil.copytree(finished_run, tmp_path / "my run")
+    (fresh / "metrics.json").unlink()
+    assert_refused(capsys, ["evaluate", run, str(fresh)], f"not evaluated yet; `endotsr evaluate '{fresh}'` writes")
     assert_refused(capsys, ["evaluate", "--compare", run, "--seed", "-1"], "--seed -1 is not allowed")
     assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label with several methods")
     assert_refused(capsys, ["evaluate", run, pictures, "--no-view"], "--no-view has no effect in a comparison")

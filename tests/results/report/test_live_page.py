@@ -67,8 +67,9 @@ def test_a_stop_before_the_first_iteration_renders_nothing(pages, monkeypatch, t
 
     monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", stopped)
     monkeypatch.setattr(live_page, "render_at", pytest.fail)
-    assert main(train_words(tmp_path / "run", "--no-evaluate")) == 130
+    assert main(train_words(tmp_path / "my run", "--no-evaluate")) == 130
     assert "<b>interrupted</b>" in pages[-1] and "<img" not in pages[-1]
+    assert f"<code>endotsr train --out &#x27;{tmp_path}/my run&#x27; --resume</code>" in pages[-1]
 
 
 def test_the_page_leads_to_the_report_once_there_is_one(quiet_run):

@@ -159,9 +159,10 @@ def test_a_time_that_no_window_shows_is_refused_with_the_reason(tmp_path):
 
 
 def test_a_run_that_is_not_trained_yet_says_how_to_go_on(recording, tmp_path):
-    plan_recording(recording, settings(), WANTED, tmp_path / "run")
-    with pytest.raises(InputError, match="000"):
-        open_any(tmp_path / "run")
+    plan_recording(recording, settings(), WANTED, tmp_path / "my run")
+    command = r"`endotsr train --out '/.*/my run' --resume`"
+    with pytest.raises(InputError, match=f"000: not trained yet; continue with {command}"):
+        open_any(tmp_path / "my run")
 
 
 def test_commands_take_a_run_of_windows(cold_run, tmp_path, capsys):

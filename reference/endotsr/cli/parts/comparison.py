@@ -1,5 +1,6 @@
 """`endotsr evaluate`: options, the sequence of a folder of pictures, and the comparison of methods."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -147,7 +148,7 @@ def _metrics(
     """The metrics of one method, and the sequence, if it was read for this or an earlier method."""
     if (path / "run.json").exists() or is_windowed(path):
         if not (path / "metrics.json").exists():
-            raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
+            raise InputError(f"{path}: not evaluated yet; `{_evaluate(path)}` writes its metrics.json")
         metrics = read_json(path / "metrics.json")
         if not is_windowed(path):
             _refuse_earlier(path, metrics)
@@ -172,9 +173,14 @@ def _refuse_earlier(path: Path, metrics: Keys) -> None:
     done = read_json(path / "run.json").get("iterations_done")
     if isinstance(measured, int) and isinstance(done, int) and measured != done:
         raise InputError(
-            f"{path}: its metrics.json is of iteration {measured}, its checkpoint of {done}; `endotsr evaluate {path}`"
+            f"{path}: its metrics.json is of iteration {measured}, its checkpoint of {done}; `{_evaluate(path)}`"
             " measures it again"
         )
+
+
+def _evaluate(run: Path) -> str:
+    """The command that evaluates a run, as a shell takes it."""
+    return f"endotsr evaluate {shlex.quote(str(run))}"
 
 
 def _as_dict(row: Any) -> dict[str, Any]:

@@ -7,6 +7,7 @@ the evaluation the page redirects to the report.
 """
 
 import contextlib
+import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -151,4 +152,4 @@ def _advice(status: str, folder: Path) -> str:
         return "This page updates itself during training."
     if status == "finished":
         return "After the evaluation, this page redirects to the report."
-    return f"Continue with <code>endotsr train --out {parts.text(folder)} --resume</code>."
+    return f"Continue with <code>endotsr train --out {parts.text(shlex.quote(str(folder)))} --resume</code>."

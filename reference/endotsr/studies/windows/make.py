@@ -7,6 +7,7 @@ failed starts cold. Finished windows are kept; unfinished ones continue from the
 """
 
 import contextlib
+import shlex
 from pathlib import Path
 
 from endotsr.clips.sequences.splits import split_frames
@@ -107,7 +108,8 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
         except KeyboardInterrupt:
             done = sum(outcome.status == FINISHED for outcome in found.values())
             raise KeyboardInterrupt(
-                f"{done} of {len(jobs)} windows are finished; continue with `endotsr train --out {run} --resume`"
+                f"{done} of {len(jobs)} windows are finished; continue with"
+                f" `endotsr train --out {shlex.quote(str(run))} --resume`"
             ) from None
     return [found[job.name] for job in jobs]
 
