@@ -1,6 +1,8 @@
 """`render`: cameras, sizes, depth and films of a trained run, and what is refused."""
 
+import gc
 import json
+import weakref
 
 import numpy as np
 import pytest
@@ -8,6 +10,8 @@ from tiny import assert_refused, render
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
+from endotsr.results.report.figures import bytes_image
+from endotsr.results.views import pictures
 from film_reader import read_video
 
 
@@ -87,6 +91,8 @@ def test_a_film_in_slow_motion(run_copy, tmp_path, capsys):
         assert main(["render", str(run), "--film", str(tmp_path / "a.mp4"), *words]) == 0
         assert said in capsys.readouterr().out
     assert len(read_video(tmp_path / "a.mp4")) == 9
+    assert main(["render", str(run), "--film", str(tmp_path / "a.gif"), "--rate", "30"]) == 0
+    assert "9 pictures, 0.3 s, 3.33 times the speed" in capsys.readouterr().out, "its pictures last 0.03 s"
     assert_refused(capsys, ["render", str(run), "--film", str(tmp_path / "a.mp4"), "--slow", "2", "--rate", "9"], "one")
 
 
@@ -128,3 +134,18 @@ def test_a_run_without_held_out_frames_names_the_other_choices(words, run_copy, 
     words = [word.format(tmp_path) for word in words]
     assert_refused(capsys, ["render", str(run_copy), *words], "render: no frame is held out; allowed: --frames train")
     assert not (tmp_path / "a").exists()
+
+
+def test_a_picture_that_is_written_is_not_kept_in_memory(finished_run, tmp_path, monkeypatch):
+    """The first one alone is, for the scale of the depth; a recording has thousands."""
+    written, alive = [], []
+
+    def watched(colour):
+        gc.collect()
+        written.append(weakref.ref(colour))
+        alive.append(sum(reference() is not None for reference in written))
+        return bytes_image(colour)
+
+    monkeypatch.setattr(pictures, "bytes_image", watched)
+    render(finished_run, tmp_path / "a", "--frames", "all")
+    assert len(alive) == 9 and max(alive) <= 3

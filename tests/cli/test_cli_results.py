@@ -266,3 +266,27 @@ def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
 
 def test_check_command_names_what_it_does_not_know(capsys):
     assert_refused(capsys, ["gradcheck", "no_such_stage"], "no_such_stage")
+
+
+def test_tradeoff_takes_a_run_without_held_out_frames(run_copy):
+    """As a training in Python on a sequence without a split leaves it."""
+    from endotsr.studies.tradeoff.scenes import run_scene
+
+    assert run_scene(run_copy).about.endswith("held-out frame 1")
+    file = run_copy / "sequence.json"
+    record = json.loads(file.read_text(encoding="utf-8"))
+    file.write_text(json.dumps(record | {"test_index": []}), encoding="utf-8")
+    assert run_scene(run_copy).about.endswith(f"training frame {record['train_index'][4]}")
+
+
+def test_a_slim_model_of_the_previous_checkpoint_is_written_and_said(run_copy, tmp_path, capsys):
+    """A kill between two renames leaves it alone, where the file system has no hard links."""
+    (run_copy / "checkpoint.npz").replace(run_copy / "checkpoint.previous.npz")
+    assert main(["export", str(run_copy), "--out", str(tmp_path / "a.npz")]) == 0
+    assert "of the checkpoint" in capsys.readouterr().out
+
+
+def test_a_run_folder_that_cannot_be_written_is_refused_before_it_is_evaluated(finished_run, monkeypatch, capsys):
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    monkeypatch.setattr("endotsr.results.evaluation.run.measure_model", pytest.fail)
+    assert_refused(capsys, ["evaluate", str(finished_run)], f"{finished_run}: cannot be written: no permission")

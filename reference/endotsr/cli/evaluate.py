@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from endotsr.cli.parts.comparison import SHOWN, EvaluateOptions, compare_methods, shown_sequence
+from endotsr.cli.parts.comparison import EvaluateOptions, compare_methods, shown_sequence
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.errors import InputError
-from endotsr.training.runs.files import write_json
+from endotsr.training.runs.files import refuse_read_only, write_json
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
@@ -20,11 +20,11 @@ def run(words: list[str]) -> int:
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.report.comparison import frames_csv
 
-    options = parse(EvaluateOptions, words, "evaluate")
+    options, given = parse(EvaluateOptions, words, "evaluate"), given_names(EvaluateOptions, words)
     use_threads(options.threads)
     if len(options.methods) > 1 or options.compare:
-        return _compare(options)
-    _refuse_without_effect(options, given_names(EvaluateOptions, words))
+        return _compare(options, given)
+    _refuse_without_effect(options, given)
     if options.pictures and options.measures:
         raise InputError("evaluate: --measures with --pictures is not allowed: measures render views of a run")
     metrics = _pictures(options) if options.pictures else _run(options)
@@ -44,15 +44,21 @@ def _refuse_without_effect(options: EvaluateOptions, given: frozenset[str]) -> N
         raise InputError(
             "evaluate: --label has no effect without --pictures; a comparison takes NAME=PATH, or omit --label"
         )
+    if options.run is not None and any(name.startswith("sequence.") for name in given):
+        raise InputError(f"evaluate: --sequence.* with {options.run} is not allowed: the settings of a run are fixed")
+    if "view" in given and options.pictures is not None:
+        raise InputError("evaluate: --no-view has no effect with --pictures: no view.html is written; omit --no-view")
 
 
-def _compare(options: EvaluateOptions) -> int:
+def _compare(options: EvaluateOptions, given: frozenset[str]) -> int:
     """Compare several methods."""
     if not options.methods:
         raise InputError("evaluate: METHOD is missing: run folders, JSON files or folders of pictures to compare")
     for name in ("pictures", "label", "measures"):
         if getattr(options, name):
             raise InputError(f"evaluate: --{name} with several methods is not allowed; allowed: evaluate one first")
+    if "view" in given:
+        raise InputError("evaluate: --no-view has no effect in a comparison: no view.html is written; omit --no-view")
     compare_methods(options)
     return 0
 
@@ -65,13 +71,13 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
 
     if options.run is None:
         raise InputError("evaluate: RUN is missing: a run folder, or --pictures FOLDER with --sequence SEQUENCE")
-    if options.settings != SHOWN:
-        raise InputError(f"evaluate: --sequence.* with {options.run} is not allowed: the settings of a run are fixed")
     if is_windowed(options.run):
         from endotsr.cli.parts.windows import evaluate_windows
 
         if options.measures:
             raise InputError(f"evaluate: --measures with {options.run} is not allowed: it is a run of windows")
+        if not options.view:
+            raise InputError(f"evaluate: --no-view has no effect with {options.run}: a run of windows has no view.html")
         return cast("EvaluationRecord", evaluate_windows(options.run, options.lpips, options.sequence))
     folder = open_run(options.run)
     load_model(folder)  # raises for a run without a usable checkpoint, before the sequence is read
@@ -128,6 +134,7 @@ def evaluate_run(
     from endotsr.training.runs.sources import run_source
 
     check_measures(measures, "--measures")
+    refuse_read_only(folder.path)
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
     model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
     scene = MovingScene(folder.sequence_record(), model, folder)

@@ -63,7 +63,7 @@ def run(words: list[str]) -> int:
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.export.times import Times
     from endotsr.results.views import pictures
-    from endotsr.results.views.film import film_rate, speed_in_words, write_film
+    from endotsr.results.views.film import speed_in_words, write_film
     from endotsr.results.views.plan import ViewRequest
     from endotsr.studies.windows.scene import open_any, shown_frames
     from endotsr.training.runs.sources import refuse_inside_data
@@ -81,7 +81,7 @@ def run(words: list[str]) -> int:
             refuse_inside_data(path, scene.folder)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
     shown_at, duration = [view.time for view in views], scene.record.duration
-    rate = (options.rate or film_rate(options.film, shown_at, duration, options.slow)) if options.film else None
+    rate = _rate(options, shown_at, duration)
     look = pictures.Look(options.depth, options.without, options.panels)
     sequence = shown_frames(scene, options.panels, views, options.sequence) if options.film else None
     made = pictures.rendered(scene, views, look)
@@ -91,7 +91,7 @@ def run(words: list[str]) -> int:
             count = write_film(options.film, pictures.film_pictures(shown, look, sequence), rate)
             print(f"{options.film}: {count} pictures, {count / rate:.1f} s{speed_in_words(shown_at, duration, rate)}")
         else:
-            list(shown)
+            pictures.dropped(shown)
 
     if options.out:
         count = pictures.write_pictures(options.out, scene, made, look, options.npy, film)
@@ -100,3 +100,12 @@ def run(words: list[str]) -> int:
         film(made)
     write_result(options.json, folder=options.out, film=options.film, rate=rate, times=shown_at)
     return 0
+
+
+def _rate(options: RenderOptions, times: list[float], duration: float) -> float | None:
+    """Pictures per second of the film, as it plays; None without one."""
+    from endotsr.results.views.film import film_rate, played_rate
+
+    if options.film is None:
+        return None
+    return played_rate(options.film, options.rate or film_rate(options.film, times, duration, options.slow))

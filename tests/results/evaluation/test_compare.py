@@ -73,6 +73,29 @@ def test_files_that_are_no_metrics_are_refused(metrics):
         methods_of(metrics, "a", "found.json")
 
 
+def test_a_method_with_the_name_of_a_baseline_keeps_its_own_numbers():
+    """It is refused beside this baseline; before, the numbers of the baseline took its place."""
+    rows = [{"frame": 1, "name": "f1", "time": 0.5, "psnr_tissue": value} for value in (30.0, 20.0)]
+    metrics = {
+        "pictures": {"arrays_sha256": DIGESTS},
+        "held_out": {"per_frame": rows[:1]},
+        "baselines": {"x": {"label": "X", "per_frame": rows[1:]}},
+    }
+    assert [m.per_frame[0]["psnr_tissue"] for m in methods_of(metrics, "X", "found.json", baselines=True)] == [30, 20]
+    with pytest.raises(InputError, match="two methods are called 'X'"):
+        compare(methods_of(metrics, "X", "found.json", baselines=True), ("psnr_tissue",))
+
+
+def test_a_single_frame_has_no_interval():
+    """Of a clip of three frames one is held out; limits that equal the difference would claim that it is certain."""
+    rows = compare([method("a", [10.0]), method("b", [11.0])], ("psnr_tissue",))
+    assert (rows[1].difference.mean, rows[1].difference.low, rows[1].difference.high) == (1.0, None, None)
+    line = comparison_table(rows).splitlines()[-1].split()
+    assert line == ["b", "PSNR", "tissue", "+1.00", "-", "1", "of", "1", "frames"]
+    (_, cells) = csv.DictReader(io.StringIO(comparison_csv(rows)))
+    assert (cells["difference"], cells["low"], cells["high"]) == ("1.0", "", "")
+
+
 def test_tables_hold_every_method_and_every_digit():
     rows = compare([method("a", [10.0, 30.0]), method("b", [11.0, 31.1])], ("psnr_tissue",))
     table = comparison_table(rows)

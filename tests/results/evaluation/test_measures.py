@@ -78,6 +78,9 @@ def test_errors_of_depth_are_those_of_pixels_that_every_row_covers():
 def test_a_render_of_background_has_no_depth():
     sequence = sequence_of(textured(0.0))
     found = held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 50.0, 0.3))
+    assert found["reason"].startswith("no pixel of the held-out priors has a depth in the model and in the training")
+    sequence.depth[[1, 5]] = 0.0
+    found = held_out_depth(sequence, lambda i, camera: render_of(np.zeros((3, 64, 64)), 50.0))
     assert found == {"reason": "no held-out frame has a prior depth on tissue"}
 
 
@@ -170,6 +173,14 @@ def test_excluded_pixels_are_moved_with_the_tissue():
 def test_without_a_right_picture_there_is_a_reason(tmp_path):
     sequence = sequence_of(textured(0.0))
     found = right_view(sequence, str(tmp_path), SequenceConfig(), lambda i, camera: pytest.fail("rendered"))
+    assert "no images_right/" in found["reason"]
+
+
+def test_a_folder_of_the_name_of_the_simulated_sequence_is_not_its_source(tmp_path, monkeypatch):
+    (tmp_path / "simulated" / "images_right").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    sequence, render = sequence_of(textured(0.0)), lambda i, camera: pytest.fail("rendered")
+    found = right_view(sequence, "simulated", SequenceConfig(), render)
     assert "no images_right/" in found["reason"]
 
 

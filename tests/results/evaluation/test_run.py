@@ -9,6 +9,7 @@ from made_up_sequence import made_up
 
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation import run
+from endotsr.results.report import run_files
 from endotsr.results.report.run_files import worst_first
 
 
@@ -43,7 +44,6 @@ def test_the_report_shows_the_worst_frames_and_the_folder_has_all(tmp_path, monk
     from tiny import train_words
 
     from endotsr.cli.main import main
-    from endotsr.results.report import run_files
     from endotsr.training.runs.files import read_json
 
     monkeypatch.setattr(run_files, "MOST_SHOWN", 1)
@@ -61,3 +61,15 @@ def test_the_report_shows_the_worst_frames_and_the_folder_has_all(tmp_path, monk
 def test_a_frame_without_a_value_is_the_worst(value):
     rows = {k: {"psnr_tissue": psnr} for k, psnr in enumerate([30.0, value, float("inf"), 20.0])}
     assert worst_first(rows) == [1, 3, 0, 2]
+
+
+def test_a_frame_without_tissue_is_not_among_the_worst_where_others_are_left(monkeypatch):
+    masks = np.ones((9, 8, 8), bool)
+    masks[4] = False
+    clip = made_up(np.zeros((9, 3, 8, 8), np.uint8), [1, 4, 7], masks)
+    frame = lambda i: SimpleNamespace(image=clip.images[i] / np.float32(255))
+    rows = [{"frame": i, "psnr_tissue": value} for i, value in ((1, 30.0), (4, None), (7, 20.0))]
+    render = RenderOut(np.zeros((3, 8, 8), np.float32), np.ones((8, 8)), np.ones((8, 8)))
+    monkeypatch.setattr(run_files, "MOST_SHOWN", 2)
+    shown = run_files.worst_frames(SimpleNamespace(**vars(clip), frame=frame), rows, lambda i: render)
+    assert [picture.index for picture in shown] == [1, 7]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from endotsr.results.report import curves
+from endotsr.results.report import curves, style
 from endotsr.training.runs.log import log_until
 
 
@@ -55,12 +55,22 @@ def test_only_charts_with_data_appear():
 
 @pytest.mark.parametrize("count", [1, 2, 300])
 def test_charts_are_drawn_in_both_themes(count):
-    evaluation = {"held_out": {"mean": {"psnr_full": 30.0}}, "training": {"mean": {"psnr_full": None}}}
+    evaluation = {"held_out": {"mean": {"psnr_tissue": 30.0}}, "training": {"mean": {"psnr_tissue": None}}}
     for chart in curves.charts(log_of(count), evaluation):
         pictures = [np.asarray(Image.open(io.BytesIO(curves.chart_png(chart, t, dots=40)))) for t in curves.THEMES]
         assert pictures[0].shape[2] == 4 and (pictures[0][0, 0, 3] == 0)  # transparent ground
         assert (pictures[0] != pictures[1]).any()
     Image.open(io.BytesIO(curves.curves_png(log_of(count), evaluation) or b"")).load()
+
+
+def test_levels_of_the_frames_are_of_the_tissue_as_the_curve_is():
+    """The log has the PSNR of the tissue; that of all pixels is higher by the fraction of the mask."""
+    mean = {"psnr_full": 33.0, "psnr_tissue": 30.0}
+    evaluation = {"held_out": {"mean": mean}, "training": {"mean": mean | {"psnr_tissue": 31.0}}}
+    (chart,) = (c for c in curves.charts(log_of(3), evaluation) if c.title.startswith("PSNR"))
+    axes = style.new_figure(4, 3).add_subplot()
+    chart.draw(axes, style.LIGHT)
+    assert "tissue" in chart.title and [line.get_ydata()[0] for line in axes.lines[1:]] == [30.0, 31.0]
 
 
 def test_loss_that_is_zero_or_negative_everywhere_is_still_drawn():

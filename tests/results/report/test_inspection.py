@@ -49,6 +49,17 @@ def test_headline_separates_what_was_found_from_what_is_open(found):
         assert said in Reader(inspection_html("clip", changed, plan)).words
 
 
+def test_undecided_tests_do_not_make_the_tissue_static(found):
+    inspection, plan = found
+    still = {name: v._replace(present=False, kind="none") for name, v in inspection.verdicts.items()}
+    unknown = still | {"motion": still["motion"]._replace(kind="unknown")}
+    for verdicts, said in (
+        (still, "No effect was found: the tissue is static."),
+        (unknown, "No effect was found. Undecided: motion."),
+    ):
+        assert said in Reader(inspection_html("clip", inspection._replace(verdicts=verdicts), plan)).words
+
+
 def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found):
     page = inspection_html("clip & <b>", *found)
     words = Reader(page).words

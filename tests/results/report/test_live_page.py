@@ -1,9 +1,11 @@
 """The page of a training that runs: it follows the run, changes no number of it, and gives way to the report."""
 
 import re
+import shutil
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "cli"))
@@ -11,8 +13,12 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "cli"))
 from tiny import assert_same_run, train_words
 
 from endotsr.cli.main import main
+from endotsr.results.evaluation.metrics import psnr_tissue
 from endotsr.results.report import line_chart, live_page
 from endotsr.results.report.line_chart import ChartCurve, chart_svg
+from endotsr.training.runs.folder import open_run
+from endotsr.training.runs.model import load_training
+from endotsr.training.runs.sources import load_run_sequence
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +67,9 @@ def test_a_stop_before_the_first_iteration_renders_nothing(pages, monkeypatch, t
 
     monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", stopped)
     monkeypatch.setattr(live_page, "render_at", pytest.fail)
-    assert main(train_words(tmp_path / "run", "--no-evaluate")) == 130
+    assert main(train_words(tmp_path / "my run", "--no-evaluate")) == 130
     assert "<b>interrupted</b>" in pages[-1] and "<img" not in pages[-1]
+    assert f"<code>endotsr train --out &#x27;{tmp_path}/my run&#x27; --resume</code>" in pages[-1]
 
 
 def test_the_page_leads_to_the_report_once_there_is_one(quiet_run):
@@ -77,6 +84,23 @@ def test_a_resumed_run_goes_on_with_its_curves(pages, tmp_path):
     assert main(["train", "--out", str(out), "--resume", "--iterations", "32", "--no-evaluate"]) == 0
     first = re.search(r'<polyline points="([^"]*)"', pages[1])
     assert len(first[1].split()) == 31, "the thirty iterations before are shown"
+
+
+def test_the_page_measures_the_clipped_render_as_the_report_does(quiet_run, monkeypatch, tmp_path):
+    folder = open_run(shutil.copytree(quiet_run[0], tmp_path / "run"))
+    sequence, render_at = load_run_sequence(folder), live_page.render_at
+
+    def bright(*words, **more):
+        found = render_at(*words, **more)
+        return found._replace(colour=found.colour + 2)
+
+    monkeypatch.setattr(live_page, "render_at", bright)
+    page = live_page.LivePage(folder, sequence, folder.config())
+    page.begin(load_training(folder, folder.config()))
+    page.close()
+    truth = sequence.frame(1).image
+    white = psnr_tissue(np.ones_like(truth), truth, sequence.masks[1])
+    assert f"<b>{white:.2f}<small>dB" in (folder.path / "training.html").read_text(encoding="utf-8")
 
 
 def test_a_page_that_cannot_be_written_stops_no_training(monkeypatch, tmp_path):

@@ -292,6 +292,16 @@ def test_extrapolated_frames_stand_in_a_table_of_their_own():
     assert "Every held-out frame is extrapolated" in report_html(data) and "30.25" in report_html(data)
 
 
+def test_nothing_is_said_of_frames_between_where_every_frame_is_extrapolated():
+    """With the split `end` the blend is a copy of the last training frame, and the cross-fade a copy of its render."""
+    data = made_up_data()
+    data.evaluation["cross_fade"] = {"label": "Faded", "mean": metrics(31.0)}
+    assert interpolation_sentence(data.evaluation) and "its motion adds no information" in report_html(data)
+    data.evaluation["frames"] = {"extrapolated": [1, 9, 17, 25]}
+    page = report_html(data)
+    assert interpolation_sentence(data.evaluation) == "" and "suffices" not in page and "its motion adds" not in page
+
+
 def test_pixels_that_training_hardly_shows_are_marked_and_left_out_in_a_table():
     data = made_up_data()
     assert "Never seen in training" not in report_html(data) and "hardly shows" not in report_html(data)

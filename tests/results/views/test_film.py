@@ -15,7 +15,7 @@ from endotsr.errors import InputError
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.depth import normalised_depth
 from endotsr.results.report.figures import EXCLUDED
-from endotsr.results.views.film import check_film, film_rate, speed_in_words, write_film
+from endotsr.results.views.film import check_film, film_rate, played_rate, speed_in_words, write_film
 from endotsr.results.views.panels import Scale, panel, side_by_side
 from film_reader import read_video
 
@@ -85,6 +85,12 @@ def test_a_film_is_as_fast_as_the_recording_or_slower(name, count, duration, slo
     """`count` frames of a recording of `duration` seconds."""
     times = [k / count for k in range(count)]
     assert film_rate(Path(name), times, duration, slow) == pytest.approx(rate)
+
+
+@pytest.mark.parametrize(("name", "rate", "played"), [("a.gif", 30, 100 / 3), ("a.gif", 50, 50), ("a.mp4", 30, 30)])
+def test_the_rate_that_is_said_is_that_of_the_film(name, rate, played):
+    """A picture of a gif lasts whole hundredths of a second: 3 of them at 30 pictures per second."""
+    assert played_rate(Path(name), rate) == pytest.approx(played)
 
 
 def test_the_speed_of_a_film_is_said():

@@ -209,6 +209,9 @@ def test_without_a_pair_there_is_no_picture(tmp_path):
     record = write_ablation(tmp_path, [open_row("base", 0)], [])
     assert record["increments"] == [] and not (tmp_path / FILES[2]).exists()
     assert ablation_record([], [])["runs"]["planned"] == 0
+    blank = {"psnr_full": None, "psnr_tissue": None, "lpips": 0.0}  # held-out frames without tissue
+    record = write_ablation(tmp_path, [row(name, 0, 0.0) | blank for name in ("base", "S")], [])
+    assert [found["metric"] for found in record["increments"]] == ["lpips"] and not (tmp_path / FILES[2]).exists()
 
 
 def test_the_picture_has_a_mark_for_every_mean_pair_and_published_value(tmp_path, monkeypatch):

@@ -66,6 +66,11 @@ REFUSED = {
     "switch": ("keep_checkpoints = 1", "keep_checkpoints = 1 is not allowed; allowed: true, false"),
     "simulator": ("simulator.colour = 1", "unknown key simulator.colour"),
     "setting": ("settings.model.apearance = true", "unknown key model.apearance; allowed: appearance"),
+    "seed in settings": ("settings.training.seed = 5", "training.seed has no effect: seeds sets it in every run"),
+    "split twice": (
+        'splits = ["blocks 8"]\nsettings.sequence.split = "end"',
+        "sequence.split has no effect: splits sets it in every run; allowed: splits alone",
+    ),
     "preset in settings": ("settings.preset = { a = 1 }", "settings.preset is not allowed; allowed: preset next to"),
     "long name": ('sequences = ["' + "x" * 5000 + '"]', "is not allowed; allowed: a folder, or simulated"),
     "large seed": ("seeds = [99999999999999999999]", "allowed: a list, each an integer >= 0 and <= "),

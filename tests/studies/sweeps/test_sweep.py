@@ -4,15 +4,18 @@ import csv
 import errno
 import json
 import os
+from types import SimpleNamespace
 
 import pytest
 from tiny_sweep import BASE, CONFIGURATIONS, assert_same_arrays, iterations, rows_of, write_spec
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError
+from endotsr.studies.sweeps import cluster, local
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, INTERRUPTED, Outcome, execute
 from endotsr.studies.sweeps.jobs import jobs_of
 from endotsr.studies.sweeps.locks import file_lock, run_lock
+from endotsr.studies.sweeps.results import results_markdown
 from endotsr.studies.sweeps.spec import read_spec
 from endotsr.studies.sweeps.sweep import Inputs, planned, run_sweep
 from endotsr.training.runs.folder import open_run
@@ -78,6 +81,11 @@ def test_the_table_has_three_forms_with_the_same_numbers(whole):
     assert text.startswith("3 of 3 runs finished, 0 failed.") and all(f"| {r['configuration']} |" in text for r in rows)
 
 
+def test_a_bar_in_the_name_of_a_clip_begins_no_cell():
+    row = {"name": "x", "sequence": "a|b", "split": "every_eighth", "configuration": "A", "seed": 0, "psnr_full": 30.0}
+    assert results_markdown([row | {"status": FINISHED}]).splitlines()[-1].startswith("| a\\|b | every_eighth | A |")
+
+
 def test_a_run_with_a_start_begins_with_that_state_and_keeps_its_gaussians(whole):
     _, out, rows, _ = whole
     run = open_run(out / "runs" / rows[2]["name"])
@@ -105,6 +113,15 @@ def test_what_is_finished_is_not_run_again(whole):
     assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows]
 
 
+def test_measurements_that_finished_runs_lack_are_named(whole):
+    """New `measures` do not apply to finished runs."""
+    spec, out, _, _ = whole
+    other, told = spec.parent / "measured.toml", Told()
+    other.write_text('measures = ["depth"]\n' + spec.read_text())
+    sweep(other, out, make=lambda job: pytest.fail(f"made {job.name} again"), told=told)
+    assert told.lines == ["depth: 3 finished runs are without it; a finished run is not measured again"]
+
+
 def test_a_run_that_was_killed_before_its_last_record_is_finished_without_training(whole, tmp_path):
     """The last checkpoint is there, run.json still says running, and metrics.json is that of an earlier checkpoint."""
     import shutil
@@ -128,11 +145,19 @@ def test_a_run_that_was_killed_before_its_last_record_is_finished_without_traini
     assert run.record()["status"] == FINISHED and iterations(run.path) == list(range(1, 31))
 
 
-def test_a_finished_run_of_other_settings_is_refused(whole):
+@pytest.mark.parametrize(
+    "before, after, said",
+    [
+        ("other_frame_points = 40", "other_frame_points = 41", "other_frame_points = 40, but the sweep has 41"),
+        ("height = 32", "height = 40", "simulator.height = 32, but the sweep has 40"),
+        ("iteration = 15", "iteration = 12", "start.iteration = 15, but the sweep has 12"),
+    ],
+)
+def test_a_finished_run_of_other_settings_is_refused(whole, before, after, said):
     spec, out, _, _ = whole
     other = spec.parent / "other.toml"
-    other.write_text(spec.read_text().replace("other_frame_points = 40", "other_frame_points = 41"))
-    with pytest.raises(InputError, match=r"other_frame_points = 40, but the sweep has 41; allowed: .* another --out"):
+    other.write_text(spec.read_text().replace(before, after))
+    with pytest.raises(InputError, match=rf"{said}; allowed: .* another --out"):
         sweep(other, out)
 
 
@@ -206,6 +231,14 @@ def test_errors_are_outcomes_of_one_line(tmp_path, monkeypatch, error, said):
     outcome = execute(first_job(tmp_path), 1)
     assert outcome.status == FAILED and said in outcome.reason and "\n" not in outcome.reason
     assert not outcome.ends_sweep
+
+
+@pytest.mark.parametrize("module", [local, cluster])
+def test_an_error_of_a_worker_is_one_line_even_without_words(module):
+    errors = ((AssertionError(), "AssertionError:"), (RuntimeError("two\nlines"), "RuntimeError: two lines"))
+    for error, said in errors:
+        future = SimpleNamespace(status="error", exception=lambda error=error: error)
+        assert module._outcome(SimpleNamespace(name="run"), future) == Outcome("run", FAILED, said)
 
 
 def test_the_lock_of_a_run_is_waited_for_as_long_as_its_log_grows(whole):

@@ -71,6 +71,14 @@ def test_a_window_that_fails_is_named_and_a_warm_one_behind_it_starts_cold(recor
     assert [outcome.status for outcome in outcomes] == ["finished"] * 2
 
 
+def test_a_window_is_named_by_the_frames_of_the_plan(recording, tmp_path):
+    """Not by those of the folder: with `--frames 4:56:2` the recording has 26 frames."""
+    run, heard = tmp_path / "run", Heard()
+    plan_recording(recording, settings(sequence={"frames": "4:56:2"}), Wanted(), run)
+    make_windows(run, lambda jobs: (Outcome(job.name, "failed", "no luck") for job in jobs), heard)
+    assert heard.lines == ["window 000 (frames 0:26): failed: no luck"]
+
+
 def test_a_recording_without_a_window_is_refused(tmp_path):
     source = write_recording(tmp_path / "source")
     for i in range(5, 56, 10):

@@ -1,6 +1,7 @@
 """One scene to the outside: what renders, is measured and is opened is the recording, not its windows."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -33,6 +34,16 @@ def test_the_record_is_that_of_the_recording(scene):
     np.testing.assert_allclose(record.times, np.arange(FRAMES) / FRAMES)
     assert record.test_index == list(range(1, FRAMES, 8))
     assert sorted(record.test_index + record.train_index) == list(range(FRAMES))
+
+
+def test_cameras_that_rest_at_two_places_are_not_one_camera(scene, cold_run, tmp_path):
+    """After a cut a mesh would otherwise be that of the first place."""
+    run = shutil.copytree(cold_run, tmp_path / "run")
+    file = run / "windows" / "001" / "sequence.json"
+    record = json.loads(file.read_text(encoding="utf-8"))
+    record["cameras"][0]["translation"] = [30.0, 0.0, 0.0]
+    file.write_text(json.dumps(record), encoding="utf-8")
+    assert scene.record.static_camera and not open_windows(run).record.static_camera
 
 
 @pytest.mark.parametrize(
@@ -104,6 +115,12 @@ def test_every_held_out_frame_is_measured_once_with_the_blended_picture(scene, r
         assert row["psnr_tissue"] == pytest.approx(found["psnr_tissue"], abs=1e-6)
 
 
+def test_totals_count_a_frame_of_two_windows_once(metrics, recording):
+    whole, frames = endotsr.load_sequence(recording), metrics["frames"]
+    assert (frames["total"], frames["training"]) == (FRAMES, len(whole.train_index))
+    assert frames["tissue_fraction"] == pytest.approx(whole.tissue_fraction)
+
+
 def test_training_frames_are_none_that_are_held_out(metrics):
     sample = metrics["frames"]["training_sample"]
     assert len(set(sample)) == len(sample) and not set(sample) & set(metrics["frames"]["held_out"])
@@ -142,9 +159,10 @@ def test_a_time_that_no_window_shows_is_refused_with_the_reason(tmp_path):
 
 
 def test_a_run_that_is_not_trained_yet_says_how_to_go_on(recording, tmp_path):
-    plan_recording(recording, settings(), WANTED, tmp_path / "run")
-    with pytest.raises(InputError, match="000"):
-        open_any(tmp_path / "run")
+    plan_recording(recording, settings(), WANTED, tmp_path / "my run")
+    command = r"`endotsr train --out '/.*/my run' --resume`"
+    with pytest.raises(InputError, match=f"000: not trained yet; continue with {command}"):
+        open_any(tmp_path / "my run")
 
 
 def test_commands_take_a_run_of_windows(cold_run, tmp_path, capsys):
@@ -159,6 +177,22 @@ def test_commands_take_a_run_of_windows(cold_run, tmp_path, capsys):
     said = capsys.readouterr().out
     assert "window 001: frames 24:56, cold" in said and "7 held-out frames" in said and "at seams" in said
     assert json.loads((cold_run / "metrics.json").read_text())["seams"]["seam_frames"] == 10
+
+
+def test_a_run_of_windows_is_compared_with_the_pictures_of_another_method(cold_run, recording, tmp_path, capsys):
+    from endotsr.cli.main import main
+
+    whole = endotsr.load_sequence(recording)
+    (tmp_path / "blend").mkdir()
+    for i in whole.test_index:
+        np.save(tmp_path / "blend" / f"{whole.names[i]}.npy", two_neighbours(whole, int(i)))
+    assert main(["evaluate", str(cold_run)]) == 0
+    assert main(["evaluate", "--compare", str(cold_run)]) == 0
+    words = ["evaluate", f"windows={cold_run}", str(tmp_path / "blend"), "--sequence", str(recording)]
+    assert main([*words, "--json", str(tmp_path / "found.json")]) == 0
+    assert "differences to windows, frame by frame" in capsys.readouterr().out
+    rows = {row["label"]: row for row in json.loads((tmp_path / "found.json").read_text())["rows"]}
+    assert rows["blend"]["mean"] == pytest.approx(rows["Blend of the two neighbouring training frames"]["mean"])
 
 
 def test_one_time_is_exported_and_what_holds_one_set_of_gaussians_is_refused(cold_run, tmp_path, capsys):

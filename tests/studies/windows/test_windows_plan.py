@@ -58,6 +58,17 @@ def test_a_frame_is_held_out_in_both_windows_that_share_it(split):
         assert held_out[k - 1] & inner == held_out[k] & inner
 
 
+@pytest.mark.parametrize("block, overlap", [(8, 8), (16, 8), (20, 4)])
+def test_no_window_is_too_short_for_the_split(block, overlap):
+    """A last window without room for a held-out block would end the training of a plan that is written already."""
+    split = SequenceConfig(split="blocks", block_length=block)
+    for count in range(64, 240):
+        found, _ = planned_windows(frames(count), Wanted(64, overlap), split)
+        assert found[-1].end == count
+        for window in found:
+            assert window.count >= 16 and len(split_frames(window.count, split.split, block)[1])
+
+
 def test_a_cut_begins_a_window_that_shares_nothing():
     windows, left_out = planned_windows(frames(120, cut={61: "the camera jumps"}), Wanted(40, 8, 9), SPLIT)
     assert left_out == [] and 61 in [w.first for w in windows]

@@ -1,5 +1,6 @@
 """`endotsr evaluate`: options, the sequence of a folder of pictures, and the comparison of methods."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -111,6 +112,8 @@ def compare_methods(asked: EvaluateOptions) -> None:
     for label, path in named:
         metrics, sequence = _metrics(label, path, asked, [p for _, p in named], sequence)
         methods += methods_of(metrics, label, path, baselines=asked.baselines and not methods)
+    if sequence is None:
+        _refuse_options_of_pictures(asked)
     methods[1:] = sorted(methods[1:], key=lambda method: method.label not in dict(named))  # baselines at the end
     rows = compare(methods, tuple(METRICS), asked.seed)
     print(comparison_table(rows))
@@ -118,6 +121,17 @@ def compare_methods(asked: EvaluateOptions) -> None:
         write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
         replace_text(asked.csv, comparison_csv(rows))
+
+
+def _refuse_options_of_pictures(asked: EvaluateOptions) -> None:
+    """Raises InputError for an option that only pictures need, because every METHOD has its metrics already."""
+    unused = [name for name, given in (("lpips", asked.lpips), ("sequence", asked.sequence)) if given is not None]
+    unused += ["sequence.*"] if asked.settings != SHOWN else []
+    if unused:
+        raise InputError(
+            f"evaluate: --{unused[0]} has no effect: no METHOD is a folder of pictures or a video; `endotsr evaluate"
+            f" RUN` measures a run again, or omit --{unused[0]}"
+        )
 
 
 def _named(word: str) -> tuple[str, Path]:
@@ -134,7 +148,7 @@ def _metrics(
     """The metrics of one method, and the sequence, if it was read for this or an earlier method."""
     if (path / "run.json").exists() or is_windowed(path):
         if not (path / "metrics.json").exists():
-            raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
+            raise InputError(f"{path}: not evaluated yet; `{_evaluate(path)}` writes its metrics.json")
         metrics = read_json(path / "metrics.json")
         if not is_windowed(path):
             _refuse_earlier(path, metrics)
@@ -159,9 +173,14 @@ def _refuse_earlier(path: Path, metrics: Keys) -> None:
     done = read_json(path / "run.json").get("iterations_done")
     if isinstance(measured, int) and isinstance(done, int) and measured != done:
         raise InputError(
-            f"{path}: its metrics.json is of iteration {measured}, its checkpoint of {done}; `endotsr evaluate {path}`"
+            f"{path}: its metrics.json is of iteration {measured}, its checkpoint of {done}; `{_evaluate(path)}`"
             " measures it again"
         )
+
+
+def _evaluate(run: Path) -> str:
+    """The command that evaluates a run, as a shell takes it."""
+    return f"endotsr evaluate {shlex.quote(str(run))}"
 
 
 def _as_dict(row: Any) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from endotsr.cli.parts.progress import StepBar
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.results.report.tables import duration
-from endotsr.training.runs.files import refuse_inside, write_json
+from endotsr.training.runs.files import refuse_inside, refuse_read_only, write_json
 from endotsr.training.runs.sources import SIMULATED
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = 
     from endotsr.studies.windows.scene import WindowFrames, open_windows
 
     scene = open_windows(run)
+    refuse_read_only(run)
     metrics = measure_windows(scene, WindowFrames(scene, source), load_lpips_weights(lpips))
     write_json(run / "metrics.json", metrics)
     for row in metrics["windows"]:

@@ -30,8 +30,8 @@ class PairedDifference(NamedTuple):
     """A paired difference to the first method, over the frames with both values."""
 
     mean: float
-    low: float  # of the interval
-    high: float
+    low: float | None  # of the interval; None for a single frame
+    high: float | None
     better: int  # number of frames on which this method is better
     frames: int
 
@@ -52,18 +52,26 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
     Raises: InputError if the dictionary is not from `endotsr evaluate`.
     """
     try:
-        about: Any = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
-        digests = {name: str(about["arrays_sha256"][name]) for name in ("images", "masks")}
-        rows = {label: metrics["held_out"]["per_frame"]}
+        hashes = _hashes(metrics)
+        digests = {name: str(hashes[name]) for name in ("images", "masks")}
+        rows = [(label, metrics["held_out"]["per_frame"])]  # no dictionary: a baseline may have the label
         if baselines:
-            rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
-        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
+            rows += [(entry["label"], entry["per_frame"]) for entry in metrics["baselines"].values()]
+        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows]
         for method in methods:
             _frames(method)
             _about(method)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
     return methods
+
+
+def _hashes(metrics: EvaluationRecord) -> Any:
+    """SHA-256 by name of an array; a run of windows has them beside its windows."""
+    found: Any = metrics
+    if "windows" not in metrics:
+        found = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
+    return found["arrays_sha256"]
 
 
 def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:
@@ -122,7 +130,7 @@ def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference 
     known = difference[np.isfinite(difference)]
     if not known.size:
         return None
-    low, high = interval(known, seed)
+    low, high = interval(known, seed) if known.size > 1 else (None, None)
     better = int(np.count_nonzero(known < 0 if metric in SMALLER_IS_BETTER else known > 0))
     return PairedDifference(float(known.mean()), low, high, better, known.size)
 

@@ -57,8 +57,10 @@ def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut
             covered[label] += int((known & (depth > 0)).sum())
             columns[label].append(depth[common])
     truth = np.concatenate(truths).astype(np.float64) if truths else np.empty(0)
-    if not truth.size:
+    if not total:
         return {"reason": "no held-out frame has a prior depth on tissue"}
+    if not truth.size:
+        return {"reason": "no pixel of the held-out priors has a depth in the model and in the training priors too"}
     rows = [
         _errors(label, np.concatenate(parts), truth) | {"covered": covered[label] / total}
         for label, parts in columns.items()

@@ -108,6 +108,13 @@ def held_out_means(evaluation: EvaluationRecord, measured: FramesMeasured) -> tu
     return measured_rows(within, 0)["mean"], measured_rows(beyond, 0)["mean"]
 
 
+def all_extrapolated(evaluation: EvaluationRecord) -> bool:
+    """Whether there are held-out frames, but none between two training frames."""
+    outside = set((evaluation.get("frames") or {}).get("extrapolated") or ())
+    rows = (evaluation.get("held_out") or {}).get("per_frame") or []
+    return bool(rows) and all(row["frame"] in outside for row in rows)
+
+
 def left_out(evaluation: EvaluationRecord) -> list[str]:
     """Names of the held-out frames without a tissue PSNR, which the means exclude."""
     rows = (evaluation.get("held_out") or {}).get("per_frame") or []

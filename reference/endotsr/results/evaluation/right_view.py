@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.sequence import IN_MEMORY, Sequence
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -27,6 +27,7 @@ from endotsr.results.evaluation.baselines import unit_image
 from endotsr.results.evaluation.evaluate import training_sample
 from endotsr.results.evaluation.metrics import psnr_tissue, ssim_tissue
 from endotsr.results.evaluation.records import Measured, MeasureRow
+from endotsr.training.runs.sources import SIMULATED
 
 FOLDER = "images_right"
 MATCHED_FRAMES = 5  # number of frames for the stereo baseline
@@ -54,7 +55,7 @@ def right_view(
              "training_ssim"}]} for the model, the warped left picture, and the unchanged left picture; or {"reason"}
     """
     folder = Path(source) / FOLDER
-    if not folder.is_dir():
+    if source in (SIMULATED, IN_MEMORY) or not folder.is_dir():  # these words name no folder
         return {"reason": f"the sequence has no {FOLDER}/"}
     right = _right_pictures(folder, sequence, settings)
     found = stereo_baseline(sequence, right)

@@ -34,7 +34,8 @@ def comparison_table(rows: list[Row]) -> str:
         if d := row.difference:
             name, digits = METRICS[row.metric]
             mean, low, high = (fixed(value, digits, "+") for value in (d.mean, d.low, d.high))
-            lines.append([row.label, name, mean, f"{low} to {high}", f"{d.better} of {d.frames} frames"])
+            limits = "-" if d.low is None else f"{low} to {high}"
+            lines.append([row.label, name, mean, limits, f"{d.better} of {d.frames} frames"])
     if not lines:
         return means
     paired = plain(["", "metric", "difference", f"{CONFIDENCE:.0%} interval", "better on"], lines, left=(0, 1))

@@ -55,7 +55,7 @@ def charts(log: LogEntries, evaluation: EvaluationRecord | None = None) -> list[
     if series(log, "loss")[0].size:
         found.append(Chart("Loss", lambda axes, theme: _draw_loss(axes, theme, log)))
     if series(log, "psnr")[0].size:
-        found.append(Chart("PSNR of the training view, dB", lambda a, t: _draw_psnr(a, t, log, evaluation)))
+        found.append(Chart("PSNR of the training view, tissue, dB", lambda a, t: _draw_psnr(a, t, log, evaluation)))
     if any(series(log, key)[0].size for key in TERMS):
         found.append(Chart("Loss terms", lambda axes, theme: _draw_terms(axes, theme, log)))
     if series(log, "gaussians")[0].size:
@@ -171,7 +171,7 @@ def _draw_psnr(axes: Any, theme: Theme, log: LogEntries, evaluation: EvaluationR
     _curve(axes, log, "psnr", theme.colours[0], "training view")
     levels = (("held_out", "held-out frames, end", "--", 1), ("training", "training frames, end", ":", 2))
     for key, label, dashes, colour in levels:
-        value = (((evaluation or {}).get(key) or {}).get("mean") or {}).get("psnr_full")
+        value = (((evaluation or {}).get(key) or {}).get("mean") or {}).get("psnr_tissue")  # as in the log
         if value is not None:
             axes.axhline(
                 value, color=theme.colours[colour], linestyle=dashes, linewidth=1.4, label=f"{label} {value:.2f}"

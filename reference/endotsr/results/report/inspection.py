@@ -62,8 +62,9 @@ def _value(value: Any) -> str:
 def _headline(title: str, inspection: Inspection, plan: Plan) -> str:
     verdicts = inspection.verdicts.values()
     present = [v.effect for v in verdicts if v.present and v.kind not in (UNKNOWN, *SMALL)]
-    found = f"Found: {', '.join(present)}." if present else "No effect was found: the tissue is static."
     unknown = [v.effect for v in verdicts if v.kind == UNKNOWN]
+    static = "No effect was found." if unknown else "No effect was found: the tissue is static."
+    found = f"Found: {', '.join(present)}." if present else static
     found += f" Undecided: {', '.join(unknown)}." if unknown else ""
     cards = [
         (f"{255 * inspection.noise.level:.2f}", "grey levels", "noise, standard deviation"),

@@ -7,10 +7,13 @@ the evaluation the page redirects to the report.
 """
 
 import contextlib
+import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
+
+import numpy as np
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config
@@ -108,7 +111,7 @@ class LivePage:
         out = render_at(state.gaussians, self._spectral, self._config, camera, time_, frames=state.frames)
         truth, mask = self._sequence.frame(index).image, self._sequence.masks[index]
         self._psnr.x.append(float(state.iteration))
-        self._psnr.y.append(psnr_tissue(out.colour, truth, mask))
+        self._psnr.y.append(psnr_tissue(np.clip(out.colour, 0, 1), truth, mask))  # as in the log and the report
         shown = "".join(
             parts.figure(label, parts.image(bytes_image(colour), label))
             for label, colour in (("Render", out.colour), ("Truth", truth))
@@ -149,4 +152,4 @@ def _advice(status: str, folder: Path) -> str:
         return "This page updates itself during training."
     if status == "finished":
         return "After the evaluation, this page redirects to the report."
-    return f"Continue with <code>endotsr train --out {parts.text(folder)} --resume</code>."
+    return f"Continue with <code>endotsr train --out {parts.text(shlex.quote(str(folder)))} --resume</code>."

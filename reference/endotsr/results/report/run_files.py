@@ -56,7 +56,7 @@ def write_evaluation(
         title=f"{Path(about.get('source', '')).name}: {folder.path.absolute().name}",
         evaluation=metrics,
         log=log,
-        frames=_worst_frames(sequence, metrics["held_out"]["per_frame"], held_out),
+        frames=worst_frames(sequence, metrics["held_out"]["per_frame"], held_out),
         configuration=config_to_toml(folder.config()),
         depth_unit=sequence.unit,
         preview=preview,
@@ -94,10 +94,13 @@ def _link(source: Path, target: Path) -> None:
         shutil.copyfile(source, target)
 
 
-def _worst_frames(
+def worst_frames(
     sequence: Sequence, per_frame: list[FrameMetrics], held_out: Callable[[int], RenderOut]
 ) -> tuple[FramePictures, ...]:
+    """The worst held-out frames in order of time; frames without tissue where no others are left."""
     rows, seen = {row["frame"]: row for row in per_frame}, times_seen(sequence)
+    # A frame without tissue has no value either, and nothing to show.
+    order = sorted(worst_first(rows), key=lambda frame: not sequence.masks[frame].any())
     return tuple(
         FramePictures(
             index=i,
@@ -110,7 +113,7 @@ def _worst_frames(
             metrics=rows[i],
             seen=seen,
         )
-        for i in sorted(worst_first(rows)[:MOST_SHOWN])
+        for i in sorted(order[:MOST_SHOWN])
     )
 
 

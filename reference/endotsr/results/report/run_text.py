@@ -3,7 +3,7 @@
 In: the dictionary of metrics.json. Out: plain text.
 """
 
-from endotsr.results.evaluation.evaluate import held_out_means, left_out
+from endotsr.results.evaluation.evaluate import all_extrapolated, held_out_means, left_out
 from endotsr.results.evaluation.records import EvaluationRecord, FramesMeasured, Means, MotionPart, PosePart, RunPart
 from endotsr.results.report.tables import duration, fixed, plain
 
@@ -84,12 +84,13 @@ def _means_table(head: str, rows: list[tuple[str, Means]]) -> str:
 def interpolation_sentence(metrics: EvaluationRecord) -> str:
     """A sentence if the blend of the two neighbouring frames predicts the frames between better than the model.
 
-    Edges   "" if the model is level or above in PSNR of the tissue, or one of the two has no finite value. Where the
-            model has the lower LPIPS, the sentence is restricted to PSNR. A second sentence follows if the model is
-            below the blend on its own training frames too: it is not fitted yet.
+    Edges   "" if the model is level or above in PSNR of the tissue, if one of the two has no finite value, or if no
+            held-out frame is between training frames. Where the model has the lower LPIPS, the sentence is
+            restricted to PSNR. A second sentence follows if the model is below the blend on its own training frames
+            too: it is not fitted yet.
     """
     blend = metrics["baselines"].get("two_neighbours")
-    if blend is None:
+    if blend is None or all_extrapolated(metrics):
         return ""
     ours, theirs = (held_out_means(metrics, entry)[0] for entry in (metrics["held_out"], blend))
     model, best = ours.get("psnr_tissue"), theirs.get("psnr_tissue")

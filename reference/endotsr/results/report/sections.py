@@ -7,6 +7,7 @@ links to the viewer page, if there is one.
 
 import numpy as np
 
+from endotsr.results.evaluation.evaluate import all_extrapolated
 from endotsr.results.report import curves, figures, parts
 from endotsr.results.report.data import DECIDING, FramePictures, ReportData
 from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
@@ -113,7 +114,7 @@ def _motion(data: ReportData) -> str:
     sentences = []
     faded = mean_of(data, "cross_fade").get("psnr_tissue")
     ours = mean_of(data, "held_out").get("psnr_tissue")
-    if faded is not None and ours is not None:
+    if faded is not None and ours is not None and not all_extrapolated(data.evaluation):
         word, what = ("above", "adds") if ours > faded else ("below", "adds no")
         sentences.append(
             f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "

@@ -66,6 +66,11 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
     return own / slow
 
 
+def played_rate(file: Path, rate: float) -> float:
+    """Pictures per second at which a film plays; those of a gif last a whole number of hundredths of a second."""
+    return HUNDREDTHS / _hundredths(rate) if file.suffix.lower() == ".gif" else rate
+
+
 def speed_in_words(times: list[float], duration: float, rate: float) -> str:
     """The speed of a film relative to the recording, as the end of a sentence; "" if unknown."""
     seconds = (times[-1] - times[0]) * duration
@@ -115,8 +120,13 @@ def _write_gif(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
         raise InputError(f"{file}: a film needs a picture")
     palette = _palette(frames)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for frame in frames]
-    milliseconds = 10 * max(2, round(HUNDREDTHS / rate))  # browsers replace shorter durations by 100 ms
+    milliseconds = 10 * _hundredths(rate)
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
+
+
+def _hundredths(rate: float) -> int:
+    """Duration of a picture of a gif, hundredths of a second; browsers replace less than 2 by 10."""
+    return max(2, round(HUNDREDTHS / rate))
 
 
 def _palette(frames: list[Any]) -> Any:

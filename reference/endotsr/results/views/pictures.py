@@ -3,6 +3,7 @@
 In: a scene and its views. Out: a folder with colour/, depth/, opacity/ and render.json; or a film of panels in a row.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
@@ -130,18 +131,24 @@ def rendered(scene: MovingScene, views: list[PlannedView], look: Look) -> Iterat
         yield view, out if look.depth == "accumulated" else out._replace(depth=normalised_depth(out))
 
 
+def dropped(pictures: Iterator[tuple[PlannedView, RenderOut]]) -> None:
+    """Consume pictures without keeping any of them."""
+    deque(pictures, maxlen=0)
+
+
 def write_pictures(
     out: Path,
     scene: MovingScene,
     pictures: Iterator[tuple[PlannedView, RenderOut]],
     look: Look,
     npy: bool = False,
-    consume: Callable[[Iterator[tuple[PlannedView, RenderOut]]], object] = list,
+    consume: Callable[[Iterator[tuple[PlannedView, RenderOut]]], object] = dropped,
 ) -> int:
     """Write a folder atomically; returns the number of pictures.
 
     npy       also write float arrays
-    consume   consumes the pictures after they are written, for example to write a film of the same renders
+    consume   consumes the pictures after they are written, for example to write a film of the same renders; the default
+              keeps none of them
     """
     out.absolute().parent.mkdir(parents=True, exist_ok=True)
     entries: list[PictureEntry] = []

@@ -23,6 +23,7 @@ ROW_KEYS = (
     "cross_fade_psnr_full", "cross_fade_psnr_tissue", "preset", "width", "height", "threads", "baselines", "measures",
     "arrays_sha256", "per_frame",
 )  # fmt: skip
+DRAWN = "psnr_full"  # metric of ablation.png
 UNRECORDED = (
     "Input not recorded: these runs are paired by sequence and seed; no hash shows that they read the same files."
 )
@@ -99,7 +100,7 @@ def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> Ablatio
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
     replace_text(out / FILES[1], ablation_markdown(record) + "\n")
-    if record["increments"]:
+    if any(found["metric"] == DRAWN for found in record["increments"]):
         draw(record, out / FILES[2])
     return record
 
@@ -158,7 +159,7 @@ def interval_text(found: IncrementRow, of: str, digits: int) -> str:
     return "-" if low is None or high is None else f"{low:+.{digits}f} to {high:+.{digits}f}"
 
 
-def draw(record: AblationRecord, path: Path, metric: str = "psnr_full") -> None:
+def draw(record: AblationRecord, path: Path, metric: str = DRAWN) -> None:
     """Plot mean differences with intervals, a line per comparison and a panel per split; crosses: published values."""
     chosen = [found for found in record["increments"] if found["metric"] == metric]
     splits = list(dict.fromkeys(found["split"] for found in chosen))

@@ -25,6 +25,7 @@ from endotsr.method.kernels.machine import usable_cores
 from endotsr.studies.sweeps.execute import FAILED, Outcome, execute
 from endotsr.studies.sweeps.jobs import STOP, Job
 from endotsr.training.runs.machine import versions
+from endotsr.untrusted.names import plain_line
 
 TICK = 0.5  # seconds between two polls of the runs
 PATIENCE = 15.0  # seconds to wait for the scheduler, and for its first worker
@@ -144,7 +145,7 @@ def _outcome(job: Job, future: Any) -> Outcome:
     if future.status in ("cancelled", "lost"):
         return Outcome(job.name, FAILED, f"the workers that held its sequence were lost {MOST_LOSSES + 1} times")
     error = future.exception()
-    return Outcome(job.name, FAILED, f"{type(error).__name__}: {str(error).splitlines()[0]}")
+    return Outcome(job.name, FAILED, plain_line(f"{type(error).__name__}: {error}"))
 
 
 @contextlib.contextmanager
@@ -182,7 +183,7 @@ def _refuse_workers(client: Any, out: Path) -> None:
     (out / TOKEN).write_text(token, encoding="ascii", newline="\n")
     for worker, found in client.run(_seen, str(out / TOKEN), on_error="return").items():
         if isinstance(found, BaseException):
-            raise InputError(f"worker {worker}: cannot load endotsr: {str(found).splitlines()[0]}; allowed: {expected}")
+            raise InputError(f"worker {worker}: cannot load endotsr: {plain_line(repr(found))}; allowed: {expected}")
         if wrong := _difference(found[0], expected):
             raise InputError(f"worker {worker}: {wrong}")
         if found[1] != token:

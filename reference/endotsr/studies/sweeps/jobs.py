@@ -5,7 +5,7 @@ folder. A job is self-contained: another process or machine can execute it.
 """
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -20,6 +20,8 @@ from endotsr.training.runs.files import read_json
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.records import StartPart
 from endotsr.training.runs.sources import SIMULATED
+from endotsr.untrusted.json import Keys
+from endotsr.untrusted.sections import checked
 from endotsr.untrusted.toml import by_key
 
 if TYPE_CHECKING:
@@ -161,10 +163,26 @@ def measured_at_the_end(job: Job) -> bool:
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:
     """Raises InputError if the folder contains a run with other settings than the job, threads excepted."""
-    theirs = by_key(msgspec.to_builtins(folder.config()))
-    for key, value in by_key(msgspec.to_builtins(job.config)).items():
+    theirs, ours = by_key(msgspec.to_builtins(folder.config())), by_key(msgspec.to_builtins(job.config))
+    with contextlib.suppress(InputError):  # a record that cannot be read ends this run alone, when it continues
+        recorded, wanted = _beside_settings(job, folder)
+        theirs, ours = theirs | recorded, ours | wanted
+    for key, value in ours.items():
         if theirs[key] != value and key not in ("preset", "training.threads"):
             raise InputError(
                 f"{folder.path}: contains a run with {key} = {theirs[key]!r}, but the sweep has {value!r}; allowed: the"
                 " original settings of the sweep, or another --out"
             )
+
+
+def _beside_settings(job: Job, folder: RunFolder) -> tuple[Keys, Keys]:
+    """Simulator and start of the run in a folder, and of the job. They are in run.json and not in config.toml."""
+    record, start = folder.record(), job.start._asdict() if isinstance(job.start, Start) else {}
+    simulator = checked(record.get("input", {}).get("simulator", {}), SimulatorSettings, str(folder.path))
+    return _as_keys(job, record.get("start") or {}, simulator), _as_keys(job, start, job.simulator)
+
+
+def _as_keys(job: Job, start: Mapping[str, object], simulator: SimulatorSettings) -> Keys:
+    found = {f"start.{key}": start.get(key) for key in ("configuration", "iteration")}
+    used = by_key(msgspec.to_builtins(simulator)) if job.source == SIMULATED else {}
+    return found | {f"simulator.{key}": value for key, value in used.items()}

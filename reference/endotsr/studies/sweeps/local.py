@@ -22,6 +22,7 @@ from pathlib import Path
 
 from endotsr.studies.sweeps.execute import FAILED, Outcome, execute
 from endotsr.studies.sweeps.jobs import STOP, Job
+from endotsr.untrusted.names import plain_line
 
 TICK = 1.0  # seconds between two updates of the progress
 MOST_LOSSES = 3  # killed processes after which a run counts as failed
@@ -103,7 +104,9 @@ def _until_broken(
 
 def _outcome(job: Job, future: Future[Outcome]) -> Outcome:
     error = future.exception()
-    return future.result() if error is None else Outcome(job.name, FAILED, f"{type(error).__name__}: {error}")
+    if error is None:
+        return future.result()
+    return Outcome(job.name, FAILED, plain_line(f"{type(error).__name__}: {error}"))
 
 
 @contextlib.contextmanager

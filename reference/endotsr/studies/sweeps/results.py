@@ -134,15 +134,20 @@ def results_markdown(rows: list[RunRow]) -> str:
     failed = [row for row in rows if row["status"] == FAILED]
     columns = [column for column in SHOWN if any(row.get(column[0]) is not None for row in finished)]
     cells = (
-        [*(str(row[key]) for key in ABOUT), *(_cell(row.get(key), form) for key, _, form in columns)]
+        [*(_text(row[key]) for key in ABOUT), *(_cell(row.get(key), form) for key, _, form in columns)]
         for row in finished
     )
     parts = [f"{len(finished)} of {len(rows)} runs finished, {len(failed)} failed."]
     if finished:
         parts.append(markdown([*ABOUT, *(head for _, head, _ in columns)], cells))
     if failed:
-        parts.append("\n".join(f"- {row['name']}: {row.get('reason')}".replace("|", "\\|") for row in failed))
+        parts.append("\n".join(f"- {_text(row['name'])}: {_text(row.get('reason'))}" for row in failed))
     return "\n\n".join(parts)
+
+
+def _text(value: Any) -> str:
+    """A name or a reason in Markdown: a bar would begin a cell."""
+    return str(value).replace("|", "\\|")
 
 
 def _cell(value: Any, form: str) -> str:

@@ -28,7 +28,7 @@ from endotsr.results.evaluation.measures import check_measures
 from endotsr.training.runs.sources import SIMULATED
 from endotsr.untrusted.json import Keys, Text, integer
 from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
-from endotsr.untrusted.toml import read_toml
+from endotsr.untrusted.toml import by_key, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")
 SPLITS = get_args(next(field.type for field in msgspec.structs.fields(SequenceConfig) if field.name == "split"))
@@ -156,10 +156,18 @@ def _configuration(name: str, values: Any, file: SpecFile, where: str) -> Config
     if iterations := keys.iterations or file.iterations:
         config = with_iterations(config, iterations)
     for changes in (file.settings, {key: value for key, value in values.items() if key not in own}):
+        _refuse_overridden(changes, file, here)
         config = _changed(config, changes, here)
     if keys.start:
         integer(keys.start.iteration, f"{here}.start.iteration", low=1, high=config.training.iterations - 1)
     return Configuration(name, config, keys.start)
+
+
+def _refuse_overridden(changes: Keys, file: SpecFile, where: str) -> None:
+    """Raises InputError for a setting that the seeds and splits of the sweep replace in every run."""
+    for key, instead in (("training.seed", "seeds"), ("sequence.split", "splits")):
+        if key in by_key(changes) and getattr(file, instead):
+            raise InputError(f"{where}: {key} has no effect: {instead} sets it in every run; allowed: {instead} alone")
 
 
 def _changed(config: Config, changes: Keys, where: str) -> Config:

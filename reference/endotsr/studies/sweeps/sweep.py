@@ -8,6 +8,7 @@ or on a cluster. Out: the rows of the table in the order of the spec.
 """
 
 import contextlib
+from collections import Counter
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -131,6 +132,8 @@ def run_sweep(
         on_rows(list(rows.values()))
         for name, reason in plan.failed.items():
             reporter.say(f"failed before: {name}: {reason}")
+        for name, count in _without(plan).items():
+            reporter.say(f"{name}: {count} finished runs are without it; a finished run is not measured again")
         jobs = {job.name: job for job in plan.left}
         advice = lambda: f"{_count(rows)} runs are finished; the same command continues"
         try:
@@ -144,6 +147,17 @@ def run_sweep(
         except KeyboardInterrupt:
             raise KeyboardInterrupt(advice()) from None
         return list(rows.values())
+
+
+def _without(plan: SweepPlan) -> Counter[str]:
+    """Measurement -> number of finished runs without it, as after a change of `measures` or `lpips`."""
+    found = Counter[str]()
+    for job in plan.jobs:
+        row = plan.rows[job.name]
+        if row["status"] == FINISHED:
+            found.update(name for name in job.measures if name not in row.get("measures", {}))
+            found.update(["lpips"] if job.lpips is not None and row.get("lpips") is None else [])
+    return found
 
 
 def as_they_end(

@@ -97,7 +97,10 @@ def simulated_scene(
 
 
 def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
-    """The latest checkpoint of a run at its middle held-out frame. Raises InputError for a run without checkpoint."""
+    """The latest checkpoint of a run at its middle held-out frame, or training frame if none is held out.
+
+    Raises: InputError for a run without checkpoint.
+    """
     from endotsr.training.fitting.model import corrected_cameras
     from endotsr.training.runs.folder import open_run
     from endotsr.training.runs.model import load_model
@@ -106,10 +109,12 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     model = load_model(folder)
     record = folder.sequence_record()
     cameras = corrected_cameras(model.frames, record.frame_cameras, record.times)
-    frame = record.test_index[len(record.test_index) // 2]
+    frames = record.test_index or record.train_index
+    frame = frames[len(frames) // 2]
+    kind = "held-out" if record.test_index else "training"
     return StudyScene(
         Path(path).resolve().name,
-        f"run after {model.iteration} iterations, held-out frame {frame}",
+        f"run after {model.iteration} iterations, {kind} frame {frame}",
         model.gaussians,
         model.spectral,
         model.config.model,

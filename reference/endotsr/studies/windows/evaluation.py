@@ -50,8 +50,9 @@ class LeftOutRow(TypedDict):
 
 
 class WindowedEvaluation(EvaluationRecord):
-    """metrics.json of a windowed run; without a held-out frame it has the windows, gaps and seams alone."""
+    """metrics.json of a windowed run; without a held-out frame it has these keys and `format` alone."""
 
     windows: list[WindowRow]
     left_out: list[LeftOutRow]
     seams: Seams
+    arrays_sha256: dict[str, str]  # of `images` and `masks` of the covered frames, each frame once

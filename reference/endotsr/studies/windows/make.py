@@ -7,6 +7,7 @@ failed starts cold. Finished windows are kept; unfinished ones continue from the
 """
 
 import contextlib
+import shlex
 from pathlib import Path
 
 from endotsr.clips.sequences.splits import split_frames
@@ -103,11 +104,12 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
         try:
             for wave in waves(record):
                 todo = [window_job(run, record, k, config, cold=_starts_cold(jobs[k], found, reporter)) for k in wave]
-                _made(todo, outcomes, reporter, watch, found)
+                _made(record, todo, outcomes, reporter, watch, found)
         except KeyboardInterrupt:
             done = sum(outcome.status == FINISHED for outcome in found.values())
             raise KeyboardInterrupt(
-                f"{done} of {len(jobs)} windows are finished; continue with `endotsr train --out {run} --resume`"
+                f"{done} of {len(jobs)} windows are finished; continue with"
+                f" `endotsr train --out {shlex.quote(str(run))} --resume`"
             ) from None
     return [found[job.name] for job in jobs]
 
@@ -198,7 +200,14 @@ def _starts_cold(job: Job, found: dict[str, Outcome], reporter: Reporter) -> boo
     return True
 
 
-def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch, found: dict[str, Outcome]) -> None:
+def _made(
+    record: WindowsRecord,
+    jobs: list[Job],
+    outcomes: Outcomes,
+    reporter: Reporter,
+    watch: Watch,
+    found: dict[str, Outcome],
+) -> None:
     """Execute the jobs of one wave; add their outcomes to `found`."""
     left = []
     for job in jobs:
@@ -210,13 +219,14 @@ def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch,
     with contextlib.closing(as_they_end(left, outcomes, reporter, watch, advice)) as made:
         for outcome in made:
             found[outcome.name] = outcome
-            reporter.say(_line(next(job for job in left if job.name == outcome.name), outcome))
+            job = next(job for job in left if job.name == outcome.name)
+            reporter.say(_line(record.windows[int(job.name)], job, outcome))
     for job in left:  # a stopped pool yields no outcome
         found.setdefault(job.name, Outcome(job.name, FAILED, "not executed"))
 
 
-def _line(job: Job, outcome: Outcome) -> str:
-    frames = job.config.sequence.frames.rsplit(":", 1)[0]
+def _line(window: Window, job: Job, outcome: Outcome) -> str:
+    frames = f"{window.first}:{window.end}"  # of the recording, as in the plan
     if outcome.status != FINISHED:
         return f"window {job.name} (frames {frames}): {outcome.status}: {outcome.reason}"
     trained = window_cost(Path(job.folder))

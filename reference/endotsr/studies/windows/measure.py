@@ -13,6 +13,7 @@ The root mean square of d over the tissue is reported for frames in an overlap (
 the model and for the recorded frames. Unlike `evaluation.measures.flicker`, it also applies to a moving camera.
 """
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import cast
@@ -33,6 +34,7 @@ from endotsr.results.evaluation.lpips import LpipsWeights
 from endotsr.results.evaluation.records import EvaluationRecord, FramesMeasured, FramesPart, LabelledFrames
 from endotsr.studies.windows.evaluation import Flicker, LeftOutRow, Seams, WindowedEvaluation, WindowRow
 from endotsr.studies.windows.make import window_cost
+from endotsr.studies.windows.record import Window
 from endotsr.studies.windows.scene import WindowedScene, WindowFrames
 
 LEVELS = 255.0  # flicker is given in 8-bit grey levels
@@ -46,9 +48,12 @@ def measure_windows(
 
     returns   the keys of `evaluate_model`, joined over the windows, with those of `WindowedEvaluation`
     """
-    found = [_measured(scene, frames, k, weights) for k in range(len(scene.plan.windows))]
+    found, shown = [], _Covered()
+    for k, window in enumerate(scene.plan.windows):
+        shown.add(window, frames.of_window(k))
+        found.append(_measured(scene, frames, k, weights))
     known = [entry for entry in found if entry is not None]
-    joined = _joined(known) if known else cast(EvaluationRecord, {"format": FORMAT})
+    joined = _joined(known, scene, shown.tissue) if known else cast(EvaluationRecord, {"format": FORMAT})
     rows: list[WindowRow] = [
         {
             "name": window.name,
@@ -60,7 +65,34 @@ def measure_windows(
         for window, folder, entry in zip(scene.plan.windows, scene.folders, found)
     ]
     gaps: list[LeftOutRow] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
-    return {**joined, "windows": rows, "left_out": gaps, "seams": _seams(scene, frames)}
+    return {**joined, "windows": rows, "left_out": gaps, "seams": _seams(scene, frames), "arrays_sha256": shown.digests}
+
+
+class _Covered:
+    """The frames that the windows cover, each of them once: SHA-256 of pictures and masks, and the tissue."""
+
+    def __init__(self) -> None:
+        self._hashes = {name: hashlib.sha256() for name in ("images", "masks")}
+        self._tissue: list[float] = []
+        self._end = 0  # of the windows that were added
+
+    def add(self, window: Window, sequence: Sequence) -> None:
+        """Add the frames of a window that no earlier one shares with it."""
+        for i in range(max(0, self._end - window.first), sequence.count):
+            for name, found in self._hashes.items():
+                found.update(getattr(sequence, name)[i].tobytes())  # as `runs.sources.digest` of the whole recording
+            self._tissue.append(float(sequence.masks[i].mean()))
+        self._end = window.end
+
+    @property
+    def tissue(self) -> float:
+        """Fraction of the pixels."""
+        return float(np.mean(self._tissue))
+
+    @property
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of `images` and `masks`."""
+        return {name: found.hexdigest() for name, found in self._hashes.items()}
 
 
 def _measured(
@@ -98,19 +130,19 @@ def _rendered(scene: WindowedScene, g: int) -> FloatArray:
     return scene.render(g / scene.plan.frames, camera).colour
 
 
-def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
-    """The metrics of all windows as one sequence: concatenated rows and means over all rows."""
+def _joined(parts: list[EvaluationRecord], scene: WindowedScene, tissue: float) -> EvaluationRecord:
+    """The metrics of all windows as one sequence: concatenated rows, means over all rows, and every frame once."""
 
     def joined_rows(found: list[FramesMeasured]) -> FramesMeasured:
         rows = [row for part in found for row in part["per_frame"]]
         return measured_rows(rows, sum(part["not_finite"] for part in found))
 
     frames: FramesPart = {
-        "total": sum(part["frames"]["total"] for part in parts),
-        "training": sum(part["frames"]["training"] for part in parts),
+        "total": len(scene.frames),
+        "training": len(scene.record.train_index),
         "held_out": [i for part in parts for i in part["frames"]["held_out"]],
         "training_sample": [i for part in parts for i in part["frames"]["training_sample"]],
-        "tissue_fraction": float(np.mean([part["frames"]["tissue_fraction"] for part in parts])),
+        "tissue_fraction": tissue,
         "extrapolated": [i for part in parts for i in part["frames"].get("extrapolated", ())],
         "coverage": [row for part in parts for row in part["frames"].get("coverage") or ()] or None,
     }

@@ -88,7 +88,7 @@ def planned_windows(
         if reason := _too_short(stretch, split):
             left_out.append(LeftOut(first=stretch.first, end=stretch.end, reason=reason))
             continue
-        windows += _windows_of(stretch, frames, wanted, split_period(split), len(windows))
+        windows += _windows_of(stretch, frames, wanted, split, len(windows))
     return windows, sorted(left_out, key=lambda gap: gap.first)
 
 
@@ -129,14 +129,18 @@ def _too_short(stretch: Stretch, split: SequenceConfig) -> str:
     return ""
 
 
-def _windows_of(stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted, period: int, named: int) -> list[Window]:
+def _windows_of(
+    stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted, split: SequenceConfig, named: int
+) -> list[Window]:
     """The windows of a stretch; `named` is the number of windows before it."""
+    period = split_period(split)
     length, least = stretch.end - stretch.first, _least_stride(wanted, period)
     sums = np.concatenate([[0.0], np.cumsum(_densities(stretch, frames, wanted))])
     count = max(1, int(np.ceil(sums[-1] - 1e-9)))
     starts = [0]
     for begin in np.searchsorted(sums, sums[-1] * np.arange(1, count) / count) // period * period:
-        if starts[-1] + least <= begin <= length - wanted.overlap - LEAST_WINDOW // 2:
+        last = Stretch(stretch.first + int(begin), stretch.end, "")  # the window, if no other begins after it
+        if starts[-1] + least <= begin <= length - wanted.overlap - LEAST_WINDOW // 2 and not _too_short(last, split):
             starts.append(int(begin))
     ends = [*(start + wanted.overlap for start in starts[1:]), length]
     return [

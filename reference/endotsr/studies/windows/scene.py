@@ -11,6 +11,7 @@ at frame g, and window k has 1 - w. Colour, depth and opacity are blended with t
 memory.
 """
 
+import shlex
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -166,10 +167,12 @@ def refuse_one_set(path: Path, out: Path) -> None:
 def open_windows(run: Path) -> WindowedScene:
     """The scene of a run of windows. Raises InputError if a window has no usable record or no checkpoint."""
     plan = read_record(run)
-    folders = [open_run(window_folder(run, window)) for window in plan.windows]
+    folders = [RunFolder(window_folder(run, window)) for window in plan.windows]
     for folder in folders:
-        if not folder.has_checkpoint:
-            raise InputError(f"{folder.path}: not trained yet; continue with `endotsr train --out {run} --resume`")
+        if not folder.has_checkpoint:  # its folder may not exist either
+            command = f"endotsr train --out {shlex.quote(str(run))} --resume"
+            raise InputError(f"{folder.path}: not trained yet; continue with `{command}`")
+        open_run(folder.path)
     return WindowedScene(_record(plan, [folder.sequence_record() for folder in folders]), run=Path(run), plan=plan)
 
 
@@ -190,7 +193,7 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
     return SequenceRecord(
         unit=records[0].unit,
         largest_depth=max(record.largest_depth for record in records),
-        static_camera=all(record.static_camera for record in records),
+        static_camera=all(record.static_camera and record.cameras == records[0].cameras for record in records),
         names=[names[g] for g in frames],
         times=[g / plan.frames for g in frames],
         train_index=[j for j, g in enumerate(frames) if g in trained],

@@ -60,6 +60,12 @@ def refuse_unwritable(*files: Path | None) -> None:
             raise InputError(f"{file}: cannot be written: no permission")
 
 
+def refuse_read_only(folder: Path) -> None:
+    """Raises InputError if no file can be written in an existing folder."""
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{folder}: cannot be written: no permission; allowed: a folder that can be, such as a copy")
+
+
 def write_json(path: Path, data: Any) -> None:
     """Write JSON atomically, with null for every number that is not finite."""
     replace_text(path, json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n")
