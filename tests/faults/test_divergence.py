@@ -61,6 +61,21 @@ def test_the_iteration_stops_before_a_parameter_is_changed(name, value, trained,
     assert entry == log_without_seconds(trained)[16]
 
 
+def test_the_state_before_a_picture_that_is_not_finite_is_whole_again_when_it_is_read(trained, tmp_path, monkeypatch):
+    """Such a gradient reaches the statistics of density control, of which a checkpoint holds finite numbers alone."""
+    out, image_loss, calls = tmp_path / "run", view.image_loss, [0]
+
+    def spoil(*words, **more):
+        found = image_loss(*words, **more)
+        calls[0] += 1
+        return found._replace(d_colour=found.d_colour * math.nan) if calls[0] == 12 else found
+
+    monkeypatch.setattr(view, "image_loss", spoil)
+    assert main(train_words(out, "--no-evaluate")) == 1
+    monkeypatch.undo()
+    assert repeat_iteration(out) == log_without_seconds(trained)[11]
+
+
 def test_a_run_that_stopped_continues_from_its_checkpoint(trained, tmp_path, monkeypatch):
     out = tmp_path / "run"
     spoiled(monkeypatch, 17, "d_position")
