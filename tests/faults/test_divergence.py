@@ -135,3 +135,12 @@ def test_gaussians_that_run_off_are_said_once(gaussians):
 
 def test_a_scene_without_gaussians_is_watched_too():
     assert watched([0.1] * 200, scene(np.zeros((3, 0)))) == []
+
+
+def test_an_iteration_of_a_coarse_start_is_repeated_on_frames_of_half_size(tmp_path, monkeypatch):
+    whole, out = tmp_path / "whole", tmp_path / "run"
+    assert main(train_words(whole, "--no-evaluate", "--training.coarse-start")) == 0
+    spoiled(monkeypatch, 12, "l1")
+    assert main(train_words(out, "--no-evaluate", "--training.coarse-start")) == 1
+    monkeypatch.undo()
+    assert repeat_iteration(out) == log_without_seconds(whole)[11]
