@@ -144,3 +144,12 @@ def test_an_iteration_of_a_coarse_start_is_repeated_on_frames_of_half_size(tmp_p
     assert main(train_words(out, "--no-evaluate", "--training.coarse-start")) == 1
     monkeypatch.undo()
     assert repeat_iteration(out) == log_without_seconds(whole)[11]
+
+
+def test_a_calibration_that_is_not_finite_is_told_from_the_training(tmp_path, capsys, monkeypatch):
+    """Its base model is no state of the run: there is nothing to repeat."""
+    out = tmp_path / "run"
+    spoiled(monkeypatch, 9, "d_position")
+    code, said = run_line(capsys, *train_words(out, "--no-evaluate", "--loss.lambda-lap", "auto"))
+    assert code == 1 and "calibration of loss.lambda_lap: iteration 9, frame " in said
+    assert "diverged.npz" not in said and not (out / "diverged.npz").exists()

@@ -112,13 +112,19 @@ def train(
 
 
 def calibrated_weight(sequence: Sequence, config: Config) -> float:
-    """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate."""
+    """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate.
+
+    Raises: FloatingPointError with iteration, frame and term if a loss or a gradient of the base model is not finite.
+    """
     model = msgspec.structs.replace(config.model, appearance=False, spectral_motion=False, laplacian=False)
     loss = msgspec.structs.replace(config.loss, lambda_lap=0.0)
     base = msgspec.structs.replace(config, model=model, loss=loss)
     constants, state = training_constants(sequence, base), new_training(sequence, base)
-    while state.iteration < config.training.residual_activation:
-        training_step(state, constants)
+    try:
+        while state.iteration < config.training.residual_activation:
+            training_step(state, constants)
+    except Diverged as error:  # of another state than that of the run, whose diverged.npz could not repeat it
+        raise FloatingPointError(f"calibration of loss.lambda_lap: {error}") from None
     return calibrate_on(state.gaussians, constants.spectral, sequence, base, state.frames).lambda_lap
 
 
