@@ -22,6 +22,7 @@ from endotsr.training.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.training.runs.records import RunRecord
 
 if TYPE_CHECKING:
+    from endotsr.clips.sequences.checks.duration import Standing
     from endotsr.clips.sequences.sequence import Sequence
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
@@ -227,12 +228,36 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     if asked.training.iterations > kept.training.iterations:
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
-    resume_run(folder, sequence, threads, _progress(folder, source, sequence, folder.config(), options))
+    config = folder.config()
+    shown = _progress(folder, source, sequence, config, options, _reached(folder, config))
+    resume_run(folder, sequence, threads, shown)
     return folder, sequence
 
 
-def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Config, options: TrainOptions) -> Progress:
-    """The progress of a training, on standard error and as a page in its folder; prints what the command will take."""
+def _reached(folder: RunFolder, config: Config) -> "Standing":
+    """The progress of a run, as far as its records tell it."""
+    from endotsr.clips.sequences.checks.duration import at_start
+    from endotsr.training.runs.log import last_entry
+
+    first, entry = at_start(config), last_entry(folder.log) or {}
+    done, count = folder.record().get("iterations_done") or 0, entry.get("gaussians")
+    if not done or not isinstance(count, int):
+        return first
+    return first._replace(iteration=min(done, config.training.iterations), gaussians=max(count, 0))
+
+
+def _progress(
+    folder: RunFolder,
+    source: str,
+    sequence: "Sequence",
+    config: Config,
+    options: TrainOptions,
+    at: "Standing | None" = None,
+) -> Progress:
+    """The progress of a training, on standard error and as a page in its folder; prints what the command will take.
+
+    at   progress of a run that is resumed; None = a new one
+    """
     import numba
 
     from endotsr.cli.parts.waiting import waiting_line
@@ -249,7 +274,7 @@ def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Conf
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived, vector_factor())
-    print(waiting_line(plan, remembered_unit(threads), done_before(config).exists()))
+    print(waiting_line(plan, remembered_unit(threads), done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))
 
