@@ -65,6 +65,8 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["smoke", "--smoke.start", "0.9", "--smoke.stop", "0.9"], ("smoke.stop = 0.9", "above smoke.start = 0.9")),
         (["still", "--noise.on", "perhaps"], ("perhaps",)),
         (["still", "--noise.of", "1"], ("unknown key noise.of", "on, sigma")),
+        (["still", "--block-length", "2"], ("block_length = 2 does not fit files", "train --sequence.split blocks")),
+        (["still", "--layout", "stereomis", "--block-length", "2"], ("block_length = 2 does not fit files",)),
     ],
 )
 def test_bad_input_is_refused_and_nothing_is_left(tmp_path, capsys, words, named):
