@@ -90,6 +90,9 @@ def train(
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)
         on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
+    if state.iteration == 0 and state.gaussians.count > config.density.maximum:
+        first = f"density.maximum = {config.density.maximum} is below the {state.gaussians.count} first points"
+        on_message(f"{first}: they are kept, and none is added before as many are removed")
     coarse = coarse_start(sequence, config) if state.coarse else None
     if coarse:
         on_message("coarse start: half-size frames until the fit error is below the detail that they lack")
