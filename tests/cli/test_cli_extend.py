@@ -7,6 +7,7 @@ import pytest
 from tiny import assert_refused, log_without_seconds
 
 from endotsr.cli.main import main
+from endotsr.cli.parts import waiting
 from endotsr.config import load_config
 from endotsr.training.fitting.checkpoint import load_checkpoint
 from endotsr.training.runs.folder import RunFolder
@@ -71,3 +72,26 @@ def test_metrics_of_an_earlier_iteration_are_not_compared(run_copy, finished_run
     assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "31", "--no-evaluate"]) == 0
     words = ["evaluate", str(finished_run), f"longer={run_copy}"]
     assert_refused(capsys, words, "its metrics.json is of iteration 30, its checkpoint of 31")
+
+
+def test_an_extension_that_was_stopped_half_way_is_completed_by_the_same_command(run_copy, monkeypatch):
+    """Killed between the checkpoint and config.toml, which then have different lengths."""
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("endotsr.training.runs.training.replace_text", killed)
+    with pytest.raises(KeyboardInterrupt):
+        extend_run(RunFolder(run_copy), 34)
+    monkeypatch.undo()
+    assert load_config(run_copy / "config.toml").training.iterations == 30
+    assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "34", "--no-evaluate"]) == 0
+    assert [entry["iteration"] for entry in log_without_seconds(run_copy)][-1] == 34
+
+
+def test_the_first_line_knows_how_far_the_run_is(run_copy, monkeypatch):
+    heard = []
+    monkeypatch.setattr(waiting, "waiting_line", lambda plan, unit, compiled, at=None: heard.append(at) or "")
+    assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "34", "--no-evaluate"]) == 0
+    (at,) = heard
+    assert at.iteration == 30 and 0 < at.gaussians == log_without_seconds(run_copy)[29]["gaussians"]

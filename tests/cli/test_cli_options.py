@@ -103,6 +103,10 @@ BAD = [
     (["--model.frequency-max", "0.5"], ["model.frequency_max", "model.frequency_min"]),
     (["--density.until", "200"], ["density.until = 200", "density.start = 500", "or 0"]),
     (["--raster.alpha-max", "0.1", "--raster.alpha-cutoff", "0.2"], ["raster.alpha_max = 0.1", "alpha_cutoff = 0.2"]),
+    (["--minutes", "5", "--density.maximum", "900"], ["--minutes with --density.maximum", "use one of them"]),
+    (["--minutes", "5", "--training.no-coarse-start"], ["--minutes with --training.no-coarse-start"]),
+    (["--optimiser.beta1", "1"], ["optimiser.beta1 = 1", "a number >= 0 and < 1"]),
+    (["--optimiser.beta2", "1.0"], ["optimiser.beta2 = 1.0", "a number >= 0 and < 1"]),
 ]
 
 

@@ -21,7 +21,7 @@ from endotsr.clips.sequences.checks.duration import (
     work_left,
 )
 from endotsr.clips.sequences.splits import every_eighth
-from endotsr.config import PRESETS, lengthened
+from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.training.fitting.records import Making
 from endotsr.training.runs.time_left import SLOWED, Timed, unit_seconds
 
@@ -188,6 +188,33 @@ def test_the_first_line_adds_up_and_names_what_comes_first():
     assert "compilation" not in waiting_line(plan, None, compiled=True)
     assert "assumed" in waiting_line(plan, None, compiled=True)
     assert "evaluation" not in waiting_line(plan._replace(perceived=None), None, compiled=True)
+
+
+def test_the_first_line_of_a_resumed_training_tells_what_is_left():
+    plan = plan_of("sharp", 156, 2)._replace(perceived=True)
+    at = at_start(plan.config)._replace(iteration=plan.config.training.iterations - 100, gaussians=80_000)
+    whole, rest = estimated_seconds(plan, 0.05), estimated_seconds(plan, 0.05, at)
+    assert rest.start == 0 and rest.evaluation == whole.evaluation
+    assert rest.iterations == pytest.approx(100 * 0.05, rel=0.2) and 0 < rest.targets < whole.targets
+    assert ": 100 iterations " in waiting_line(plan, 0.05, True, at)
+    assert "iterations" not in waiting_line(plan, 0.05, True, at._replace(iteration=plan.config.training.iterations))
+    assert "initial motion" in waiting_line(plan, 0.05, True, at._replace(iteration=0)), "no checkpoint was written"
+    without = plan._replace(config=with_settings(plan.config, model={"spectral_motion": False}))
+    assert estimated_seconds(without, 0.05).start == 0 < whole.start, "nothing is tracked without component S"
+
+
+def test_the_training_of_the_base_model_is_part_of_the_forecast():
+    """An `auto` weight is calibrated on it before the first iteration; a resumed training has its weight."""
+    given = plan_of("paper", 63, 2)
+    auto = given._replace(config=with_settings(given.config, loss={"lambda_lap": "auto"}))
+    one, other = estimated_seconds(given, 0.1), estimated_seconds(auto, 0.1)
+    assert 0.3 < other.calibration / one.iterations < 0.5, "3000 iterations before 6000"
+    assert other._replace(calibration=0.0) == one and other.training > one.training
+    assert ", calibration " in waiting_line(auto, 0.1, True) or ": calibration " in waiting_line(auto, 0.1, True)
+    at = at_start(given.config)._replace(iteration=10)
+    assert estimated_seconds(given, 0.1, at) == estimated_seconds(auto, 0.1, at)
+    base = with_settings(auto.config, model={"laplacian": False})
+    assert estimated_seconds(auto._replace(config=base), 0.1) == one
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,8 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
     truth = read_truth(tmp_path / "a")
     on = [name for name in ("breathing", "noise", "vignetting", *IN_FILES) if getattr(truth.settings, name).on]
     assert on == ["noise", "vignetting", *IN_FILES] and truth.scene == "noise,vignetting"
+    words = ["--effects", "more_instruments", "--instrument.travel", "0.01"]  # which these move by too
+    assert main(["simulate", *words, "--out", str(tmp_path / "b"), *SMALL]) == 0
 
 
 @pytest.mark.parametrize(
@@ -65,6 +67,10 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["smoke", "--smoke.start", "0.9", "--smoke.stop", "0.9"], ("smoke.stop = 0.9", "above smoke.start = 0.9")),
         (["still", "--noise.on", "perhaps"], ("perhaps",)),
         (["still", "--noise.of", "1"], ("unknown key noise.of", "on, sigma")),
+        (["still", "--motion-blur.shutter", "0.9"], ("--motion-blur.shutter has no effect", "add --motion-blur.on")),
+        (["pulling", "--pull.no-on", "--pull.width", "9"], ("--pull.width has no effect: pull is off",)),
+        (["still", "--block-length", "2"], ("block_length = 2 does not fit files", "train --sequence.split blocks")),
+        (["still", "--layout", "stereomis", "--block-length", "2"], ("block_length = 2 does not fit files",)),
     ],
 )
 def test_bad_input_is_refused_and_nothing_is_left(tmp_path, capsys, words, named):

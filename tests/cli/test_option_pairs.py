@@ -231,6 +231,9 @@ VALUES = {
     "calibrate-only": [], "config": ["mine.toml"], "preset": ["sharp"], "iterations": ["30"], "minutes": ["2"],
     "schedule": ["absolute"], "effects": ["auto"], "windows": ["9"], "resume": [], "no-evaluate": [], "lpips": ["a"],
     "overlap": ["3"], "chain": ["2"], "workers": ["1"], "scheduler": ["tcp://a:1"], "json": ["a.json"],
+    "training.iterations": ["30"], "training.visits-per-frame": ["9"], "density.growth": ["budget"],
+    "density.maximum": ["90"], "density.gradient-threshold": ["0.1"], "initialisation.first-frame-points": ["9"],
+    "initialisation.other-frame-points": ["9"],
 }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from endotsr.cli.parts.options import base_settings
+from endotsr.cli.train import _of_minutes
 from endotsr.clips.sequences.checks.duration import at_start, vector_factor, work_left
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
@@ -78,3 +79,14 @@ def test_a_wish_in_minutes_begins_from_sharp_however_it_is_written(words):
     assert base_settings(words)[0].preset == "sharp"
     assert base_settings([*words, "--preset", "quick"])[0].preset == "quick"
     assert base_settings([])[0].preset == "paper"
+
+
+def test_the_line_on_minutes_is_of_this_clip_and_of_the_points_that_it_starts_with(still, monkeypatch):
+    """The shortest trainings start with more points than density control may reach, and lose none of them."""
+    monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", 64)  # bytes, of a processor with AVX-512
+    monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", lambda *_: False)
+    monkeypatch.setattr(pace, "seconds_of_unit", lambda *_: 0.1)
+    config, line = _of_minutes(SimpleNamespace(minutes=0.13), still, SHARP, 1)
+    points = config.initialisation.first_frame_points + config.initialisation.other_frame_points
+    assert config.density.maximum < points and line.endswith(f" iterations, {points} Gaussians")
+    assert "an iteration of 60 000 Gaussians takes 60 ms" in line, "and 100 ms at 640x512"

@@ -61,6 +61,21 @@ def test_the_iteration_stops_before_a_parameter_is_changed(name, value, trained,
     assert entry == log_without_seconds(trained)[16]
 
 
+def test_the_state_before_a_picture_that_is_not_finite_is_whole_again_when_it_is_read(trained, tmp_path, monkeypatch):
+    """Such a gradient reaches the statistics of density control, of which a checkpoint holds finite numbers alone."""
+    out, image_loss, calls = tmp_path / "run", view.image_loss, [0]
+
+    def spoil(*words, **more):
+        found = image_loss(*words, **more)
+        calls[0] += 1
+        return found._replace(d_colour=found.d_colour * math.nan) if calls[0] == 12 else found
+
+    monkeypatch.setattr(view, "image_loss", spoil)
+    assert main(train_words(out, "--no-evaluate")) == 1
+    monkeypatch.undo()
+    assert repeat_iteration(out) == log_without_seconds(trained)[11]
+
+
 def test_a_run_that_stopped_continues_from_its_checkpoint(trained, tmp_path, monkeypatch):
     out = tmp_path / "run"
     spoiled(monkeypatch, 17, "d_position")
@@ -120,3 +135,21 @@ def test_gaussians_that_run_off_are_said_once(gaussians):
 
 def test_a_scene_without_gaussians_is_watched_too():
     assert watched([0.1] * 200, scene(np.zeros((3, 0)))) == []
+
+
+def test_an_iteration_of_a_coarse_start_is_repeated_on_frames_of_half_size(tmp_path, monkeypatch):
+    whole, out = tmp_path / "whole", tmp_path / "run"
+    assert main(train_words(whole, "--no-evaluate", "--training.coarse-start")) == 0
+    spoiled(monkeypatch, 12, "l1")
+    assert main(train_words(out, "--no-evaluate", "--training.coarse-start")) == 1
+    monkeypatch.undo()
+    assert repeat_iteration(out) == log_without_seconds(whole)[11]
+
+
+def test_a_calibration_that_is_not_finite_is_told_from_the_training(tmp_path, capsys, monkeypatch):
+    """Its base model is no state of the run: there is nothing to repeat."""
+    out = tmp_path / "run"
+    spoiled(monkeypatch, 9, "d_position")
+    code, said = run_line(capsys, *train_words(out, "--no-evaluate", "--loss.lambda-lap", "auto"))
+    assert code == 1 and "calibration of loss.lambda_lap: iteration 9, frame " in said
+    assert "diverged.npz" not in said and not (out / "diverged.npz").exists()

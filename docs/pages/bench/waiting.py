@@ -68,7 +68,7 @@ class Heard:
         self.trained, self.largest_rise, self._least = 0.0, 0.0, float("inf")
         self._about: LivePage | None = None
 
-    def first_line(self, plan: TimedCommand, unit: float | None, compiled: bool) -> str:
+    def first_line(self, plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
         """In place of `waiting_line`."""
         found = estimated_seconds(plan, unit or assumed_unit(plan.threads))
         left = sum(found) - found.reading + (0.0 if compiled else COMPILATION)
@@ -76,7 +76,7 @@ class Heard:
             "at": self.watch.now(), "left": left, "evaluation": found.evaluation, "initial": found.start,
             "speed": "assumed" if unit is None else "measured", "compiled": compiled,
         }  # fmt: skip
-        return LINE(plan, unit, compiled)
+        return LINE(plan, unit, compiled, at)
 
     def update(self, shown: progress.Progress, entry: Any) -> None:
         """In place of `Progress.update`."""

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.clips.simulator.scenes import SCENES, effects_on, named_scene, scene_of
@@ -57,6 +57,7 @@ def run(words: list[str]) -> int:
     base = named_scene(options.scene) if options.scene else STILL
     base = base if options.effects is None else scene_of(options.effects)
     settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings
+    _refuse_idle(settings, given_names(SimulateOptions, words))
     _write(options, settings, options.scene if options.effects is None else options.effects)
     write_result(
         options.json,
@@ -68,6 +69,16 @@ def run(words: list[str]) -> int:
     advice = "train with: endotsr train {} --out RUN" if options.layout == "endonerf" else PREPARE
     print(f"truth in {options.out}/truth; {advice.format(shlex.quote(str(options.out)))}")
     return 0
+
+
+def _refuse_idle(settings: SimulatorSettings, given: frozenset[str]) -> None:
+    """Raises InputError for an option of an effect that is off; further graspers move like the first one."""
+    on = set(effects_on(settings))
+    on |= {"instrument"} if "more_instruments" in on else set()
+    for name in sorted(given):
+        effect, dot, key = name.partition(".")
+        if dot and key != "on" and effect.replace("-", "_") not in on:
+            raise InputError(f"simulate: --{name} has no effect: {effect} is off; add --{effect}.on, or omit --{name}")
 
 
 def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> None:

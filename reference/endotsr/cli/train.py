@@ -22,6 +22,7 @@ from endotsr.training.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.training.runs.records import RunRecord
 
 if TYPE_CHECKING:
+    from endotsr.clips.sequences.checks.duration import Standing
     from endotsr.clips.sequences.sequence import Sequence
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
@@ -194,6 +195,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 
 def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
+    from endotsr.clips.sequences.checks.duration import at_start, iteration_work, vector_factor
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.runs.pace import paced_for, seconds_of_unit
 
@@ -201,9 +203,10 @@ def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, thr
     compile_ahead(config, print)
     unit = seconds_of_unit(sequence, config)
     found = paced_for(options.minutes, sequence, config, unit, threads)
+    late = unit * float(iteration_work(60_000, sequence.width * sequence.height, 1.0, vector_factor()))
     return found, (
-        f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * unit:.0f} ms: "
-        f"{found.training.iterations} iterations, {found.density.maximum} Gaussians"
+        f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * late:.0f} ms: "
+        f"{found.training.iterations} iterations, {max(found.density.maximum, at_start(found).gaussians)} Gaussians"
     )
 
 
@@ -227,12 +230,36 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     if asked.training.iterations > kept.training.iterations:
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
-    resume_run(folder, sequence, threads, _progress(folder, source, sequence, folder.config(), options))
+    config = folder.config()
+    shown = _progress(folder, source, sequence, config, options, _reached(folder, config))
+    resume_run(folder, sequence, threads, shown)
     return folder, sequence
 
 
-def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Config, options: TrainOptions) -> Progress:
-    """The progress of a training, on standard error and as a page in its folder; prints what the command will take."""
+def _reached(folder: RunFolder, config: Config) -> "Standing":
+    """The progress of a run, as far as its records tell it."""
+    from endotsr.clips.sequences.checks.duration import at_start
+    from endotsr.training.runs.log import last_entry
+
+    first, entry = at_start(config), last_entry(folder.log) or {}
+    done, count = folder.record().get("iterations_done") or 0, entry.get("gaussians")
+    if not done or not isinstance(count, int):
+        return first
+    return first._replace(iteration=min(done, config.training.iterations), gaussians=max(count, 0))
+
+
+def _progress(
+    folder: RunFolder,
+    source: str,
+    sequence: "Sequence",
+    config: Config,
+    options: TrainOptions,
+    at: "Standing | None" = None,
+) -> Progress:
+    """The progress of a training, on standard error and as a page in its folder; prints what the command will take.
+
+    at   progress of a run that is resumed; None = a new one
+    """
     import numba
 
     from endotsr.cli.parts.waiting import waiting_line
@@ -249,7 +276,7 @@ def _progress(folder: RunFolder, source: str, sequence: "Sequence", config: Conf
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
     plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived, vector_factor())
-    print(waiting_line(plan, remembered_unit(threads), done_before(config).exists()))
+    print(waiting_line(plan, remembered_unit(threads), done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))
 

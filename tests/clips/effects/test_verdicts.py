@@ -120,6 +120,17 @@ def test_blurred_and_smoky_frames_are_found_and_told_apart():
     assert len(smoke.verdicts["smoke"].details["frames"]) == 6
 
 
+def test_frames_without_tissue_spoil_no_verdict_on_the_others():
+    """A scope that is withdrawn for a third of the clip, at its middle too."""
+    sequence = clip("noise")
+    masks = sequence.masks.copy()
+    masks[[2, 3, 4, 5, 11, 12, 13, 14]] = False
+    whole, found = inspect_sequence(sequence), inspect_sequence(replace(sequence, masks=masks))
+    for name in ("smoke", "blur", "depth quality", "motion"):
+        assert found.verdicts[name].kind == whole.verdicts[name].kind, found.verdicts[name].reason
+    assert masks[sequence.train_index[found.clip.reference]].any()
+
+
 def test_verdicts_have_every_effect_and_a_sentence():
     found = inspected("noise", "instrument")
     assert tuple(found.verdicts) == EFFECTS

@@ -42,6 +42,7 @@ def test_the_command_writes_poses_with_their_origin(clip, capsys):
     assert main(["poses", str(clip), "--html", str(page), "--json", str(data)]) == 0
     said = capsys.readouterr().out
     assert "the scope moves" in said and "no method can tell" in said and "% of the matches agree" in said
+    assert f"(median, over {len(TRUE) - 1} frames)" in said, "the clip is shorter than the usual distance"
     assert path_error(poses_of(clip), TRUE) < 0.15
     assert 'origin = "estimated by endotsr poses' in (clip / "sequence.toml").read_text("utf-8")
     found = json.loads(data.read_text("utf-8"))

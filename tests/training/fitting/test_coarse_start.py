@@ -148,3 +148,17 @@ def test_a_stopped_run_goes_on_the_same_way(sequence, tmp_path, monkeypatch):
     assert sizes == [(60, 32), (100, 64)]
     for name, array in arrays(whole.gaussians).items():
         np.testing.assert_array_equal(array, getattr(again.gaussians, name), err_msg=name)
+
+
+def test_a_frame_without_tissue_is_no_perfect_fit(sequence):
+    """The error of the others decides, as their detail does."""
+    config, masks, index = settings(), sequence.masks.copy(), sequence.train_index
+    masks[index[::2]] = False
+    start = coarse_start.coarse_start(replace(sequence, masks=masks), config)
+    assert len(start.frames) and set(start.frames) <= set(index[1::2])
+    assert start.lacking == lacking(sequence, start.frames)
+    state, whole = new_training(sequence, config), coarse_start.coarse_start(sequence, config)
+    error = coarse_start.fit_error(state, start.constants, start.frames)
+    assert error == coarse_start.fit_error(state, whole.constants, start.frames) > 0
+    nothing = coarse_start.coarse_start(replace(sequence, masks=np.zeros_like(masks)), config)
+    assert len(nothing.frames) == 8 and nothing.lacking == 0.0, "it ends at the latest"

@@ -65,6 +65,16 @@ def test_without_the_second_process_all_goes_on(tmp_path, monkeypatch, program):
     assert not (tmp_path / "marker").exists()
 
 
+def test_the_workload_is_compiled_for_an_extent_of_cameras_too(tmp_path, monkeypatch):
+    """Its camera does not move, unlike that of the clip for which the kernels are compiled."""
+    monkeypatch.setattr(compile_ahead, "done_before", lambda config: tmp_path / "marker")
+    monkeypatch.setattr(compile_ahead, "usable_cores", lambda: 2)
+    monkeypatch.setattr(sys, "executable", "false")
+    config = msgspec.structs.replace(DEMO, density=msgspec.structs.replace(DEMO.density, extent="cameras"))
+    assert compile_ahead.compile_ahead(config) == (os.environ.get("NUMBA_DISABLE_JIT") != "1")
+    compile_ahead.rehearse(config)
+
+
 def test_settings_that_call_other_kernels_have_another_marker():
     double = msgspec.structs.replace(PAPER, training=msgspec.structs.replace(PAPER.training, precision="float64"))
     static = msgspec.structs.replace(PAPER, model=msgspec.structs.replace(PAPER.model, deformation=False))

@@ -6,6 +6,7 @@ residuals born after 25; smoothness from 10; detail loss from 16, full at 30; ha
 
 import copy
 
+import msgspec
 import numba
 import numpy as np
 import pytest
@@ -107,6 +108,16 @@ def assert_same(one, two):
 
 
 # --- it learns, and everything takes part ---
+
+
+def test_more_first_points_than_the_maximum_are_said(sequence):
+    said, config = [], settings(iterations=1)
+    few = msgspec.structs.replace(config, density=msgspec.structs.replace(config.density, maximum=9))
+    state = new_training(sequence, few)
+    count = state.gaussians.count
+    train(state, sequence, few, lambda entry: None, lambda _: None, on_message=said.append)
+    (line,) = said
+    assert f"density.maximum = 9 is below the {count} first points: they are kept" in line
 
 
 def test_loss_falls_and_every_part_takes_part(finished):

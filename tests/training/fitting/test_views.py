@@ -37,3 +37,10 @@ def test_the_fraction_of_bridged_views_is_that_of_the_settings():
     assert abs(between.mean() - 0.25) < 0.03
     assert t.min() >= 0 and t.max() <= 7 / 8 and set(index) == set(TRAIN)
     assert np.abs(t * 8 - index)[between].max() <= 1.5  # the nearer frame of a gap of three at most
+
+
+def test_one_training_frame_has_no_time_to_bridge():
+    sequence = SimpleNamespace(train_index=TRAIN[1:2], times=np.arange(8) / 8, count=8)
+    training = msgspec.structs.replace(PAPER.training, bridge_fraction=1.0)
+    view, _ = drawn_view(np.random.default_rng(3), sequence, training)  # type: ignore[arg-type]
+    assert view == (2, 2 / 8, None)

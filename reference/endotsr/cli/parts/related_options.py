@@ -13,6 +13,11 @@ OF_PAGE = ("keys", "title", "no-held-out", "sequence")
 NOT_OF_PAGE = ("content", "times", "frames", "count", "opacity", "voxel", "without")
 ONE_RUN = "the settings of a run are fixed"
 RESIDUALS = ("model.appearance", "model.spectral-motion")
+OF_MINUTES = (
+    "training.iterations", "training.visits-per-frame", "training.coarse-start", "training.no-coarse-start",
+    "density.growth", "density.maximum", "density.gradient-threshold", "initialisation.first-frame-points",
+    "initialisation.other-frame-points",
+)  # fmt: skip
 
 # layout: of the source, stated or detected
 PREPARE = (
@@ -76,6 +81,7 @@ TRAIN = (
     Excludes(("calibrate-only",), ("no-evaluate", "lpips"), "it trains nothing and evaluates nothing"),
     Excludes(("resume",), ("minutes", "effects", "windows", "overlap", "chain"), ONE_RUN),
     Excludes(("minutes",), ("iterations",), "both set the length of the run"),
+    Excludes(("minutes",), OF_MINUTES, "it chooses length, points and Gaussians"),
     Excludes(("minutes", "effects=auto"), ("windows",), "each window would get settings of its own"),
     Needs(("schedule",), ("iterations",), "only a stated length stretches the schedule"),
     Needs(("overlap", "chain"), ("windows",), "it describes the windows"),

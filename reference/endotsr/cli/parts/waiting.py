@@ -1,20 +1,23 @@
-"""What a person waits for in `endotsr train`, in one line before the first iteration."""
+"""What a person waits for in `endotsr train`, in one line before the first iteration, also of a resumed training."""
 
-from endotsr.clips.sequences.checks.duration import COMPILATION, TimedCommand, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
 from endotsr.results.report.tables import duration
 
 
-def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool) -> str:
+def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
     """The parts of the command after reading, with the time of each.
 
     unit       seconds per unit of work in an earlier training on this machine; None = unknown
     compiled   whether the kernels are in the cache
+    at         progress of a training that is resumed; None = a new one
     """
-    found = estimated_seconds(plan, assumed_unit(plan.threads) if unit is None else unit)
+    found = estimated_seconds(plan, assumed_unit(plan.threads) if unit is None else unit, at)
+    left = plan.config.training.iterations - (0 if at is None else at.iteration)
     steps = {
         "initial motion": found.start,
         "compilation, once": 0.0 if compiled else COMPILATION,
-        f"{plan.config.training.iterations} iterations": found.training,
+        "calibration": found.calibration,
+        f"{left} iterations": found.training - found.calibration,
         "evaluation": found.evaluation,
     }
     named = ", ".join(f"{name} {duration(seconds)}" for name, seconds in steps.items() if seconds >= 1)

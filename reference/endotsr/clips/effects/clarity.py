@@ -3,12 +3,13 @@
 The sharpness of a frame is the mean squared Laplacian over tissue at full size, less the contribution of noise, divided
 by the squared brightness. It is invariant to gain. Blur lowers the sharpness and does not change the darkest tissue.
 Smoke adds light everywhere, which also raises the dark channel (the smallest channel, tenth percentile over tissue).
-Both are found only if they vary: a clip that is blurred throughout has no sharp frame for comparison.
+Both are found only if they vary: a clip that is blurred throughout has no sharp frame for comparison. A frame without
+tissue shows neither, and no other frame is compared with it.
 """
 
 import numpy as np
 
-from endotsr.clips.effects.frames import ReducedFrames
+from endotsr.clips.effects.frames import ReducedFrames, without_gaps
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.verdict import Curve, EffectVerdict
 from endotsr.clips.sequences.sequence import Sequence
@@ -25,14 +26,19 @@ def clarity_verdicts(sequence: Sequence, clip: ReducedFrames, noise: Noise) -> t
     """Verdicts on smoke and on blur."""
     rows = [_measures(sequence.images[i], sequence.masks[i], noise.level) for i in sequence.train_index]
     sharpness, dark = (np.array(column) for column in zip(*rows))
+    seen = np.isfinite(sharpness)
+    if seen.any():
+        sharpness, dark = without_gaps(sharpness, clip.times), without_gaps(dark, clip.times)
+    else:
+        sharpness, dark, seen = np.zeros(clip.count), np.zeros(clip.count), ~seen
     fall = _local_median(sharpness) - sharpness
-    slow_fall = np.percentile(sharpness, 75) - sharpness
-    rise = dark - np.percentile(dark, 25)
+    slow_fall = np.percentile(sharpness[seen], 75) - sharpness
+    rise = dark - np.percentile(dark[seen], 25)
     spread = SCATTER * float(np.median(np.abs(fall - np.median(fall)))) / 0.6745
-    score = np.minimum(rise / SMOKE_RISE, slow_fall / SMOKE_FALL)
+    score = np.where(seen, np.minimum(rise / SMOKE_RISE, slow_fall / SMOKE_FALL), 0.0)
     smoke = _verdict("smoke", score, 1.0, "times the threshold", "rise of the dark channel with a fall of sharpness",
                      clip, {"dark channel": dark})  # fmt: skip
-    clear = np.where(score >= 1.0, 0.0, fall)
+    clear = np.where(seen & (score < 1.0), fall, 0.0)
     blur = _verdict("blur", clear, max(BLUR, spread), "natural logarithm", "fall of the log sharpness below its"
                     " neighbours", clip, {"log sharpness": sharpness})  # fmt: skip
     return smoke, blur
@@ -47,10 +53,10 @@ def clear_frames(clip: ReducedFrames, *verdicts: EffectVerdict) -> BoolArray:
 
 
 def _measures(image: np.ndarray, mask: np.ndarray, sigma: float) -> tuple[float, float]:
-    """Log sharpness and dark channel of a frame (3, H, W) uint8."""
+    """Log sharpness and dark channel of a frame (3, H, W) uint8; NaN without tissue."""
     inner = mask[1:-1, 1:-1] & mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
     if not inner.any():
-        return 0.0, 0.0
+        return np.nan, np.nan
     grey = image.mean(axis=0, dtype=np.float32) / np.float32(255)
     curved = 4 * grey[1:-1, 1:-1] - grey[:-2, 1:-1] - grey[2:, 1:-1] - grey[1:-1, :-2] - grey[1:-1, 2:]
     energy = float((curved[inner] ** 2).mean()) - 20.0 * sigma**2 / 3.0

@@ -61,7 +61,7 @@ def reduced_frames(sequence: Sequence) -> ReducedFrames:
 def with_clear_reference(clip: ReducedFrames, clear: BoolArray) -> ReducedFrames:
     """The clip with the clear frame nearest the middle as its reference; unchanged if no frame is clear.
 
-    clear   (m,) False for training frames with blur or smoke
+    clear   (m,) False for training frames with blur or smoke, or without tissue
     """
     frames = np.flatnonzero(clear)
     if not frames.size:

@@ -1,8 +1,8 @@
 """All tests of a clip, in order: noise, blur and smoke, motion, then the others.
 
-The tests of blur, smoke, motion, light and topology measure in units of the noise. Frames with blur or smoke are
-excluded as reference and from motion. The test of light depends on the results of the tests of motion and of the
-camera.
+The tests of blur, smoke, motion, light and topology measure in units of the noise. Frames with blur or smoke, and those
+without tissue, are excluded as reference and from motion. The test of light depends on the results of the tests of
+motion and of the camera.
 """
 
 from typing import Any, NamedTuple
@@ -56,7 +56,7 @@ def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Ins
     clip = reduced_frames(sequence)
     noise = estimate_noise(sequence, clip)
     smoke, blur = clarity_verdicts(sequence, clip, noise)
-    clear = clear_frames(clip, smoke, blur)
+    clear = clear_frames(clip, smoke, blur) & clip.masks.any(axis=(1, 2))
     clip = with_clear_reference(clip, clear)
     tracks = make_tracks(clip, noise)
     motion, lines = motion_verdict(sequence, clip, without_frames(tracks, ~clear), noise)

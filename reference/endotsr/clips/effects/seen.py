@@ -69,10 +69,12 @@ def highlights(image: NDArray[np.uint8]) -> BoolArray:
 def depth_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     """The verdict on faults of the prior depth. `details["usable"]`: whether any frame has enough depth."""
     depth, known = clip.depth, (clip.depth > 0) & clip.masks
-    by_frame = 1.0 - known.sum(axis=(1, 2)) / np.maximum(clip.masks.sum(axis=(1, 2)), 1)
+    tissue = clip.masks.sum(axis=(1, 2))
+    seen = (tissue > 0) | ~tissue.any()  # a frame without tissue lacks no depth
+    by_frame = np.where(seen, 1.0 - known.sum(axis=(1, 2)) / np.maximum(tissue, 1), 0.0)
     usable = [int(k.sum()) >= LEAST_PIXELS and float(np.ptp(d[k])) > 0 for d, k in zip(depth, known)]
     median = float(np.median(depth[known])) if known.any() else 0.0
-    holes, step, flicker = float(by_frame.mean()), quantisation(depth, known), temporal_flicker(clip)
+    holes, step, flicker = float(by_frame[seen].mean()), quantisation(depth, known), temporal_flicker(clip)
     limit = max(RELATIVE * median, 1e-30)
     scores = {"holes": holes / HOLES, "quantised": step / limit, "flicker": flicker / (limit + 0.5 * step)}
     found = [name for name, score in scores.items() if score >= 1.0]

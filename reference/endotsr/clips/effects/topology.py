@@ -48,7 +48,7 @@ class End(NamedTuple):
 def topology_verdict(clip: ReducedFrames, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> EffectVerdict:
     """The verdict on tissue that appears or disappears permanently.
 
-    clear    (m,) False for training frames with blur or smoke, which are not compared
+    clear    (m,) False for training frames with blur or smoke, or without tissue, which are not compared
     returns  kind "none", "suspected", or UNKNOWN: the ends have too little tissue in common, or the camera moves
     """
     frames = np.flatnonzero(clear)

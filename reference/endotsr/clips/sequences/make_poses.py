@@ -193,9 +193,14 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
             f"the scope sees earlier places again: {len(e.returns)} pairs of frames hold the path against drift"
         )
     lines += gap_lines(found.interpolated, found.held)
+    apart = min(APART, len(e.poses) - 1)
+    own = f"beside the rigid motion, tissue moves by {e.own:.2g} {unit}"
+    own += f" (median, over {apart} frame{'s' * (apart != 1)})"
+    if not np.isfinite(e.own):
+        own = "how tissue moves beside the rigid motion cannot be told: no two frames apart match"
     lines.append(
-        f"beside the rigid motion, tissue moves by {e.own:.2g} {unit} (median, over {APART} frames); what the whole"
-        " tissue does in common, as in breathing, no method can tell from motion of the scope: it is in the path"
+        f"{own}; what the whole tissue does in common, as in breathing, no method can tell from motion of the scope: it"
+        " is in the path"
     )
     return lines
 

@@ -46,8 +46,18 @@ def check_scene(settings: SimulatorSettings) -> None:
             "simulator: a sequence without an excluded pixel is not read without a flag; allowed: stereo, instrument or"
             " more_instruments on"
         )
-    split_frames(settings.frames, "every_eighth", 0)
+    check_split(settings)
     check_field_of_view(settings)
+
+
+def check_split(settings: SimulatorSettings) -> None:
+    """Raises InputError for too few frames, or for a split of its own: files hold none, a training chooses it."""
+    if settings.block_length:
+        raise InputError(
+            f"simulator: block_length = {settings.block_length} does not fit files, which hold no split; allowed: 0,"
+            f" and endotsr train --sequence.split blocks --sequence.block-length {settings.block_length}"
+        )
+    split_frames(settings.frames, "every_eighth", 0)
 
 
 def write_sequence(

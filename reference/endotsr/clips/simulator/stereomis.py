@@ -15,9 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.sequences.splits import split_frames
 from endotsr.clips.simulator.field_of_view import check_field_of_view
-from endotsr.clips.simulator.folder import frames_with_truth
+from endotsr.clips.simulator.folder import check_split, frames_with_truth
 from endotsr.clips.simulator.frames import SimulatedScene, make_scene
 from endotsr.clips.simulator.instrument import graspers
 from endotsr.clips.simulator.settings import SimulatorSettings
@@ -36,7 +35,7 @@ def check_recording(settings: SimulatorSettings) -> None:
         raise InputError("simulator: stereo.on = False does not fit the layout stereomis; allowed: True")
     if settings.width % 2:
         raise InputError(f"simulator: width = {settings.width} does not fit a video; allowed: even numbers")
-    split_frames(settings.frames, "every_eighth", 0)
+    check_split(settings)
     check_field_of_view(settings)
 
 

@@ -30,7 +30,7 @@ class CoarseStart(NamedTuple):
     """Constants of a coarse start."""
 
     constants: TrainingConstants  # of the half-size frames
-    frames: NDArray[np.intp]  # rendered by a check
+    frames: NDArray[np.intp]  # rendered by a check; those with tissue
     lacking: float  # d, display units
 
 
@@ -38,7 +38,8 @@ def coarse_start(sequence: Sequence, config: Config) -> CoarseStart:
     """The coarse start of a training on a sequence."""
     frames = sequence.train_index[calibration_views(len(sequence.train_index), CHECKED_FRAMES)]
     small = training_constants(halved(sequence, config.sequence.memory), coarse_config(config))
-    return CoarseStart(small, frames, lacking(sequence, frames))
+    seen = frames[small.sequence.masks[frames].any(axis=(1, 2))]  # without tissue, any render would fit a frame
+    return CoarseStart(small, seen if seen.size else frames, lacking(sequence, frames))
 
 
 def coarse_config(config: Config) -> Config:

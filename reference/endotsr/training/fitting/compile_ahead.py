@@ -17,7 +17,7 @@ from typing import Any
 
 import msgspec
 
-from endotsr.config import Config
+from endotsr.config import PAPER, Config, with_settings
 from endotsr.method.kernels.machine import compiled_for, usable_cores
 
 READY = "ready for the first iteration"
@@ -91,6 +91,8 @@ def _small(config: Config) -> tuple[Any, Any]:
     from endotsr.training.fitting.state import bench_state, training_constants
     from endotsr.training.scene import workload
 
+    if config.density.extent == "cameras":  # those of the workload coincide
+        config = with_settings(config, density={"extent": PAPER.density.extent})
     constants = training_constants(workload.sequence(64, 48, frames=3), config)
     return constants, bench_state(workload.gaussians(64, config), config, 0)
 

@@ -45,8 +45,10 @@ def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingCo
     """A training frame, uniform with replacement; with probability `bridge_fraction` a time between two (B14).
 
     Draws: `rng.random()` if views are bridged, then one `rng.integers`.
+    Edges: with one training frame there is no time to bridge.
     """
-    if training.bridge_fraction > 0 and rng.random() < training.bridge_fraction:
+    bridging = training.bridge_fraction > 0 and rng.random() < training.bridge_fraction
+    if bridging and len(sequence.train_index) > 1:
         return _draw_bridged(rng, sequence)
     index = int(sequence.train_index[rng.integers(len(sequence.train_index))])
     return View(index, float(sequence.times[index]))
@@ -61,7 +63,7 @@ def _draw_bridged(rng: np.random.Generator, sequence: Sequence) -> View:
     train = sequence.train_index
     gaps = np.diff(train)
     last = np.cumsum(2 * gaps - 1)
-    k = int(rng.integers(last[-1])) if last.size else 0
+    k = int(rng.integers(last[-1]))
     gap = int(np.searchsorted(last, k, side="right"))
     place = k - (int(last[gap - 1]) if gap else 0) + 1
     bridged = BridgedTime(int(train[gap]), int(train[gap + 1]), place / (2.0 * gaps[gap]))

@@ -7,7 +7,7 @@ the number of threads.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import cast
 
 import msgspec
@@ -81,8 +81,8 @@ def train(
     With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
     This pre-training is not checkpointed: after an interruption it restarts and gives the same weight.
     Raises: Diverged (a FloatingPointError) with iteration, frame and term if a loss or a gradient is not finite; the
-            state is then unchanged since the previous iteration, except for the density statistics. ValueError with
-            array and index if the state has a non-finite number.
+            state is then unchanged since the previous iteration. ValueError with array and index if the state has a
+            non-finite number.
     """
     check_state(state)
     watch = DivergenceWatch(state.gaussians)
@@ -90,6 +90,9 @@ def train(
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)
         on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
+    if state.iteration == 0 and state.gaussians.count > config.density.maximum:
+        first = f"density.maximum = {config.density.maximum} is below the {state.gaussians.count} first points"
+        on_message(f"{first}: they are kept, and none is added before as many are removed")
     coarse = coarse_start(sequence, config) if state.coarse else None
     if coarse:
         on_message("coarse start: half-size frames until the fit error is below the detail that they lack")
@@ -112,13 +115,19 @@ def train(
 
 
 def calibrated_weight(sequence: Sequence, config: Config) -> float:
-    """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate."""
+    """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate.
+
+    Raises: FloatingPointError with iteration, frame and term if a loss or a gradient of the base model is not finite.
+    """
     model = msgspec.structs.replace(config.model, appearance=False, spectral_motion=False, laplacian=False)
     loss = msgspec.structs.replace(config.loss, lambda_lap=0.0)
     base = msgspec.structs.replace(config, model=model, loss=loss)
     constants, state = training_constants(sequence, base), new_training(sequence, base)
-    while state.iteration < config.training.residual_activation:
-        training_step(state, constants)
+    try:
+        while state.iteration < config.training.residual_activation:
+            training_step(state, constants)
+    except Diverged as error:  # of another state than that of the run, whose diverged.npz could not repeat it
+        raise FloatingPointError(f"calibration of loss.lambda_lap: {error}") from None
     return calibrate_on(state.gaussians, constants.spectral, sequence, base, state.frames).lambda_lap
 
 
@@ -136,13 +145,15 @@ def training_step(state: TrainingState, constants: TrainingConstants, timer: Tim
         degree=active_degree(iteration, config), ahead=state.ahead, timer=timer,
     )  # fmt: skip
     loss, d_scene = found.loss, found.d_scene
+    gradients = {name: getattr(d_scene, name) for name in WATCHED_GRADIENTS}
+    _refuse_not_finite(iteration, view, {**loss.terms, "loss": loss.loss}, gradients, rng_state)
     watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(
         lambda: scene_reverse(d_scene, found.scene_saved, coefficients=False),
         timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, constants)),
         timed(timer, "density control", lambda: _watch_density(state, d_scene, found.camera, watched)),
     )
-    _refuse_not_finite(iteration, view, loss, penalty, d_scene, rng_state)
+    _refuse_not_finite(iteration, view, {"matern_penalty": penalty or 0.0}, {}, rng_state)
     entry = _log_entry(iteration, view, loss, penalty, found.rendered, targets, state, config)
     dense, state.ahead = densify_now(iteration, config), None
     state.drawn = None
@@ -235,12 +246,15 @@ def _control_density(state: TrainingState, constants: TrainingConstants, iterati
 
 
 def _refuse_not_finite(
-    iteration: int, view: View, loss: ImageLoss, penalty: float | None, d_scene: RenderGrads, rng_state: RngState
+    iteration: int,
+    view: View,
+    terms: Mapping[str, float],
+    gradients: Mapping[str, FloatArray | None],
+    rng_state: RngState,
 ) -> None:
-    """Raise `Diverged` for the first non-finite loss term or gradient, before any parameter is updated."""
-    terms = {**loss.terms, "matern_penalty": penalty or 0.0, "loss": loss.loss}
+    """Raise `Diverged` for the first non-finite loss term or gradient, before anything is updated."""
     broken = next(((name, str(float(v))) for name, v in terms.items() if not math.isfinite(v)), None)
-    broken = broken or not_finite({name: getattr(d_scene, name) for name in WATCHED_GRADIENTS})
+    broken = broken or not_finite(gradients)
     if broken:
         raise Diverged(iteration, view.index, *broken, rng_state)
 

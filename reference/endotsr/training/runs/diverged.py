@@ -27,6 +27,7 @@ def save_diverged(folder: RunFolder, state: "TrainingState", error: Diverged, co
     header: CheckpointHeader = {
         "config": msgspec.to_builtins(config),
         "lambda_lap": state.lambda_lap,
+        "coarse": state.coarse,
         "diverged": about,
     }
     path = folder.path / NAME
@@ -46,6 +47,7 @@ def repeat_iteration(run: str | Path) -> LogEntry:
     Raises: Diverged as in the run; InputError if there is no diverged.npz or it cannot be used.
     """
     from endotsr.training.fitting.checkpoint import load_checkpoint
+    from endotsr.training.fitting.coarse_start import coarse_start
     from endotsr.training.fitting.state import state_from_checkpoint, training_constants
     from endotsr.training.fitting.trainer import training_step
     from endotsr.training.runs.sources import load_run_sequence
@@ -53,4 +55,6 @@ def repeat_iteration(run: str | Path) -> LogEntry:
     folder = open_run(Path(run))
     config = folder.config()
     state = state_from_checkpoint(load_checkpoint(folder.path / NAME), config)
-    return training_step(state, training_constants(load_run_sequence(folder), config))
+    sequence = load_run_sequence(folder)
+    constants = coarse_start(sequence, config).constants if state.coarse else training_constants(sequence, config)
+    return training_step(state, constants)

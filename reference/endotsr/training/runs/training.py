@@ -106,16 +106,29 @@ def extend_run(folder: RunFolder, iterations: int) -> None:
     Milestones keep their iterations. Learning rates that decay over the whole run follow the decay of the new length
     from the next iteration on, and therefore jump up.
     """
-    from endotsr.training.runs.model import load_training, save_training
+    from endotsr.training.runs.model import save_training
 
     with folder.locked():
         before = folder.config()
         config = with_settings(before, training={"iterations": iterations})
         if folder.has_checkpoint:
-            save_training(folder, load_training(folder, before, continues=True), config)
+            save_training(folder, _state_to_extend(folder, before, config), config)
         replace_text(folder.path / "config.toml", config_to_toml(config))
         entry: ExtendedEntry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
         folder.update({"extended": [*folder.record().get("extended", []), entry]})
+
+
+def _state_to_extend(folder: RunFolder, before: Config, after: Config) -> "TrainingState":
+    """The state of the latest checkpoint, also if an extension to the same length was stopped after writing it."""
+    from endotsr.training.runs.model import load_training
+
+    try:
+        return load_training(folder, before, continues=True)
+    except InputError as refused:
+        try:
+            return load_training(folder, after, continues=True)
+        except InputError:
+            raise refused from None
 
 
 def train_run(

@@ -121,6 +121,15 @@ def work_left(config: Config, pixels: int, at: Standing, vectors: float = 1.0) -
     return float(np.sum(iteration_work(counts, seen, later / config.training.iterations, vectors)))
 
 
+def calibration_work(config: Config, pixels: int, at: Standing, vectors: float = 1.0) -> float:
+    """Work of the base model on which equation (7) calibrates an `auto` weight, before the first iteration; else 0."""
+    if at.iteration or config.loss.lambda_lap != "auto" or not config.model.laplacian:
+        return 0.0
+    later = np.arange(1, config.training.residual_activation + 1)
+    counts = expected_gaussians(config, at, later)
+    return float(np.sum(iteration_work(counts, pixels, later / config.training.iterations, vectors)))
+
+
 def expected_gaussians(config: Config, at: Standing, later: NDArray[np.integer]) -> NDArray[np.floating]:
     """Expected number of Gaussians at later iterations, without pruning.
 
@@ -204,14 +213,15 @@ class PartSeconds(NamedTuple):
 
     reading: float
     start: float  # initial points and their motion
+    calibration: float  # training of the base model for an `auto` weight
     targets: float  # between the frames; the iterations make them at first use
     iterations: float  # without the targets
     evaluation: float  # with report and viewer
 
     @property
     def training(self) -> float:
-        """Seconds of the iterations with their targets."""
-        return self.targets + self.iterations
+        """Seconds of the iterations with their targets, and of the calibration before them."""
+        return self.calibration + self.targets + self.iterations
 
 
 def frames_of(train_index: IndexArray, held_out: IndexArray) -> Frames:
@@ -229,20 +239,27 @@ def expected_frames(count: int, config: Config) -> Frames:
         return frames_of(np.arange(count), np.arange(0))
 
 
-def estimated_seconds(plan: TimedCommand, unit: float = SECONDS) -> PartSeconds:
-    """Seconds of the parts of a command. unit: seconds per unit of work with the threads of the plan."""
+def estimated_seconds(plan: TimedCommand, unit: float = SECONDS, at: Standing | None = None) -> PartSeconds:
+    """Seconds of the parts of a command.
+
+    unit    seconds per unit of work with the threads of the plan
+    at      progress of a training that is resumed; None: a new one
+    """
     config, frames, size = plan.config, plan.frames, plan.pixels / PIXELS
-    alone, first = plan.alone(unit), at_start(config)
-    tracked = (TRACKED + TRACKED_POINTS * first.gaussians) * (config.initialisation.motion != "none")
+    alone, at = plan.alone(unit), at_start(config) if at is None else at
+    tracks = config.initialisation.motion != "none" and config.model.spectral_motion and at.iteration == 0
+    tracked = (TRACKED + TRACKED_POINTS * at.gaussians) * tracks
     sizes = 1.25 if config.training.coarse_start else 1.0
-    targets = sizes * gap_units(frames) * frames.gaps * visited(config, frames.gaps, config.training.iterations)
+    visits = visited(config, frames.gaps, config.training.iterations - at.iteration)
+    targets = sizes * gap_units(frames) * frames.gaps * visits
     pictures = frames.held_out * METHODS * (MEASURED + PERCEIVED * bool(plan.perceived))
     pictures += MEASURED * frames.training / EVERY_TRAINING_FRAME + COMPARED * frames.compared
     return PartSeconds(
         alone * size * READ * frames.total,
         alone * size * tracked * frames.training,
+        unit * calibration_work(config, plan.pixels, at, plan.vectors),
         alone * size * targets / plan.threads,
-        unit * work_left(config, plan.pixels, first, plan.vectors),
+        unit * work_left(config, plan.pixels, at, plan.vectors),
         0.0 if plan.perceived is None else plan.evaluating(unit) * (PAGES * gaussians_at_end(config) + size * pictures),
     )
 
