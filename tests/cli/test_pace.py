@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endotsr.cli.parts.options import base_settings
-from endotsr.cli.train import _of_minutes
+from endotsr.cli.train import config_of_minutes
 from endotsr.clips.sequences.checks.duration import at_start, vector_factor, work_left
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
@@ -86,7 +86,7 @@ def test_the_line_on_minutes_is_of_this_clip_and_of_the_points_that_it_starts_wi
     monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", 64)  # bytes, of a processor with AVX-512
     monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", lambda *_: False)
     monkeypatch.setattr(pace, "seconds_of_unit", lambda *_: 0.1)
-    config, line = _of_minutes(SimpleNamespace(minutes=0.13), still, SHARP, 1)
+    config, line = config_of_minutes(SimpleNamespace(minutes=0.13), still, SHARP, 1)
     points = config.initialisation.first_frame_points + config.initialisation.other_frame_points
     assert config.density.maximum < points and line.endswith(f" iterations, {points} Gaussians")
     assert "an iteration of 60 000 Gaussians takes 60 ms" in line, "and 100 ms at 640x512"

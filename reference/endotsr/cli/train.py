@@ -176,7 +176,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     threads = use_threads(config.training.threads)
     config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
     if options.minutes is not None:
-        config, schedule_note = _of_minutes(options, sequence, config, threads)
+        config, schedule_note = config_of_minutes(options, sequence, config, threads)
     found: RunRecord = {}
     lines = ["effects: everything; `--effects auto` trains only the components that the clip needs"]
     if options.effects == "auto":
@@ -193,7 +193,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     return folder, sequence
 
 
-def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
+def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
     from endotsr.clips.sequences.checks.duration import at_start, iteration_work, vector_factor
     from endotsr.training.fitting.compile_ahead import compile_ahead

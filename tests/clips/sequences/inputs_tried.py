@@ -21,6 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import test_relative_depth as one_view
 from careless_inputs import CARELESS_ROWS
+from exported_inputs import EXPORTED_ROWS
 from input_kinds import (
     MATRIX,
     OPENCV,
@@ -430,6 +431,7 @@ ROWS = [
     *MASK_ROWS,
     *STRANGER_ROWS,
     *STRANGE_ROWS,
+    *EXPORTED_ROWS,
 ]  # fmt: skip
 
 

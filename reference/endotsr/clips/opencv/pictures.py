@@ -35,8 +35,9 @@ STARTS = {  # extension -> file type, and its first bytes
     ".bmp": ("BMP", (b"BM",)),
 }
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
-TIFF_WIDTH, TIFF_HEIGHT, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 277, 339  # tags
+TIFF_WIDTH, TIFF_HEIGHT, TIFF_BITS, TIFF_PHOTOMETRIC, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 258, 262, 277, 339  # tags
 FLOATING_POINT = 3  # of TIFF_FORMAT
+ZERO_IS_WHITE = 0  # of TIFF_PHOTOMETRIC
 GREY = ("1", "L")  # modes of Pillow
 NOT_DECODED = ("LA", "La", "PA", "LAB")  # OpenCV drops their transparency or reads them as RGB
 
@@ -115,6 +116,7 @@ def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
             if kind == "TIFF":
                 if picture.mode in NOT_DECODED:
                     raise InputError(f"{path}: a TIFF of the mode {picture.mode}; allowed: grey, palette, RGB, CMYK")
+                _check_white(picture, path)
                 return None
             if picture.mode in GREY:
                 return np.array(picture.convert("L"))
@@ -138,6 +140,16 @@ def _plugin(kind: str) -> Any:
     warnings.filterwarnings("ignore", module=r"PIL\.")  # about metadata, without a file name
     logging.getLogger("PIL").addHandler(logging.NullHandler())  # it would print errors, without a file name either
     return getattr(importlib.import_module(f"PIL.{name}Plugin"), f"{name}File")
+
+
+def _check_white(picture: Any, path: Path) -> None:
+    """Refuse a TIFF of more than 8 bits in which 0 is white: OpenCV inverts those of 8 bits and fewer alone."""
+    bits = picture.tag_v2.get(TIFF_BITS, (1,))
+    if picture.tag_v2.get(TIFF_PHOTOMETRIC) == ZERO_IS_WHITE and max(bits) > 8:
+        raise InputError(
+            f"{path}: states that 0 is white (PhotometricInterpretation 0): its numbers are inverted where it is shown;"
+            " allowed: 0 is black, as most programs store it"
+        )
 
 
 def _check_one_upright(picture: Any, path: Path) -> None:

@@ -118,6 +118,7 @@ def white_pixels(
     Raises:  InputError for a picture with more than 5 % of its pixels farther than an eighth from black and white, and,
              unless the set is graded, for areas of another number.
     """
+    refuse_parts(plane, name)
     white = np.greater_equal(plane, levels.least, out=out)
     exact = int(np.count_nonzero(plane == levels.black) + np.count_nonzero(plane == levels.white))
     if plane.max() > levels.white or (levels.white > 255 and plane.dtype == np.uint8):
@@ -137,6 +138,18 @@ def white_pixels(
     if not levels.graded:
         _refuse_areas(plane, levels, name)
     return white, plane.size - exact
+
+
+def refuse_parts(plane: NDArray, name: object) -> None:
+    """Raises InputError for a picture of numbers with a point that are not whole, such as probabilities."""
+    if plane.dtype.kind != "f":
+        return
+    wrong = ~(plane == np.round(plane))  # NaN is not whole either
+    if wrong.any():
+        raise InputError(
+            f"{name}: holds {plane[wrong][0]:g}; allowed: whole numbers; a threshold, such as > 0.5, makes a mask of"
+            " probabilities"
+        )
 
 
 def refuse_coded_objects(read: Callable[[int], NDArray], count: int, where: object) -> None:

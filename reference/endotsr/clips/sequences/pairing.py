@@ -45,7 +45,7 @@ def paired(
         return Paired([files[0]] * count)
     in_one_file = files[0].parent.is_file()  # planes of one array, which have an order and no names
     if pairing == "order" or (pairing == "auto" and in_one_file and len(files) == count):
-        return _in_order(count, files)
+        return _in_order(frames, files)
     found = {"number": _by_number(frames, files)}
     if source_names is not None:
         found["source"] = _by_number([Path(f"{name}.png") for name in source_names], files)
@@ -89,11 +89,24 @@ def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | N
     return found
 
 
-def _in_order(count: int, files: list[Path]) -> Paired:
-    where = files[0].parent
+def _in_order(frames: list[Path] | int, files: list[Path]) -> Paired:
+    where, count = files[0].parent, frames if isinstance(frames, int) else len(frames)
     if len(files) != count:
         raise InputError(f"{where}: --pairing order: {len(files)} files for {count} frames; allowed: one per frame")
-    return Paired(list(files), f"{where.name}: --pairing order pairs {files[0].name} with the first frame")
+    note = f"{where.name}: --pairing order pairs {files[0].name} with the first frame"
+    return Paired(list(files), note + ("" if isinstance(frames, int) else _as_text(frames)))
+
+
+def _as_text(frames: list[Path]) -> str:
+    """The end of the note where the names of the frames, sorted as text, are in another order than by their numbers."""
+    names = [frame.name for frame in frames]
+    k = next((k for k, (one, other) in enumerate(zip(names, sorted(names))) if one != other), None)
+    if k is None:
+        return ""
+    return (
+        f"; sorted as text, {sorted(names)[k]} stands in the place of {names[k]}: a program that sorts so has stored"
+        " another order, and needs names with leading zeros"
+    )
 
 
 def _by_number(frames: list[Path] | int, files: list[Path]) -> list[Path | None] | None:

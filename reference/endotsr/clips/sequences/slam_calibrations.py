@@ -35,10 +35,14 @@ ORB = Inventory(
         "Camera2.* Stereo.T_c1_c2 LEFT.* RIGHT.*": "a pair that is not rectified: state both cameras in the form of"
         " OpenCV or Kalibr",
     },
+    told={
+        "DepthMapFactor RGBD.DepthMapFactor": "steps of the depth per metre: the layout tum applies it; for files of"
+        " --depth state it with --depth-unit m and --depth-scale, one divided by it",
+    },
     harmless={
         "File.version": "it documents the file",
         "Camera.fps Camera.RGB Camera.newWidth Camera.newHeight": "a setting of the program that reads the pictures",
-        "ThDepth Stereo.ThDepth DepthMapFactor RGBD.*": "it sets the depth of the program; prepare has --depth-scale",
+        "ThDepth Stereo.ThDepth": "it sets which depth the program uses",
         "ORBextractor.* Viewer.* System.* IMU.* Tbc loopClosing": "a setting of the program",
     },
 )

@@ -15,6 +15,7 @@ FARTHEST_STEP = 2.0  # of the depth; with a larger step, neighbouring frames wou
 WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
 OFF_CENTRE = 0.25  # of the picture
 EXCHANGED, IN_TURN = 0.08, 3.0  # of the picture; times nearer to its centre with cx and cy exchanged
+SMALLER, LARGER, ALIKE = 0.75, 1.35, 0.05  # sizes whose centre is told from this one; difference of its two parts
 
 
 def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Finding]:
@@ -55,10 +56,13 @@ def intrinsics_findings(camera: Camera | Intrinsics, where: str) -> list[Finding
         found.append(finding("field-of-view", where, f"the horizontal field of view is {angle:.1f} degrees"))
     apart = _off_centre(camera, camera.cx, camera.cy)
     exchanged = apart > max(EXCHANGED, IN_TURN * _off_centre(camera, camera.cy, camera.cx))
-    if apart > OFF_CENTRE or exchanged:
+    factor = camera.cx / camera.width + camera.cy / camera.height  # 1: of the centre
+    scaled = not SMALLER < factor < LARGER and abs(camera.cx / camera.width - camera.cy / camera.height) < ALIKE
+    if apart > OFF_CENTRE or exchanged or scaled:
         size = f"{camera.width}x{camera.height}"
         what = f"the principal point is at ({camera.cx:g}, {camera.cy:g}) of {size}"
         what += ", and near the centre with cx and cy exchanged" if exchanged else ""
+        what += f", the centre of pictures of {factor:.3g} times this size" if scaled and factor > 0 else ""
         found.append(finding("principal-point", where, what))
     ratio = camera.fy / camera.fx
     if not 0.8 < ratio < 1.25:

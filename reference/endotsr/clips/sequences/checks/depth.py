@@ -22,6 +22,7 @@ FAR_OFF = 4.0
 LEAST_FRAMES, REPEATED = 4, 0.5  # frames; different planes of depth for each of them
 FULL_SCALE = (255.0, 65535.0)
 MARK, MARKED = 8.0, 0.005  # a mark of missing depth: times the median, fraction of the pixels
+APART, ENDS = 1.5, (0.5, 99.5)  # the same in all frames: times these percentiles of the other depths
 AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
 LIT, FEWEST = (20, 250), 300  # grey levels that are neither black nor overexposed; pixels of a correlation
 
@@ -40,6 +41,8 @@ class DepthFacts(NamedTuple):
     at_highest: float = 0.0  # fraction of the pixels with depth that have the largest value
     limit: float = 0.0  # far limit: the upper percentile to which a reader clips
     digest: bytes = b""  # of the depth, equal for equal planes
+    at_lowest: float = 0.0  # as at_highest
+    others: tuple[float, float] = (0.0, 0.0)  # between which all depths but the lowest and highest lie, outliers aside
 
 
 def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: NDArray[np.bool_] | None) -> DepthFacts:
@@ -59,7 +62,17 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
         float((values == values.max()).mean()) if values.size else 0.0,
         float(np.percentile(values, CLIPPED[1])) if values.size else 0.0,
         blake2b(depth.tobytes(), digest_size=16).digest(),
+        float((values == values.min()).mean()) if values.size else 0.0,
+        _between(values),
     )
+
+
+def _between(values: NDArray[np.float32]) -> tuple[float, float]:
+    """Between which depths all but the lowest and the highest one lie, outliers aside; (0, 0) without others."""
+    inner = values[::4]
+    inner = inner[(inner > values.min()) & (inner < values.max())] if values.size else inner
+    low, high = np.percentile(inner, ENDS) if inner.size else (0.0, 0.0)
+    return float(low), float(high)
 
 
 def _levels(values: NDArray[np.float32]) -> int:
@@ -143,11 +156,33 @@ def mark_finding(facts: list[DepthFacts], where: str) -> list[Finding]:
     """A warning if many pixels of most frames have one far too large value, such as 65535 or 1e6."""
     found = [fact for fact in facts if fact.at_highest > MARKED and fact.highest > MARK * fact.median]
     if not found or len(found) <= len(facts) / 2:
-        return []
+        return _apart(facts, where)
     fraction = float(np.mean([fact.at_highest for fact in found]))
     times = float(np.mean([fact.highest / fact.median for fact in found]))
     stored = f"{fraction:.1%} of the pixels hold {found[0].stored_highest:g}"
     return [finding("marked-depth", where, f"{stored}, {times:.3g} times the median depth")]
+
+
+def _apart(facts: list[DepthFacts], where: str) -> list[Finding]:
+    """As `mark_finding`, if one number of all frames lies apart from their other depths.
+
+    The far plane of a renderer is such a number, and so is the least one that a network writes where it knows nothing.
+    """
+    known = [fact for fact in facts if fact.others != (0.0, 0.0)]
+    if len(known) < LEAST_FRAMES or len(known) < len(facts):
+        return []
+    nearest, farthest = min(fact.others[0] for fact in known), max(fact.others[1] for fact in known)
+    lowest, highest = ({getattr(fact, name) for fact in known} for name in ("lowest", "highest"))
+    if len(highest) == 1 and max(highest) > APART * farthest:
+        value, at, others = max(highest), [fact.at_highest for fact in known], f"most {farthest:.4g}"
+    elif len(lowest) == 1 and APART * min(lowest) < nearest:
+        value, at, others = min(lowest), [fact.at_lowest for fact in known], f"least {nearest:.4g}"
+    else:
+        return []
+    if np.median(at) <= MARKED:
+        return []
+    what = f"{np.mean(at):.1%} of the pixels have the depth {value:.4g} in every frame, nearly all others at {others}"
+    return [finding("marked-depth", where, what)]
 
 
 def unit_finding(usual: float, where: str) -> list[Finding]:

@@ -19,7 +19,7 @@ from endotsr.clips.sequences.picture_fields import colours_differ
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
 FROZEN = 0.5  # as SAME, from the first frame of a clip to any other; encoders refine a still picture
-WOVEN = 1.15  # median of `FrameFacts.comb`, above which pictures are interlaced
+WOVEN, PART = 1.15, 0.3  # of `FrameFacts.comb`, above which a picture is interlaced; part of the pictures
 LEAST_ROWS = 16
 JUMP = 2.0  # ratio of the mean brightness of neighbouring frames; published clips stay within 1.15
 FLAT = 4  # grey levels between the darkest and the brightest pixel of a channel: a frame of one colour
@@ -79,9 +79,10 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     grey = [fact.small.mean(axis=2) for fact in facts]
     found += cut_findings(grey, [fact.name for fact in facts], readable, where) + halves_finding(grey, where)
     found += alternating_finding(grey, where) + _blue_finding(facts, where)
-    comb = float(np.median([fact.comb for fact in facts])) if facts else 0.0
-    if comb > WOVEN:
-        what = f"neighbouring rows differ {comb:.2f} times as much as rows two apart"
+    woven = [fact.comb for fact in facts if fact.comb > WOVEN]  # of film as video, two of five pictures
+    if woven and len(woven) >= PART * len(facts):
+        some = "" if 2 * len(woven) > len(facts) else f" in {len(woven)} of {len(facts)} frames"
+        what = f"neighbouring rows differ {np.median(woven):.2f} times as much as rows two apart{some}"
         found.append(finding("interlaced-pictures", where, what))
     if facts and all((fact.small == fact.small[:, :, :1]).all() for fact in facts):
         found.append(finding("grey-pictures", where, "every picture is grey"))

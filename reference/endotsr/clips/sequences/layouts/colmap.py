@@ -13,7 +13,7 @@ from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.colmap_folders import choose_model, files_of_model, find_models, unregistered
 from endotsr.clips.sequences.colmap_model import ModelImage, read_model
-from endotsr.clips.sequences.files import time_order
+from endotsr.clips.sequences.files import shortened, time_order, visible_files
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.pictures import PAIRS
 from endotsr.clips.sequences.picture_fields import picture_notes
@@ -39,6 +39,7 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
     order = time_order(files)
     files, images = [files[i] for i in order], [registered[i] for i in order]
     notes.insert(0, f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points")
+    notes += _of_nerfstudio(path)
     intrinsics = shared_intrinsics([model.cameras[image.camera] for image in images], folder, notes)
     notes += picture_notes(files) + unregistered(files) + [found.line for found in gap_findings(files)]
     empty, named = np.zeros((0, 3)), {key for image in images for key in image.points.tolist()}
@@ -67,6 +68,17 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
         ),
         notes=notes,
     )
+
+
+def _of_nerfstudio(path: Path) -> list[str]:
+    """A note on a project of nerfstudio, which keeps the model beside its own file."""
+    files = [file.name for file in visible_files(path, "transforms*.json")]
+    if not files:
+        return []
+    return [
+        f"{shortened(files)}: not read, because the COLMAP model is; --layout nerfstudio reads masks, depth and times"
+        " that it names"
+    ]
 
 
 def _one_side(images: list[ModelImage], notes: list[str]) -> list[ModelImage]:

@@ -1,7 +1,8 @@
 """TUM RGB-D folders: `rgb.txt`, `rgb/`, and optionally `depth.txt`, `depth/` and `groundtruth.txt`.
 
 `rgb.txt` and `depth.txt` have one line per picture, `time file`. `groundtruth.txt` is a camera-to-world trajectory in
-seconds and metres. Depth has 5000 steps per metre. Pictures, depth and poses are matched by time, to `LONGEST`.
+seconds and metres. Depth has 5000 steps per metre, or as many as `DepthMapFactor` in settings of ORB-SLAM states.
+Pictures, depth and poses are matched by time, to `LONGEST`.
 """
 
 from pathlib import Path
@@ -31,7 +32,9 @@ from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
+from endotsr.untrusted.json import number
 from endotsr.untrusted.names import relative_path
+from endotsr.untrusted.yaml import read_yaml
 
 LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
 TRAJECTORIES = (
@@ -40,7 +43,8 @@ TRAJECTORIES = (
     "KeyFrameTrajectory.txt",
 )  # the last two: ORB-SLAM
 SETTINGS = ".fx:"  # in the settings of ORB-SLAM
-STEP = 1000.0 / 5000.0  # mm per step of the stored depth
+FACTORS = ("DepthMapFactor", "RGBD.DepthMapFactor")  # of its versions 2 and 3: steps of the depth per metre
+STEPS = 5000.0  # per metre, of the stored depth
 LONGEST = 0.02  # seconds between a picture and its depth or pose
 DEFAULT = (525.0, 525.0, 320.0, 240.0)  # the intrinsics recommended by the authors of the layout, 640x480
 
@@ -56,7 +60,7 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
     Raises:  InputError naming the line.
     """
     times, files = [], []
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+    for place, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split(maxsplit=1)
         if not words or words[0].startswith("#"):
             continue
@@ -65,9 +69,9 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
         except ValueError:
             time = float("nan")
         if len(words) != 2 or not np.isfinite(time):
-            raise InputError(f"{path}: line {number}: allowed: a time in seconds and the name of a file")
+            raise InputError(f"{path}: line {place}: allowed: a time in seconds and the name of a file")
         times.append(time)
-        files.append(path.parent / relative_path(words[1].strip(), f"{path}: line {number}"))
+        files.append(path.parent / relative_path(words[1].strip(), f"{path}: line {place}"))
     if not times:
         raise InputError(f"{path}: names no picture")
     order = np.argsort(times, kind="stable")
@@ -83,14 +87,25 @@ def _unlisted(path: Path, files: list[Path]) -> list[str]:
     return [f"{path.name}: without a line in {LIST}, left out: {shortened(found)}"] if found else []
 
 
-def _listed_depth(path: Path, times: np.ndarray) -> Depth | None:
-    """The depth of `depth.txt` nearest in time to each picture; None without the file."""
+def _depth_steps(settings: Path | None, notes: list[str]) -> float:
+    """Steps of the stored depth per metre: those of the settings, noted, or of the layout. Raises InputError."""
+    keys = {} if settings is None else read_yaml(settings)
+    name = next((name for name in FACTORS if name in keys), None)
+    if settings is None or name is None:
+        return STEPS
+    found = number(keys[name], f"{settings}: {name}", 1e-3, 1e9)
+    notes.append(f"{settings.name}: {name}: the depth has {found:g} steps per metre")
+    return found
+
+
+def _listed_depth(path: Path, times: np.ndarray, step: float) -> Depth | None:
+    """The depth of `depth.txt` nearest in time to each picture, `step` mm per number; None without the file."""
     if not (path / DEPTH_LIST).is_file():
         return None
     stamps, planes = read_list(path / DEPTH_LIST)
     nearest = np.abs(stamps[None, :] - times[:, None]).argmin(axis=1)
     paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
-    return depth_of(paired, STEP)
+    return depth_of(paired, step)
 
 
 def describe_tum(path: Path, options: SourceOptions) -> Clip:
@@ -117,6 +132,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         poses = poses_at(found, times, LONGEST)
         notes.append(f"poses of {where.name}" + "".join(f"; not read: {file.name}" for file in given if file != where))
     planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
+    steps_of_depth = _depth_steps(settings, notes) if planes and options.depth is None else STEPS
     steps = np.diff(times)
     return Clip(
         layout="tum",
@@ -124,7 +140,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         names=[file.stem for file in files],
         pictures=pictures_from_files(files, []),
         masks=stated_masks(options, files, width, height),
-        depth=stated_depth(options, files) or _listed_depth(path, times),
+        depth=stated_depth(options, files) or _listed_depth(path, times, 1000.0 / steps_of_depth),
         unit="mm",
         intrinsics=intrinsics,
         poses=poses,
