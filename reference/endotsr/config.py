@@ -29,7 +29,7 @@ LARGEST_SEED = (1 << 53) - 1  # larger integers are not exact in JSON, which rec
 NO_DENSIFICATION = 1  # largest `density.until` with which no iteration densifies: they count from 1
 
 
-MomentDecay = Annotated[float, msgspec.Meta(ge=0, lt=1)]  # at 1 the bias correction of a moment divides by 0
+DecayRate = Annotated[float, msgspec.Meta(ge=0, lt=1)]  # at 1 the bias correction of a moment divides by 0
 PERCENTILES = "percent, 0 <= low < 50 < high <= 100"
 
 
@@ -177,9 +177,9 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     """last iteration with the constant rates"""
     restart_residual_schedule: bool = True
     """residual rates decay over the steps after activation"""
-    beta1: MomentDecay = 0.9
+    beta1: DecayRate = 0.9
     """Adam first-moment decay"""
-    beta2: MomentDecay = 0.999
+    beta2: DecayRate = 0.999
     """Adam second-moment decay"""
     epsilon: Positive = 1e-15
     """Adam epsilon"""

@@ -13,7 +13,7 @@ from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.camera import Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
-from endotsr.clips.sequences.editing import chosen_frames, cropped, of_one_moment, thinned, with_partner, without
+from endotsr.clips.sequences.editing import chosen_frames, cropped, paired_by_time, thinned, with_partner, without
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
@@ -213,20 +213,20 @@ def test_a_right_view_that_lags_is_paired_by_moment(late, wanted):
     notes: list[str] = []
     kept = with_partner(clip, list(wanted), late, notes)
     assert kept == [i for i in wanted if i + late in range(20)]
-    found = [(int(pair.left[0, 0, 0]), int(pair.right[0, 0, 0])) for pair in of_one_moment(clip, late).pictures(kept)]
+    found = [(int(pair.left[0, 0, 0]), int(pair.right[0, 0, 0])) for pair in paired_by_time(clip, late).pictures(kept)]
     assert found == [(i, 100 + i + late) for i in kept]
     assert read == sorted({*kept, *(i + late for i in kept)})
     assert bool(notes) == (len(kept) < len(wanted))
 
 
-def test_pairs_of_one_moment_keep_no_more_pictures_than_the_lag():
+def test_pairs_paired_by_time_keep_no_more_pictures_than_the_lag():
     clip, read = stereo(100)
-    for turn, pair in enumerate(of_one_moment(clip, 3).pictures(list(range(97)))):
+    for turn, pair in enumerate(paired_by_time(clip, 3).pictures(list(range(97)))):
         assert pair.left[0, 0, 0] == turn and len(read) <= turn + 4
 
 
 def test_a_lag_needs_right_pictures_and_a_longer_clip():
     with pytest.raises(InputError, match="--right-late 20: allowed: -19 to 19 for 20 frames"):
-        of_one_moment(recording(), 20)
+        paired_by_time(recording(), 20)
     with pytest.raises(InputError, match="no right pictures"):
-        next(of_one_moment(recording(), 1).pictures([3]))
+        next(paired_by_time(recording(), 1).pictures([3]))

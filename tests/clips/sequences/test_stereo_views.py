@@ -47,7 +47,7 @@ def test_a_right_view_of_another_frame_is_named(late, words, tmp_path):
 
 
 @pytest.mark.parametrize("late", [2, -1])
-def test_prepare_pairs_the_views_of_one_moment(late, tmp_path, capsys):
+def test_prepare_pairs_the_views_paired_by_time(late, tmp_path, capsys):
     clip, out = stereo_clip(tmp_path / "clip", pairs(late=late)), tmp_path / "out"
     assert main(["prepare", str(clip), "--out", str(out), "--right-late", str(late)]) == 0
     first, said = max(0, -late), capsys.readouterr().out

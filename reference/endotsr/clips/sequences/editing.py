@@ -179,7 +179,7 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     )
 
 
-def of_one_moment(clip: Clip, late: int) -> Clip:
+def paired_by_time(clip: Clip, late: int) -> Clip:
     """The clip with the left picture of frame i beside the right one of frame i + late, for a view that lags.
 
     late     frames of the source by which the right view is late; negative: early

@@ -25,7 +25,7 @@ from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import (
     chosen_frames,
-    of_one_moment,
+    paired_by_time,
     thinned,
     with_partner,
     without,
@@ -89,7 +89,7 @@ def prepare(
     Raises:  InputError, leaving nothing behind.
     """
     if settings.right_late:
-        clip = of_one_moment(clip, settings.right_late)
+        clip = paired_by_time(clip, settings.right_late)
     notes = [*clip.notes, *(part.paired for part in (clip.masks, clip.depth) if part is not None and part.paired)]
     frames = without(chosen_frames(settings.frames, clip), settings.drop, clip)
     chosen = thinned(clip, with_partner(clip, frames, settings.right_late, notes), settings.rate, notes)
