@@ -9,8 +9,9 @@ from tiny import assert_refused, log_without_seconds
 from endotsr.cli.main import main
 from endotsr.cli.parts import waiting
 from endotsr.config import load_config
+from endotsr.errors import InputError
 from endotsr.training.fitting.checkpoint import load_checkpoint
-from endotsr.training.runs.folder import RunFolder
+from endotsr.training.runs.folder import RunFolder, refuse_existing
 from endotsr.training.runs.training import extend_run
 
 
@@ -95,3 +96,11 @@ def test_the_first_line_knows_how_far_the_run_is(run_copy, monkeypatch):
     assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "34", "--no-evaluate"]) == 0
     (at,) = heard
     assert at.iteration == 30 and 0 < at.gaussians == log_without_seconds(run_copy)[29]["gaussians"]
+
+
+def test_the_command_that_continues_a_run_is_quoted_for_a_shell(tmp_path):
+    run = tmp_path / "my run"
+    run.mkdir()
+    (run / "run.json").write_text("{}")
+    with pytest.raises(InputError, match=r"`endotsr train --out '.*/my run' --resume`"):
+        refuse_existing(run)

@@ -70,7 +70,7 @@ class Heard:
 
     def first_line(self, plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
         """In place of `waiting_line`."""
-        found = estimated_seconds(plan, unit or assumed_unit(plan.threads))
+        found = estimated_seconds(plan, unit or assumed_unit(plan.threads), at)
         left = sum(found) - found.reading + (0.0 if compiled else COMPILATION)
         self.said["start"] = {
             "at": self.watch.now(), "left": left, "evaluation": found.evaluation, "initial": found.start,

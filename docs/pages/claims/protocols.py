@@ -4,7 +4,7 @@ Those on other frames come from ablations at half size (`ablation_pulling_half*.
 minus the base, and at a fixed count the whole method minus the method without the detail loss.
 `endotsr evaluate --measures right_view` measures the right camera on two sets of frames: held-out frames, with a new
 time and view, and training frames, with only a new view. Its runs are those of `ablation_pulling_pairs.json`, on the
-clip that `endotsr prepare --right-late -1` writes: the right pictures of the source are one frame early.
+clip that `endotsr prepare --right-late -1` writes: `check` finds the right pictures of the source one frame early.
 """
 
 from typing import Any

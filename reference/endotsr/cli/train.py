@@ -195,7 +195,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 
 def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
-    from endotsr.clips.sequences.checks.duration import at_start, iteration_work, vector_factor
+    from endotsr.clips.sequences.checks.duration import GAUSSIANS, at_start, iteration_work, vector_factor
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.runs.pace import paced_for, seconds_of_unit
 
@@ -203,7 +203,7 @@ def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Confi
     compile_ahead(config, print)
     unit = seconds_of_unit(sequence, config)
     found = paced_for(options.minutes, sequence, config, unit, threads)
-    late = unit * float(iteration_work(60_000, sequence.width * sequence.height, 1.0, vector_factor()))
+    late = unit * float(iteration_work(GAUSSIANS, sequence.width * sequence.height, 1.0, vector_factor()))
     return found, (
         f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * late:.0f} ms: "
         f"{found.training.iterations} iterations, {max(found.density.maximum, at_start(found).gaussians)} Gaussians"

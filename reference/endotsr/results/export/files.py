@@ -85,7 +85,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     model = scene.model
     save_slim_model(out, model, scene.record)
     size = out.stat().st_size
-    kept = (scene.folder.checkpoint, scene.folder.path / "checkpoint.previous.npz") if scene.folder else ()
+    kept = (scene.folder.checkpoint, scene.folder.previous) if scene.folder else ()
     whole = next((file.stat().st_size for file in kept if file.is_file()), None)  # one of them, or both, are there
     compared = f", {size / whole:.1%} of the checkpoint" if whole else ""
     return f"{out}: {model.gaussians.count} Gaussians, {size / 1e6:.2f} MB{compared}"

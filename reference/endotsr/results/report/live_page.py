@@ -7,7 +7,6 @@ the evaluation the page redirects to the report.
 """
 
 import contextlib
-import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +23,7 @@ from endotsr.results.report.figures import bytes_image
 from endotsr.results.report.line_chart import ChartCurve, chart_svg
 from endotsr.training.fitting.model import camera_at, render_at, spectral_from
 from endotsr.training.fitting.records import LogEntry
-from endotsr.training.runs.folder import RunFolder
+from endotsr.training.runs.folder import RunFolder, resume_command
 from endotsr.training.runs.log import log_until
 from endotsr.training.runs.machine import now
 from endotsr.untrusted.writing import replace_text
@@ -152,4 +151,4 @@ def _advice(status: str, folder: Path) -> str:
         return "This page updates itself during training."
     if status == "finished":
         return "After the evaluation, this page redirects to the report."
-    return f"Continue with <code>endotsr train --out {parts.text(shlex.quote(str(folder)))} --resume</code>."
+    return f"Continue with <code>{parts.text(resume_command(folder))}</code>."

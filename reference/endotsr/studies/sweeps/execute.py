@@ -181,7 +181,7 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     weights = load_lpips_weights(job.lpips)
     _, metrics, held_out = measure_folder(folder, sequence, job.source, weights=weights, measures=job.measures)
     write_evaluation(folder, sequence, metrics, held_out)
-    (folder.path / "checkpoint.previous.npz").unlink(missing_ok=True)
+    folder.previous.unlink(missing_ok=True)
     if not job.keep_checkpoints:
         folder.checkpoint.unlink(missing_ok=True)
 

@@ -7,7 +7,6 @@ failed starts cold. Finished windows are kept; unfinished ones continue from the
 """
 
 import contextlib
-import shlex
 from pathlib import Path
 
 from endotsr.clips.sequences.splits import split_frames
@@ -24,7 +23,7 @@ from endotsr.studies.windows.evaluation import WindowCost
 from endotsr.studies.windows.plan import Wanted, check_wanted, planned_windows
 from endotsr.studies.windows.record import FOLDER, Window, WindowsRecord, read_record, write_record
 from endotsr.studies.windows.survey import survey
-from endotsr.training.runs.folder import open_run, refuse_existing
+from endotsr.training.runs.folder import open_run, refuse_existing, resume_command
 from endotsr.training.runs.log import last_entry, last_iteration
 from endotsr.untrusted.writing import replacing_folder
 
@@ -108,8 +107,7 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
         except KeyboardInterrupt:
             done = sum(outcome.status == FINISHED for outcome in found.values())
             raise KeyboardInterrupt(
-                f"{done} of {len(jobs)} windows are finished; continue with"
-                f" `endotsr train --out {shlex.quote(str(run))} --resume`"
+                f"{done} of {len(jobs)} windows are finished; continue with `{resume_command(run)}`"
             ) from None
     return [found[job.name] for job in jobs]
 

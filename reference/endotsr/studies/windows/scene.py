@@ -11,7 +11,6 @@ at frame g, and window k has 1 - w. Colour, depth and opacity are blended with t
 memory.
 """
 
-import shlex
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -32,7 +31,7 @@ from endotsr.results.views.pictures import check_panels, frames_of
 from endotsr.results.views.plan import PlannedView
 from endotsr.studies.windows.make import window_folder
 from endotsr.studies.windows.record import FOLDER, WindowsRecord, is_windowed, read_record
-from endotsr.training.runs.folder import RunFolder, open_run
+from endotsr.training.runs.folder import RunFolder, open_run, resume_command
 from endotsr.training.runs.model import Model
 from endotsr.training.runs.sources import load_run_sequence
 
@@ -170,8 +169,7 @@ def open_windows(run: Path) -> WindowedScene:
     folders = [RunFolder(window_folder(run, window)) for window in plan.windows]
     for folder in folders:
         if not folder.has_checkpoint:  # its folder may not exist either
-            command = f"endotsr train --out {shlex.quote(str(run))} --resume"
-            raise InputError(f"{folder.path}: not trained yet; continue with `{command}`")
+            raise InputError(f"{folder.path}: not trained yet; continue with `{resume_command(run)}`")
         open_run(folder.path)
     return WindowedScene(_record(plan, [folder.sequence_record() for folder in folders]), run=Path(run), plan=plan)
 

@@ -16,6 +16,7 @@ file names and JSON; it is independent of models and pictures.
 
 import contextlib
 import os
+import shlex
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -48,9 +49,14 @@ class RunFolder:
         return self.path / "checkpoint.npz"
 
     @property
+    def previous(self) -> Path:
+        """The checkpoint before the latest one."""
+        return self.path / "checkpoint.previous.npz"
+
+    @property
     def has_checkpoint(self) -> bool:
         """Whether there is a checkpoint, the latest or the previous one."""
-        return os.path.lexists(self.checkpoint) or (self.path / "checkpoint.previous.npz").exists()
+        return os.path.lexists(self.checkpoint) or self.previous.exists()
 
     @property
     def log(self) -> Path:
@@ -114,13 +120,17 @@ def lock_taken(file: IO[bytes]) -> bool:
         return True
 
 
+def resume_command(run: Path) -> str:
+    """The command that continues a run, as a shell takes it."""
+    return f"endotsr train --out {shlex.quote(str(run))} --resume"
+
+
 def refuse_existing(path: Path) -> None:
     """Raises InputError if a new folder cannot be created at `path`, or if something exists there."""
     path = Path(path)
     if (path / "run.json").exists():
         raise InputError(
-            f"{path}: already contains a run; choose another --out, or continue it with "
-            f"`endotsr train --out {path} --resume`"
+            f"{path}: already contains a run; choose another --out, or continue it with `{resume_command(path)}`"
         )
     if os.path.lexists(path):
         raise InputError(f"{path}: exists already; choose another --out")

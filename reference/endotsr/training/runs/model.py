@@ -16,7 +16,7 @@ import msgspec
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.training.runs.files import warn
-from endotsr.training.runs.folder import RunFolder
+from endotsr.training.runs.folder import RunFolder, resume_command
 from endotsr.training.runs.records import RunRecord
 from endotsr.untrusted.toml import by_key
 
@@ -48,9 +48,7 @@ def load_model(folder: RunFolder) -> Model:
     from endotsr.training.fitting.model import spectral_from
 
     if not folder.has_checkpoint:
-        raise InputError(
-            f"{folder.path}: no checkpoint yet; continue the run with `endotsr train --out {folder.path} --resume`"
-        )
+        raise InputError(f"{folder.path}: no checkpoint yet; continue the run with `{resume_command(folder.path)}`")
     config, record = folder.config(), folder.sequence_record()
     checkpoint, _ = _checkpoint_of(folder, config)
     spectral = spectral_from(config.model, record.train_times)

@@ -27,8 +27,8 @@ LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
 REMEMBERED = 0.125
 SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left out; a coarse check takes three
 # Seconds, times the threads, by which one second of the second thread prolongs the iterations: 0.82 and 0.83 on two
-# cores, in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. Of three threads on two cores, a parallel
-# loop waits for the one that shares a core.
+# cores, in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. A guess at the cause: of three threads on
+# two cores, a parallel loop waits for the one that shares a core.
 SLOWED = 1.6
 
 

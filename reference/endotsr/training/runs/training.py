@@ -21,7 +21,7 @@ from endotsr.errors import InputError
 from endotsr.training.fitting.divergence import Diverged
 from endotsr.training.fitting.records import LogEntry
 from endotsr.training.runs.files import os_error_line
-from endotsr.training.runs.folder import RunFolder, create_run
+from endotsr.training.runs.folder import RunFolder, create_run, resume_command
 from endotsr.training.runs.log import RunLog
 from endotsr.training.runs.machine import now, peak_memory_bytes
 from endotsr.training.runs.records import ExtendedEntry, ResumedEntry, RunRecord
@@ -255,7 +255,7 @@ class _Recorder:
     def _advice(self) -> str:
         saved = self._saved
         kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet; the run starts again"
-        return f"{kept}; continue with `endotsr train --out {self._folder.path} --resume`"
+        return f"{kept}; continue with `{resume_command(self._folder.path)}`"
 
     def _mark(self, status: str) -> None:
         with contextlib.suppress(OSError, InputError):  # fails too on a full disk

@@ -107,15 +107,16 @@ def growth_by_threshold(config: Config) -> float:
     return GROWTH + GROWTH_BY_GRADIENT * config.loss.ssim_weight / config.density.gradient_threshold
 
 
-def work_left(config: Config, pixels: int, at: Standing, vectors: float = 1.0) -> float:
+def work_left(config: Config, pixels: int, at: Standing, vectors: float = 1.0, until: int | None = None) -> float:
     """Work from here to the end, with the numbers of `expected_gaussians`.
 
     pixels    of a frame of full size
     vectors   `vector_factor` of the processor
+    until     the last iteration; None = of the run
 
     A coarse start is assumed to last until `coarse_end`.
     """
-    later = np.arange(at.iteration + 1, config.training.iterations + 1)
+    later = np.arange(at.iteration + 1, (until or config.training.iterations) + 1)
     seen = np.where(at.coarse & (later <= max(coarse_end(config, at), 1)), pixels / 4, pixels)
     counts = expected_gaussians(config, at, later)
     return float(np.sum(iteration_work(counts, seen, later / config.training.iterations, vectors)))
@@ -125,9 +126,7 @@ def calibration_work(config: Config, pixels: int, at: Standing, vectors: float =
     """Work of the base model on which equation (7) calibrates an `auto` weight, before the first iteration; else 0."""
     if at.iteration or config.loss.lambda_lap != "auto" or not config.model.laplacian:
         return 0.0
-    later = np.arange(1, config.training.residual_activation + 1)
-    counts = expected_gaussians(config, at, later)
-    return float(np.sum(iteration_work(counts, pixels, later / config.training.iterations, vectors)))
+    return work_left(config, pixels, at._replace(coarse=False), vectors, config.training.residual_activation)
 
 
 def expected_gaussians(config: Config, at: Standing, later: NDArray[np.integer]) -> NDArray[np.floating]:
