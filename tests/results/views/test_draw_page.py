@@ -98,7 +98,7 @@ class Page:
         file.unlink(missing_ok=True)
         self.press("save")
         end = time.monotonic() + 60
-        while not file.exists():
+        while not (file.exists() and file.stat().st_size):  # the browser reserves the name with an empty file
             assert time.monotonic() < end
             time.sleep(0.05)
         return read_drawn(file, clip(), WIDTH, HEIGHT)
