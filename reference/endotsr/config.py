@@ -181,7 +181,7 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     """Adam first-moment decay"""
     beta2: DecayRate = 0.999
     """Adam second-moment decay"""
-    epsilon: Positive = 1e-15
+    epsilon: Annotated[float, msgspec.Meta(ge=1e-37)] = 1e-15  # float32 rounds a smaller one to 0
     """Adam epsilon"""
     legacy_skip: bool = False
     """skip the Adam step on densify iterations, as Deform3DGS and SurgicalGS do"""

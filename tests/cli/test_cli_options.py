@@ -106,6 +106,7 @@ BAD = [
     (["--minutes", "5", "--density.maximum", "900"], ["--minutes with --density.maximum", "use one of them"]),
     (["--minutes", "5", "--training.no-coarse-start"], ["--minutes with --training.no-coarse-start"]),
     (["--optimiser.beta1", "1"], ["optimiser.beta1 = 1", "a number >= 0 and < 1"]),
+    (["--optimiser.epsilon", "1e-46"], ["optimiser.epsilon = 1e-46", "a number >= 1e-37"]),
     (["--optimiser.beta2", "1.0"], ["optimiser.beta2 = 1.0", "a number >= 0 and < 1"]),
 ]
 

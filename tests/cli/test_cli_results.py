@@ -290,3 +290,11 @@ def test_a_run_folder_that_cannot_be_written_is_refused_before_it_is_evaluated(f
     monkeypatch.setattr("os.access", lambda path, mode: False)
     monkeypatch.setattr("endotsr.results.evaluation.run.measure_model", pytest.fail)
     assert_refused(capsys, ["evaluate", str(finished_run)], f"{finished_run}: cannot be written: no permission")
+
+
+def test_a_file_in_a_folder_that_cannot_be_written_is_refused_at_the_start(finished_run, tmp_path, monkeypatch, capsys):
+    """A file is written beside its place and renamed: its own permission is not enough."""
+    file = tmp_path / "metrics.json"
+    file.write_text("{}")
+    monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)
+    assert_refused(capsys, ["evaluate", str(finished_run), "--json", str(file)], "metrics.json: cannot be written")

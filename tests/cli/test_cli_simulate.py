@@ -59,6 +59,7 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
         (["still", "--width", "9000", "--height", "9000"], ("9000x9000 pixels are not allowed", "at most 67108864")),
         (["still", "--width", "15"], ("width = 15 is not allowed", "an integer >= 16")),
         (["still", "--frames", "2"], ("frames = 2 is not allowed", "an integer >= 3")),
+        (["pulling", "--distance", "20000"], ("distance = 20000", "a number > 0 and <= 10000")),
         (["breathing", "--breathing.amplitude", "60"], ("breathing.amplitude = 60 leaves", "allowed: at most")),
         (["still", "--stereo.on", "false"], ("without an excluded pixel", "stereo")),
         (["still", "--relief", "30"], ("leaves the field of view",)),

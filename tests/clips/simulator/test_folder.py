@@ -146,3 +146,9 @@ def test_without_stereo_there_is_no_right_picture(tmp_path):
     write_sequence(tmp_path, settings)
     assert not (tmp_path / "images_right").exists()
     np.testing.assert_array_equal(read_sequence(tmp_path, EXACT).masks, simulate(settings).sequence.masks)
+
+
+def test_depth_beyond_the_largest_level_is_refused(tmp_path):
+    deep = with_settings(small("still"), depth_errors={"on": True, "sigma": 1e6})
+    with pytest.raises(InputError, match=r"depth/000000.png: the prior depth reaches \d+ mm; allowed: at most 65535"):
+        write_sequence(tmp_path, deep, "still")

@@ -13,12 +13,13 @@ from endotsr.cli.main import main
 from endotsr.errors import InputError
 from endotsr.studies.sweeps import cluster, local
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, INTERRUPTED, Outcome, execute
-from endotsr.studies.sweeps.jobs import jobs_of
+from endotsr.studies.sweeps.jobs import finished_folder, jobs_of
 from endotsr.studies.sweeps.locks import file_lock, run_lock
 from endotsr.studies.sweeps.results import results_markdown
 from endotsr.studies.sweeps.spec import read_spec
 from endotsr.studies.sweeps.sweep import Inputs, planned, run_sweep
 from endotsr.training.runs.folder import open_run
+from synthetic_folder import write_synthetic_folder
 
 pytestmark = pytest.mark.slow
 
@@ -145,6 +146,17 @@ def test_a_run_that_was_killed_before_its_last_record_is_finished_without_traini
     assert run.record()["status"] == FINISHED and iterations(run.path) == list(range(1, 31))
 
 
+def test_a_run_that_was_stopped_before_its_report_is_measured_again(tmp_path, monkeypatch):
+    def stopped(data):
+        raise KeyboardInterrupt
+
+    job = first_job(tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr("endotsr.results.report.run_files.report_html", stopped)
+        assert execute(job, 1).status == INTERRUPTED and finished_folder(job) is None
+    assert execute(job, 1).status == FINISHED and (finished_folder(job).path / "report.html").is_file()
+
+
 @pytest.mark.parametrize(
     "before, after, said",
     [
@@ -159,6 +171,21 @@ def test_a_finished_run_of_other_settings_is_refused(whole, before, after, said)
     other.write_text(spec.read_text().replace(before, after))
     with pytest.raises(InputError, match=rf"{said}; allowed: .* another --out"):
         sweep(other, out)
+
+
+def test_finished_runs_of_other_frames_are_refused(tmp_path, monkeypatch):
+    """Files that changed without a change of any array, such as a comment in sequence.toml, are no other frames."""
+    clip, spec = tmp_path / "clip", write_spec(tmp_path, ONE + CONFIGURATIONS, sequences='["clip"]')
+    spec.write_text(spec.read_text().replace("[simulator]\nwidth = 48\nheight = 32\nframes = 9\n", ""))
+    write_synthetic_folder(clip, frames=9)
+    rows = sweep(spec, tmp_path / "out")
+    monkeypatch.setattr("endotsr.clips.sequences.read.file_hashes", lambda path, config: {"other": ""})
+    again = sweep(spec, tmp_path / "out", make=lambda job: pytest.fail(f"made {job.name} again"))
+    assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows]
+    picture = sorted((clip / "images").iterdir())[3]
+    picture.write_bytes(sorted((clip / "images").iterdir())[4].read_bytes())
+    with pytest.raises(InputError, match=r"clip: images differ from those the run .*base-seed0 was trained on"):
+        sweep(spec, tmp_path / "out")
 
 
 def test_a_sweep_that_runs_already_is_refused(whole):

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.clips.sequences.files import TRUTH
 from endotsr.clips.sequences.poses import POSE_FILES, rows_from_cameras
@@ -30,6 +31,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 
 PICTURES = ("images", "images_right", "depth", "masks", "gt_masks")
+DEEPEST = np.iinfo(np.uint16).max  # mm
 TRACKS = (24, 19)  # tracked points, evenly spaced over the first picture, across and down
 
 
@@ -133,6 +135,16 @@ def _write_pictures(folder: Path, i: int, frame: SimulatedFrame) -> None:
     write_png(folder / "images" / name, frame.image.transpose(1, 2, 0))
     if frame.image_right is not None:
         write_png(folder / "images_right" / name, frame.image_right.transpose(1, 2, 0))
-    write_png(folder / "depth" / name, frame.prior.astype(np.uint16))
+    write_png(folder / "depth" / name, _whole_millimetres(frame.prior, name))
     write_png(folder / "masks" / name, np.where(frame.tissue, 0, 255).astype(np.uint8))
     write_png(folder / "gt_masks" / name, np.where(frame.excluded, 255, 0).astype(np.uint8))
+
+
+def _whole_millimetres(prior: NDArray[np.float32], name: str) -> NDArray[np.uint16]:
+    """Levels of a picture of depth. Raises InputError for a depth beyond the largest level."""
+    if prior.max() > DEEPEST:
+        raise InputError(
+            f"simulator: depth/{name}: the prior depth reaches {prior.max():.0f} mm; allowed: at most {DEEPEST}, with a"
+            " smaller distance, relief, depth_errors.sigma or depth_rounding.step"
+        )
+    return prior.astype(np.uint16)

@@ -15,6 +15,7 @@ from endotsr.untrusted.sections import Count, NonNegative, Positive, Section
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]
+Distance = Annotated[float, msgspec.Meta(gt=0, le=10000)]  # the sheet of tissue, and its memory, grow with it
 
 
 class SimulatorSettings(Section, frozen=True, kw_only=True):
@@ -28,7 +29,7 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     """n; frame i is at time i / n"""
     seed: Count = 0
     """seed of the surface, the texture and all noise"""
-    distance: Positive = 50.0
+    distance: Distance = 50.0
     """from the camera to the middle of the tissue, mm"""
     relief: NonNegative = 1.0
     """factor on the folds of the tissue (1: about +-4 mm)"""

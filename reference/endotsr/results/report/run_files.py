@@ -46,7 +46,6 @@ def write_evaluation(
     viewer      name of the viewer page in the folder, to link from the report; "" = none
     """
     _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
-    write_json(folder.path / "metrics.json", metrics)
     log = log_until(folder.log, metrics["run"]["iteration"])
     picture = curves_png(log, metrics)
     if picture:
@@ -63,6 +62,7 @@ def write_evaluation(
         viewer=viewer,
     )
     replace_text(folder.path / REPORT, report_html(data))
+    write_json(folder.path / "metrics.json", metrics)  # last: a run with its metrics has all the others
     lead_to_report(folder.path)
 
 

@@ -19,7 +19,7 @@ from endotsr.studies.sweeps.spec import Configuration, Spec, Start, split_name, 
 from endotsr.training.runs.files import read_json
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.training.runs.records import StartPart
-from endotsr.training.runs.sources import SIMULATED
+from endotsr.training.runs.sources import SIMULATED, check_same_input, load_sequence
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.sections import checked
 from endotsr.untrusted.toml import by_key
@@ -159,6 +159,25 @@ def measured_at_the_end(job: Job) -> bool:
         found = read_json(Path(job.folder) / "metrics.json", ("run.iteration",))
         return found["run"]["iteration"] == job.config.training.iterations
     return False
+
+
+def refuse_other_clip(finished: list[Job]) -> None:
+    """Raises InputError if a finished run was trained on other frames than its sequence has today.
+
+    The arrays are read and compared only where a file differs: a comment in sequence.toml changes no array.
+    """
+    today: dict[str, dict[str, str]] = {}
+    for job in finished:
+        before = open_run(Path(job.folder)).record().get("input", {}).get("files_sha256")
+        if job.source == SIMULATED or not before:
+            continue
+        if job.input_key not in today:
+            from endotsr.clips.sequences.read import file_hashes
+
+            today[job.input_key] = file_hashes(Path(job.source), job.config.sequence)
+        if before != today[job.input_key]:
+            sequence = load_sequence(job.source, job.config, job.simulator)
+            check_same_input(open_run(Path(job.folder)), sequence, job.source)
 
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:

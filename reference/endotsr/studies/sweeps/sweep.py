@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, Outcome, loaded_sequence
-from endotsr.studies.sweeps.jobs import RUNS, Job, finished_folder, jobs_of
+from endotsr.studies.sweeps.jobs import RUNS, Job, finished_folder, jobs_of, refuse_other_clip
 from endotsr.studies.sweeps.locks import file_lock
 from endotsr.studies.sweeps.place import Size
 from endotsr.studies.sweeps.results import RunRow, failures, finished_row, open_row, write_results
@@ -89,10 +89,11 @@ def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> SweepPlan:
     """Every run and its state.
 
     retry    execute failed runs again
-    Raises:  InputError for an unusable sequence or folder.
+    Raises:  InputError for an unusable sequence or folder, and for finished runs of other frames.
     """
     jobs, before = jobs_of(spec, out, inputs.training_frames), failures(out)
     rows = {job.name: finished_row(job) if finished_folder(job) else open_row(job) for job in jobs}
+    refuse_other_clip([job for job in jobs if rows[job.name]["status"] == FINISHED])
     failed = (
         {} if retry else {name: before[name] for name in rows if name in before and rows[name]["status"] != FINISHED}
     )

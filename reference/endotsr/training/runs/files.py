@@ -56,7 +56,8 @@ def refuse_unwritable(*files: Path | None) -> None:
             raise InputError(f"{file}: cannot be written: it is a folder; allowed: the name of a file")
         if not above.is_dir():
             raise InputError(f"{file}: cannot be written: {above} is not a folder; allowed: a file in one that exists")
-        if not os.access(file if file.exists() else above, os.W_OK):
+        # A file is written beside its place and renamed, so its folder has to be writable too.
+        if not all(os.access(path, os.W_OK) for path in (above, file) if path.exists()):
             raise InputError(f"{file}: cannot be written: no permission")
 
 
