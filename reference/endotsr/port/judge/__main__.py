@@ -12,6 +12,7 @@ from endotsr.errors import InputError
 from endotsr.port.judge.badge import write_proof
 from endotsr.port.judge.call import called
 from endotsr.port.judge.certificate import port_of, read_certificate
+from endotsr.port.judge.command import refuse_folders
 from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.profiles import PROFILES
 from endotsr.port.judge.report import as_html, as_json, as_table
@@ -62,9 +63,7 @@ def _judged(golden: Golden, options: argparse.Namespace, scratch: Path) -> tuple
         if options.runs != 1:
             return called_often(golden, options.port, root, options.precision, runs=options.runs, **asked)
         return called(golden, options.port, root, options.precision, **asked)
-    for folder in filter(None, (options.outdir, options.again)):
-        if not folder.is_dir():
-            raise InputError(f"{folder}: not a folder")
+    refuse_folders(options.outdir, options.again, options.level, options.profile)
     return judge(golden, options.outdir, options.precision, again=options.again, **asked), options.outdir
 
 

@@ -11,6 +11,7 @@ import msgspec
 from endotsr.errors import InputError
 from endotsr.port.judge.about import axes_of, page_of
 from endotsr.port.judge.format import (
+    BITS,
     Case,
     Precision,
     Request,
@@ -21,6 +22,7 @@ from endotsr.port.judge.format import (
     to_json,
 )
 from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.profiles import last_level
 from endotsr.port.judge.store import Golden
 
 KEPT = ("requests", "outputs", "outputs_again")  # folders of one call of `golden run`
@@ -80,6 +82,18 @@ def _request(case: Case, level: int) -> Request:
         page=page_of(case.equation), settings=case.settings,
         inputs={name: array.file for name, array in case.inputs.items()}, about=about, outputs=outputs,
     )  # fmt: skip
+
+
+def refuse_folders(outputs: Path, again: Path | None, level: int, profile: str = "") -> None:
+    """Raise InputError if a folder of outputs is missing, or `again` is the same one or has no use."""
+    for folder in filter(None, (outputs, again)):
+        if not folder.is_dir():
+            raise InputError(f"{folder}: not a folder")
+    if again and again.samefile(outputs):
+        raise InputError(f"--again {again}: is OUTDIR itself; give the outputs of a second run")
+    asked = min(level, last_level(profile)) if profile else level
+    if again and asked < BITS:
+        raise InputError(f"--again: two runs are compared at level {BITS}, and level {asked} is asked; leave it out")
 
 
 def refuse_command(command: str) -> None:

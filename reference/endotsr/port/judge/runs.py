@@ -15,12 +15,10 @@ from endotsr.errors import InputError
 from endotsr.port.judge.call import called
 from endotsr.port.judge.command import KEPT, run_port
 from endotsr.port.judge.compare import largest
-from endotsr.port.judge.format import MOST_RUNS, Case, Precision
+from endotsr.port.judge.format import BITS, MOST_RUNS, Case, Precision
 from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report, asked_of, judge, without_claim
-
-BITS = 5  # the level that asks for equal bits
 
 
 class RunDifference(NamedTuple):
