@@ -135,8 +135,9 @@ class Report(msgspec.Struct, kw_only=True):
 
     @property
     def passed(self) -> bool:
-        """Whether the requested level is complete."""
-        return self.level >= self.asked_level
+        """Whether the requested level is complete; in a profile, the highest level up to it that has outputs."""
+        asked = [level for level, (_, count) in self.levels.items() if count] if self.profile else []
+        return self.level >= max(asked, default=self.asked_level)
 
     @property
     def accepted(self) -> bool:
