@@ -390,9 +390,18 @@ def _taken(path: Path, root: Path, asked: Output, precision: Precision) -> NDArr
 
 
 def _identical(got: NDArray, other: NDArray | Refused | None, name: str) -> Verdict:
-    if isinstance(other, np.ndarray) and other.dtype == got.dtype and other.tobytes() == got.tobytes():
+    """Whether an output has the bits of another one; if not, with the first entry that differs."""
+    if not isinstance(other, np.ndarray):
+        return Verdict(False, f"{name}, whose bits it must have, is not there", 0.0, (), np.nan, np.nan)
+    if other.dtype != got.dtype or other.shape != got.shape:
+        reason = f"{got.dtype} {got.shape}; {name} is {other.dtype} {other.shape}"
+        return Verdict(False, reason, 0.0, (), np.nan, np.nan)
+    bits = [np.ascontiguousarray(a).reshape(-1).view(np.uint8).reshape(a.size, -1) for a in (got, other)]
+    unequal = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
+    if not unequal.size:
         return Verdict(True, "same bits", 0.0)
-    return Verdict(False, f"bits differ from {name}", 0.0)
+    worst = tuple(int(k) for k in np.unravel_index(int(unequal[0]), got.shape))
+    return Verdict(False, f"bits differ from {name}", 0.0, worst, float(got[worst]), float(other[worst]))
 
 
 def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:
