@@ -96,8 +96,10 @@ def refuse_folders(outputs: Path, again: Path | None, level: int, profile: str =
         raise InputError(f"--again: two runs are compared at level {BITS}, and level {asked} is asked; leave it out")
 
 
-def refuse_command(command: str) -> None:
-    """Raise InputError if a port's command lacks {requests} or {outputs}."""
+def refuse_command(command: str, seconds: float) -> None:
+    """Raise InputError if a port's command lacks {requests} or {outputs}, or if it gets no time."""
+    if not seconds > 0:
+        raise InputError(f"--timeout {seconds:g}; allowed: seconds above 0, or inf")
     if "{requests}" not in command or "{outputs}" not in command:
         raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
 
@@ -117,9 +119,9 @@ def words_of(command: str, *, backslash_escapes: bool = os.name != "nt") -> list
 def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
     """Run the port's command once, without a shell; returns a note if it failed.
 
-    Raises: InputError if the command lacks {requests} or {outputs}, or cannot be started.
+    Raises: InputError if the command lacks {requests} or {outputs}, gets no time, or cannot be started.
     """
-    refuse_command(command)
+    refuse_command(command, seconds)
     outputs.mkdir(parents=True, exist_ok=True)
     try:
         split = words_of(command)

@@ -5,6 +5,7 @@ asks for equal bits and is not for such a port; one run of level 4 does not see 
 """
 
 import shutil
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -39,7 +40,7 @@ def called_often(
     Raises: InputError as `called`, and for a number of runs or a level that cannot be asked.
     """
     if not 2 <= runs <= MOST_RUNS:
-        raise InputError(f"--runs {runs}; allowed: 2 to {MOST_RUNS}")
+        raise InputError(f"--runs {runs}; allowed: 1 to {MOST_RUNS}")
     if level >= BITS and not profile:
         raise InputError("--runs: level 5 asks for the same bits; give --level 4 or less")
     level = min(asked_of(golden, only, profile, level)[1], BITS - 1)
@@ -48,7 +49,9 @@ def called_often(
     second = root / KEPT[2]
     for number in range(2, runs + 1):
         shutil.rmtree(second, ignore_errors=True)
+        began = time.monotonic()
         note = run_port(port, root / KEPT[0], second, timeout)
+        seconds += time.monotonic() - began
         report = judge(golden, second, precision, level=level, only=only, profile=profile)
         if note:
             without_claim(report, [f"run {number}: {note}"])
@@ -65,7 +68,7 @@ def _right(report: Report) -> int:
 
 
 def _joined(one: RunDifference, other: RunDifference) -> RunDifference:
-    further = max(one, other, key=lambda spread: spread.most)
+    further = max(one, other, key=lambda spread: (spread.most, bool(spread.where)))
     return RunDifference(one.outputs | other.outputs, further.most, further.where)
 
 
