@@ -62,5 +62,5 @@ def test_a_known_failure_that_is_no_case_is_refused(tmp_path):
 def test_a_file_of_known_failures_that_is_no_text_is_refused(tmp_path):
     listed = tmp_path / "known.txt"
     listed.write_bytes("motion/generic  # dür Rest\n".encode("utf-16"))
-    with pytest.raises(InputError, match="known.txt: not UTF-8 text"):
+    with pytest.raises(InputError, match=r"known\.txt: not UTF-8 text"):
         known_of(listed, {"motion/generic"})
