@@ -57,7 +57,7 @@ def fingerprint(name: str, array: NDArray) -> float:
     """
     flat = array.reshape(-1).astype(np.float64)
     broken = ~np.isfinite(flat)
-    with np.errstate(over="ignore"):  # an infinite sum agrees with no mistake
+    with np.errstate(all="ignore"):  # a sum that overflows agrees with no mistake
         return float((signs(name, array.size) * (broken if broken.any() else flat)).sum())
 
 
