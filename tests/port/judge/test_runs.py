@@ -8,7 +8,7 @@ from made_up_ports import racing
 from endotsr.errors import InputError
 from endotsr.port.judge import call, runs
 from endotsr.port.judge.__main__ import main
-from endotsr.port.judge.runs import RunDifference, _joined, called_often, lines
+from endotsr.port.judge.runs import RunDifference, called_often, joined, lines
 
 
 def called(golden, folder, sizes, runs=3, **more):
@@ -60,7 +60,7 @@ def test_the_seconds_are_those_of_every_run(golden, tmp_path, monkeypatch):
 
 def test_bits_that_differ_by_nothing_have_their_place(golden, tmp_path):
     """Two zeros of other signs: before, the place was empty."""
-    spread = _joined(RunDifference(frozenset(), 0.0, ""), RunDifference(frozenset({"a/b/c"}), 0.0, "a/b/c"))
+    spread = joined(RunDifference(frozenset(), 0.0, ""), RunDifference(frozenset({"a/b/c"}), 0.0, "a/b/c"))
     assert lines(2, [], spread)[0].endswith("0 of the tolerance at most (a/b/c)")
 
 

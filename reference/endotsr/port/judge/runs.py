@@ -57,7 +57,7 @@ def called_often(
             without_claim(report, [f"run {number}: {note}"])
         wrong += [] if report.accepted else [number]
         worst = min(worst, report, key=lambda one: (one.accepted, one.level, _right(one)))
-        spread = _joined(spread, spread_of(golden, first, second, precision, level))
+        spread = joined(spread, spread_of(golden, first, second, precision, level))
     worst.seconds, worst.runs = seconds, runs
     worst.notes += lines(runs, wrong, spread)
     return worst, first
@@ -67,7 +67,7 @@ def _right(report: Report) -> int:
     return sum(o.status == "passed" for case in report.cases for o in case.outputs)
 
 
-def _joined(one: RunDifference, other: RunDifference) -> RunDifference:
+def joined(one: RunDifference, other: RunDifference) -> RunDifference:
     further = max(one, other, key=lambda spread: (spread.most, bool(spread.where)))
     return RunDifference(one.outputs | other.outputs, further.most, further.where)
 
