@@ -97,6 +97,13 @@ def test_two_passes_of_other_bits_show_the_first_entry_that_differs(golden, righ
     assert found.endswith(f"{to}, whose bits it must have, is not there")
 
 
+def test_a_part_is_right_without_a_second_run(golden, right, capsys):
+    """Before, `golden judge OUTDIR --only matern` ended with exit code 1, as level 5 is the default."""
+    assert run(["judge", str(right), "--only", "matern"]) == 0 and "missing" not in capsys.readouterr().out
+    assert run(["judge", str(right), "--search", "0"]) == 1 and "second run" in capsys.readouterr().out
+    assert judge(golden, right, "float32", only="matern", again=right).cases[-1].name == "determinism/again"
+
+
 def test_what_is_left_out_is_said_and_is_printed_on_request(golden, right):
     count = 0
     for case in golden.cases:
