@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 
+from endotsr.definition.calibration import calibrate as plain_calibrate
+from endotsr.definition.covariance import covariance_forward as plain_covariance
+from endotsr.method.equations.calibration import calibrate
+from endotsr.method.splatting.covariance import covariance_forward
 from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.registry import all_stages
@@ -48,3 +52,18 @@ def test_a_wrong_function_is_seen():
 
 def test_a_larger_bound_has_a_reason():
     assert all(reason for _, reason in BOUNDS.values())
+
+
+def test_a_view_whose_photometric_gradient_is_infinite_is_dropped_by_both():
+    """Before, its ratio was 0 in the definition."""
+    views = [("broken", np.inf, 1.0), ("right", 1.0, 2.0)]
+    for function in (plain_calibrate, calibrate):
+        assert function(views, 0.25).lambda_lap == 0.125 and function(views, 0.25).ratios.tolist() == [2.0]
+
+
+def test_a_log_scale_that_is_no_number_is_not_clipped_by_either():
+    """Before, the definition drew such a Gaussian with the largest scale."""
+    quaternion, log_scale = np.eye(4)[:, :1], np.array([[np.nan], [41.0], [-41.0]])
+    for function in (plain_covariance, covariance_forward):
+        scale = function(quaternion, log_scale)[0].scale[:, 0]
+        assert np.isnan(scale[0]) and np.allclose(scale[1:], np.exp([40.0, -40.0]), rtol=1e-14)

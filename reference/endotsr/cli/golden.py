@@ -118,15 +118,14 @@ def run(words: list[str]) -> int:
 
 
 def _judge(words: list[str]) -> int:
+    from endotsr.port.judge.command import refuse_folders
     from endotsr.port.judge.store import golden_folder, read_golden
     from endotsr.port.judge.verdict import judge
 
     options = parse(JudgeOptions, words, "golden judge")
     if options.outdir is None:
         raise InputError("golden judge: OUTDIR is missing")
-    for folder in filter(None, (options.outdir, options.again)):
-        if not folder.is_dir():
-            raise InputError(f"{folder}: not a folder")
+    refuse_folders(options.outdir, options.again, options.level, options.profile)
     golden = read_golden(golden_folder(options.golden))
     asked = {"level": options.level, "again": options.again, "only": options.only, "profile": options.profile}
     report = judge(golden, options.outdir, options.precision, **asked)

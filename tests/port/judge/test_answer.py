@@ -76,6 +76,34 @@ def test_a_file_of_another_name_is_named_beside_the_missing_one(golden, right):
     assert "unlike" not in text
 
 
+def test_two_passes_of_other_bits_show_the_first_entry_that_differs(golden, right):
+    """Before, the report had 0 and 0 at no index."""
+    case = case_of(golden, "determinism/twice")
+    name = next(name for name, o in case.outputs.items() if o.compare.kind == "identical" and o.shape)
+    to, last = case.outputs[name].compare.to, tuple(n - 1 for n in case.outputs[name].shape)
+
+    def nudged(array):
+        changed = array.copy()
+        changed[last] = np.nextafter(changed[last], np.inf)
+        return changed
+
+    spoil(golden, right, case.name, name, nudged)
+    found = line(as_table(judge(golden, right, "float64", only=case.name)), f"  {case.name}/{name}: ")
+    assert f"bits differ from {to}; at {list(last)} " in found and "off by 0.00" not in found
+    spoil(golden, right, case.name, name, lambda array: array.astype(np.float32))
+    assert f"{to} is float64" in as_table(judge(golden, right, "float32", only=case.name))
+    (right / case.name / f"{to}.npy").unlink()
+    found = line(as_table(judge(golden, right, "float32", only=case.name)), f"  {case.name}/{name}: ")
+    assert found.endswith(f"{to}, whose bits it must have, is not there")
+
+
+def test_a_part_is_right_without_a_second_run(golden, right, capsys):
+    """Before, `golden judge OUTDIR --only matern` ended with exit code 1, as level 5 is the default."""
+    assert run(["judge", str(right), "--only", "matern"]) == 0 and "missing" not in capsys.readouterr().out
+    assert run(["judge", str(right), "--search", "0"]) == 1 and "second run" in capsys.readouterr().out
+    assert judge(golden, right, "float32", only="matern", again=right).cases[-1].name == "determinism/again"
+
+
 def test_what_is_left_out_is_said_and_is_printed_on_request(golden, right):
     count = 0
     for case in golden.cases:

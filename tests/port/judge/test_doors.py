@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 import sys
 
 import numpy as np
@@ -11,6 +12,7 @@ from made_up_ports import case_of
 
 from endotsr.cli.golden import run
 from endotsr.errors import InputError
+from endotsr.port.judge.__main__ import main
 from endotsr.port.judge.command import words_of
 from endotsr.port.judge.npy import npy_bytes, read_plain
 from endotsr.port.judge.report import as_table
@@ -76,7 +78,8 @@ def test_bits_that_change_between_runs_stop_level_5(golden, answered, tmp_path):
 
 def test_exit_codes_and_report_files(golden, answered, tmp_path, capsys):
     precision, folder = answered
-    words = ["judge", str(folder), "--precision", precision, "--again", str(folder)]
+    second = shutil.copytree(folder, tmp_path / "second")
+    words = ["judge", str(folder), "--precision", precision, "--again", str(second)]
     page, data = tmp_path / "r.html", tmp_path / "r.json"
     assert run([*words, "--html", str(page), "--json", str(data)]) == 0
     assert f"level 5, {precision}" in capsys.readouterr().out
@@ -86,6 +89,26 @@ def test_exit_codes_and_report_files(golden, answered, tmp_path, capsys):
         run(["judge", str(tmp_path / "nothing")])
     with pytest.raises(InputError):
         run(["judje"])
+
+
+@pytest.mark.parametrize("door", [run, main])
+def test_one_folder_is_not_two_runs(tmp_path, capsys, door):
+    """Before, the first run was compared with itself and had level 5; below level 5 the second run had no effect."""
+    other = tmp_path / "other"
+    other.mkdir()
+    words = ["judge", str(tmp_path), "--again"]
+    for more, reason in (
+        ([str(other / "..")], "is OUTDIR itself"),
+        ([str(other), "--level", "4"], "level 4 is asked; leave it out"),
+        ([str(other), "--profile", "losses"], "level 2 is asked; leave it out"),
+        ([str(tmp_path / "none")], "none: not a folder"),
+    ):
+        try:
+            assert door([*words, *more]) == 2
+            said = capsys.readouterr().err
+        except InputError as error:
+            said = str(error)
+        assert reason in said
 
 
 def test_a_command_is_called_with_requests_alone(golden, tmp_path, capsys):

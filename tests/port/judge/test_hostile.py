@@ -57,6 +57,7 @@ BAD = {
     "nan": (npy_bytes(np.full((3, 7), np.nan)), "not finite"),
     "inf": (npy_bytes(np.full((3, 7), np.inf)), "not finite"),
     "zeros": (npy_bytes(RIGHT), "of scale"),
+    "boolean bytes": (header(plain("|b1"), b"\x01" * 20 + b"\x02"), "a boolean byte other than 0 and 1"),
     "version 9": (header(plain(), b"\x00" * 168, version=9), "version"),
 }  # fmt: skip
 

@@ -74,6 +74,16 @@ def test_verify_judges_again(written, tmp_path, capsys):
     assert "without: " in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["smallest", "largest"])
+def test_other_tolerances_are_a_difference(written, tmp_path, capsys, name):
+    """Before, a certificate with any tolerances was confirmed."""
+    data = json.loads((written / "c.json").read_text())
+    data["tolerances"][name] *= 2
+    (tmp_path / "c.json").write_text(json.dumps(data))
+    assert run(["verify", str(tmp_path / "c.json"), "--port", command()]) == 1
+    assert f"tolerances.{name}: the certificate says" in capsys.readouterr().out
+
+
 def test_a_command_out_of_a_file_is_shown_and_not_run(written):
     with pytest.raises(InputError, match=r"not run.*three_functions"):
         run(["verify", str(written / "c.json")])

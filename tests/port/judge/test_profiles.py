@@ -6,6 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from made_up_ports import write_expected
 
 from endotsr.cli import golden as golden_command
 from endotsr.cli.golden import run
@@ -77,6 +78,16 @@ def test_a_forward_renderer_claims_its_images(golden, port):
     assert (said(report) == {"renderer-forward": 3, "renderer": 1} and not report.accepted) or report.level == 1
     assert report.claim.endswith(", reverse passes") and not report.notes
     assert not judge(golden, port, "float32", profile="renderer").passed
+
+
+@pytest.mark.parametrize(("name", "level"), [("renderer-forward", 2), ("optimiser", 0), ("training", 4)])
+def test_a_level_that_a_profile_has_no_output_of_is_passed_over(golden, tmp_path, name, level):
+    """Before, level 2 of the forward renderer was never complete."""
+    write_expected(golden, golden.cases, tmp_path)
+    report = judge(golden, tmp_path, "float32", profile=name, level=level)
+    assert report.passed and report.level == min(level, 1) + 3 * (name == "training")
+    (tmp_path / "reading" / "layout" / "flat.npy").unlink()
+    assert not judge(golden, tmp_path, "float32", profile=name, level=level).passed
 
 
 def test_losses_alone(golden, port):

@@ -7,7 +7,7 @@ import pytest
 from made_up_ports import case_of
 
 from endotsr.errors import InputError
-from endotsr.port.judge.pytest_cases import answered, explain, golden_test
+from endotsr.port.judge.pytest_cases import answered, explain, golden_test, known_of
 
 
 def answer(operation, inputs, settings):
@@ -57,3 +57,10 @@ def test_a_known_failure_that_is_no_case_is_refused(tmp_path):
     (tmp_path / "known.txt").write_text("motion/nothing\n")
     with pytest.raises(InputError, match="no such case"):
         golden_test(answer, known_failures=tmp_path / "known.txt")
+
+
+def test_a_file_of_known_failures_that_is_no_text_is_refused(tmp_path):
+    listed = tmp_path / "known.txt"
+    listed.write_bytes("motion/generic  # dür Rest\n".encode("utf-16"))
+    with pytest.raises(InputError, match=r"known\.txt: not UTF-8 text"):
+        known_of(listed, {"motion/generic"})

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from endotsr.port.judge.compare import fingerprint
 from endotsr.port.judge.relate import relations
 
 RIGHT = np.arange(1.0, 16.0).reshape(3, 5) ** 1.5
@@ -94,3 +95,15 @@ def test_long_lists_of_indices_are_counted():
     got = right.copy()
     got[0, 3:40] *= np.linspace(1.1, 1.5, 37)
     assert "only at 37 of 50 indices of axis 1" in [r.text for r in relations(got, right, "max", 1e-12, {})]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("got", [np.full((3, 5), 1e308), np.where(RIGHT > 50, -1.7e308, RIGHT)])
+def test_a_number_near_the_largest_neither_warns_nor_is_an_infinite_factor(got):
+    said = [one.text for one in relations(got, RIGHT, "max", 1e-12, {"other": 1e300 * RIGHT})]
+    assert said and not any("inf" in text or "nan" in text for text in said)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_fingerprint_that_overflows_does_not_warn():
+    assert not np.isfinite(fingerprint("name", np.full(64, 1e308)))

@@ -1,11 +1,14 @@
 """Several runs of a port: each within tolerance, and what differs between them; a wrong run is found in any place."""
 
+import time
+
 import pytest
 from made_up_ports import racing
 
 from endotsr.errors import InputError
+from endotsr.port.judge import call, runs
 from endotsr.port.judge.__main__ import main
-from endotsr.port.judge.runs import RunDifference, called_often, lines
+from endotsr.port.judge.runs import RunDifference, called_often, joined, lines
 
 
 def called(golden, folder, sizes, runs=3, **more):
@@ -37,10 +40,28 @@ def test_a_run_that_fails_takes_the_claim(golden, tmp_path):
 
 
 def test_what_cannot_be_asked_is_refused(golden, tmp_path):
-    with pytest.raises(InputError, match="--runs 1; allowed: 2 to 1000"):
-        called(golden, tmp_path, [0.0], runs=1)
+    for number in (0, 1001):
+        with pytest.raises(InputError, match=f"--runs {number}; allowed: 1 to 1000"):
+            called(golden, tmp_path, [0.0], runs=number)
+    for seconds in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match=r"--timeout .*; allowed: seconds above 0"):
+            called(golden, tmp_path, [0.0], timeout=seconds)
+    assert not (tmp_path / "kept").exists()
     with pytest.raises(InputError, match="level 5 asks for the same bits"):
         called_often(golden, "p {requests} {outputs}", tmp_path, "float32", runs=2, level=5)
+
+
+def test_the_seconds_are_those_of_every_run(golden, tmp_path, monkeypatch):
+    """Before, they were those of the first run."""
+    for module in (call, runs):
+        monkeypatch.setattr(module, "run_port", lambda *words: time.sleep(0.1) or "")
+    assert called(golden, tmp_path, [0.0]).seconds >= 0.3
+
+
+def test_bits_that_differ_by_nothing_have_their_place(golden, tmp_path):
+    """Two zeros of other signs: before, the place was empty."""
+    spread = joined(RunDifference(frozenset(), 0.0, ""), RunDifference(frozenset({"a/b/c"}), 0.0, "a/b/c"))
+    assert lines(2, [], spread)[0].endswith("0 of the tolerance at most (a/b/c)")
 
 
 def test_the_program_of_the_judge_has_the_option(tmp_path, capsys):
@@ -54,3 +75,10 @@ def test_a_decision_that_differs_is_said_as_such():
     assert lines(4, [], spread)[0].endswith(
         "1 outputs have other bits in another run, a decision differs (density/full/count)"
     )
+
+
+@pytest.mark.parametrize("option", ["--json", "--html", "--certificate", "--badge"])
+def test_a_file_that_cannot_be_written_is_refused_before_the_port_runs(tmp_path, capsys, option):
+    words = ["run", "--port", racing(tmp_path, [0.0]), "--level", "1", "--only", "motion", option]
+    assert main([*words, str(tmp_path / "none" / "file")]) == 2 and main([*words, str(tmp_path)]) == 2
+    assert "cannot be written" in capsys.readouterr().err and not (tmp_path / "count").exists()

@@ -166,8 +166,9 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
     returns     Shape(rotation (3, 3, N), scale (3, N) scene units)
 
     Reverse: `covariance_reverse`; the gradient is orthogonal to the quaternion and scales with 1/|q|.
-    Edges:   the zero quaternion is the identity with zero gradient; below |q| = 1e-20 the gradient is computed for
-             |q| = 1e-20; a clipped log-scale has zero gradient (`covariance_degenerate` counts zeros and clipped).
+    Edges:   the zero quaternion is the identity with zero gradient; with a largest entry below 1e-20, the gradient
+             is that of q lengthened until it is 1e-20; a clipped log-scale has zero gradient (`covariance_degenerate`
+             counts zeros and clipped).
     Oracle:  scipy.spatial.transform.Rotation; `endotsr.definition.covariance`.
     """
     n = quaternion.shape[1]

@@ -4,6 +4,7 @@ It has no search for the line of the definition that a port computes: `endotsr g
 """
 
 import argparse
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -12,6 +13,7 @@ from endotsr.errors import InputError
 from endotsr.port.judge.badge import write_proof
 from endotsr.port.judge.call import called
 from endotsr.port.judge.certificate import port_of, read_certificate
+from endotsr.port.judge.command import refuse_folders
 from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.profiles import PROFILES
 from endotsr.port.judge.report import as_html, as_json, as_table
@@ -62,9 +64,7 @@ def _judged(golden: Golden, options: argparse.Namespace, scratch: Path) -> tuple
         if options.runs != 1:
             return called_often(golden, options.port, root, options.precision, runs=options.runs, **asked)
         return called(golden, options.port, root, options.precision, **asked)
-    for folder in filter(None, (options.outdir, options.again)):
-        if not folder.is_dir():
-            raise InputError(f"{folder}: not a folder")
+    refuse_folders(options.outdir, options.again, options.level, options.profile)
     return judge(golden, options.outdir, options.precision, again=options.again, **asked), options.outdir
 
 
@@ -75,10 +75,19 @@ def _verified(golden: Golden, options: argparse.Namespace, scratch: Path) -> int
     return 1 if found else 0
 
 
+def _refuse_unwritable(options: argparse.Namespace) -> None:
+    """Raise InputError before the port runs if a file cannot be written afterwards."""
+    for name in ("json", "html", "certificate", "badge"):
+        file = getattr(options, name, None)
+        if file and (file.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK)):
+            raise InputError(f"--{name} {file}: cannot be written; allowed: a file in a folder that exists")
+
+
 def main(words: list[str]) -> int:
     """The command: exit code 0 if the level is complete, 1 if it is not, 2 if it cannot be judged."""
     options = _parser().parse_args(words)
     try:
+        _refuse_unwritable(options)
         golden = read_golden(golden_folder(options.golden))
         with tempfile.TemporaryDirectory() as scratch:
             if options.command == "verify":

@@ -19,7 +19,7 @@ def called(
 
     Raises: InputError if the command cannot be used, or `root` has folders that no earlier call made.
     """
-    refuse_command(port)
+    refuse_command(port, timeout)
     requests, *folders = (root / name for name in KEPT)
     clear_kept(root)
     asked, level = asked_of(golden, only, profile, level)

@@ -11,6 +11,7 @@ import msgspec
 from endotsr.errors import InputError
 from endotsr.port.judge.about import axes_of, page_of
 from endotsr.port.judge.format import (
+    BITS,
     Case,
     Precision,
     Request,
@@ -21,6 +22,7 @@ from endotsr.port.judge.format import (
     to_json,
 )
 from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.profiles import last_level
 from endotsr.port.judge.store import Golden
 
 KEPT = ("requests", "outputs", "outputs_again")  # folders of one call of `golden run`
@@ -82,8 +84,22 @@ def _request(case: Case, level: int) -> Request:
     )  # fmt: skip
 
 
-def refuse_command(command: str) -> None:
-    """Raise InputError if a port's command lacks {requests} or {outputs}."""
+def refuse_folders(outputs: Path, again: Path | None, level: int, profile: str = "") -> None:
+    """Raise InputError if a folder of outputs is missing, or `again` is the same one or has no use."""
+    for folder in filter(None, (outputs, again)):
+        if not folder.is_dir():
+            raise InputError(f"{folder}: not a folder")
+    if again and again.samefile(outputs):
+        raise InputError(f"--again {again}: is OUTDIR itself; give the outputs of a second run")
+    asked = min(level, last_level(profile)) if profile else level
+    if again and asked < BITS:
+        raise InputError(f"--again: two runs are compared at level {BITS}, and level {asked} is asked; leave it out")
+
+
+def refuse_command(command: str, seconds: float) -> None:
+    """Raise InputError if a port's command lacks {requests} or {outputs}, or if it gets no time."""
+    if not seconds > 0:
+        raise InputError(f"--timeout {seconds:g}; allowed: seconds above 0, or inf")
     if "{requests}" not in command or "{outputs}" not in command:
         raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
 
@@ -103,9 +119,9 @@ def words_of(command: str, *, backslash_escapes: bool = os.name != "nt") -> list
 def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
     """Run the port's command once, without a shell; returns a note if it failed.
 
-    Raises: InputError if the command lacks {requests} or {outputs}, or cannot be started.
+    Raises: InputError if the command lacks {requests} or {outputs}, gets no time, or cannot be started.
     """
-    refuse_command(command)
+    refuse_command(command, seconds)
     outputs.mkdir(parents=True, exist_ok=True)
     try:
         split = words_of(command)

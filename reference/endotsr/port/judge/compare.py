@@ -57,7 +57,8 @@ def fingerprint(name: str, array: NDArray) -> float:
     """
     flat = array.reshape(-1).astype(np.float64)
     broken = ~np.isfinite(flat)
-    return float((signs(name, array.size) * (broken if broken.any() else flat)).sum())
+    with np.errstate(all="ignore"):  # a sum that overflows agrees with no mistake
+        return float((signs(name, array.size) * (broken if broken.any() else flat)).sum())
 
 
 def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str, order: str = "") -> Verdict:

@@ -23,6 +23,7 @@ LEVELS = {
 }
 Precision = Literal["float32", "float64"]
 MOST_RUNS = 1000  # of a port with races
+BITS = 5  # the level that asks for equal bits in two runs
 OPTIONS = ("exposure",)  # operations that a case of another operation may use; its arrays are named after them
 FLIP_BUDGET = "band"  # the name in the files of the rule that lets some entries flip
 

@@ -134,6 +134,8 @@ def _read_open(handle: int, largest: int) -> NDArray:
         data = file.read(length)
         if len(data) != length:
             raise Refused("file ended while it was read")
+    if kind == "b" and data.strip(b"\0\1"):
+        raise Refused("a boolean byte other than 0 and 1")
     return np.frombuffer(data, np.dtype(f"<{kind}{size}")).reshape(header.shape)
 
 

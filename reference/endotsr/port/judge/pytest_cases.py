@@ -79,6 +79,8 @@ def known_of(file: str | Path | None, names: set[str]) -> set[str]:
         lines = [line.split("#")[0].strip() for line in Path(file).read_text(encoding="utf-8").splitlines()]
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: not UTF-8 text") from None
     listed = {line for line in lines if line}
     if listed - names:
         raise InputError(f"{file}: no such case: {', '.join(sorted(listed - names))}")

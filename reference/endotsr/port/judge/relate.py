@@ -80,7 +80,11 @@ def relations(
     kind, tolerance   as of the rule of the output
     others            the other arrays of the case: inputs, and the expected other outputs
     """
-    pair = OutputPair(got, expected, kind, tolerance)
+    with np.errstate(all="ignore"):  # outputs up to 1e308: a product or a mean may overflow, and then fits nothing
+        return _relations(OutputPair(got, expected, kind, tolerance), others)
+
+
+def _relations(pair: OutputPair, others: Mapping[str, NDArray]) -> list[Relation]:
     if not pair.wrong.any():
         return []
     broken = ~np.isfinite(pair.got)
@@ -128,6 +132,8 @@ def _times(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation
     if not square:
         return
     factor = float((pair.got * pair.expected).sum()) / square
+    if not math.isfinite(factor):
+        return
     if not pair.got.any():
         yield Relation(kind="zero", text="0 everywhere", value=0.0)
     elif pair.close(factor * pair.expected, factor):

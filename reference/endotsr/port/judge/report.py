@@ -255,7 +255,8 @@ def _plane(array: NDArray) -> NDArray[np.float64]:
 def _png(plane: NDArray[np.float64], low: float, high: float) -> str:
     """An 8-bit grey PNG as base64."""
     span = high - low if high > low else 1.0
-    grey = np.clip(np.nan_to_num((plane - low) / span, nan=1.0), 0.0, 1.0)
+    with np.errstate(all="ignore"):
+        grey = np.clip(np.nan_to_num((plane - low) / span, nan=1.0), 0.0, 1.0)
     pixels = (grey * 255).astype(np.uint8)
     height, width = pixels.shape
     raw = b"".join(b"\x00" + row.tobytes() for row in pixels)

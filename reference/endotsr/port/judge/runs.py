@@ -5,6 +5,7 @@ asks for equal bits and is not for such a port; one run of level 4 does not see 
 """
 
 import shutil
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,12 +16,10 @@ from endotsr.errors import InputError
 from endotsr.port.judge.call import called
 from endotsr.port.judge.command import KEPT, run_port
 from endotsr.port.judge.compare import largest
-from endotsr.port.judge.format import MOST_RUNS, Case, Precision
+from endotsr.port.judge.format import BITS, MOST_RUNS, Case, Precision
 from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report, asked_of, judge, without_claim
-
-BITS = 5  # the level that asks for equal bits
 
 
 class RunDifference(NamedTuple):
@@ -41,7 +40,7 @@ def called_often(
     Raises: InputError as `called`, and for a number of runs or a level that cannot be asked.
     """
     if not 2 <= runs <= MOST_RUNS:
-        raise InputError(f"--runs {runs}; allowed: 2 to {MOST_RUNS}")
+        raise InputError(f"--runs {runs}; allowed: 1 to {MOST_RUNS}")
     if level >= BITS and not profile:
         raise InputError("--runs: level 5 asks for the same bits; give --level 4 or less")
     level = min(asked_of(golden, only, profile, level)[1], BITS - 1)
@@ -50,13 +49,15 @@ def called_often(
     second = root / KEPT[2]
     for number in range(2, runs + 1):
         shutil.rmtree(second, ignore_errors=True)
+        began = time.monotonic()
         note = run_port(port, root / KEPT[0], second, timeout)
+        seconds += time.monotonic() - began
         report = judge(golden, second, precision, level=level, only=only, profile=profile)
         if note:
             without_claim(report, [f"run {number}: {note}"])
         wrong += [] if report.accepted else [number]
         worst = min(worst, report, key=lambda one: (one.accepted, one.level, _right(one)))
-        spread = _joined(spread, spread_of(golden, first, second, precision, level))
+        spread = joined(spread, spread_of(golden, first, second, precision, level))
     worst.seconds, worst.runs = seconds, runs
     worst.notes += lines(runs, wrong, spread)
     return worst, first
@@ -66,8 +67,8 @@ def _right(report: Report) -> int:
     return sum(o.status == "passed" for case in report.cases for o in case.outputs)
 
 
-def _joined(one: RunDifference, other: RunDifference) -> RunDifference:
-    further = max(one, other, key=lambda spread: spread.most)
+def joined(one: RunDifference, other: RunDifference) -> RunDifference:
+    further = max(one, other, key=lambda spread: (spread.most, bool(spread.where)))
     return RunDifference(one.outputs | other.outputs, further.most, further.where)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.port.judge.compare import Verdict, judged, misses
 from endotsr.port.judge.diagnose import diagnosis, first_wrong
-from endotsr.port.judge.format import LEVELS, Case, Output, Precision
+from endotsr.port.judge.format import BITS, LEVELS, Case, Output, Precision
 from endotsr.port.judge.needles import Off, only_needles
 from endotsr.port.judge.npy import Refused, read_plain, read_text
 from endotsr.port.judge.profiles import (
@@ -135,8 +135,9 @@ class Report(msgspec.Struct, kw_only=True):
 
     @property
     def passed(self) -> bool:
-        """Whether the requested level is complete."""
-        return self.level >= self.asked_level
+        """Whether the requested level is complete; in a profile, the highest level up to it that has outputs."""
+        asked = [level for level, (_, count) in self.levels.items() if count] if self.profile else []
+        return self.level >= max(asked, default=self.asked_level)
 
     @property
     def accepted(self) -> bool:
@@ -165,7 +166,7 @@ def judge(
         for case in golden.cases
         if case.level <= level
     ]
-    if level >= 5:
+    if level >= BITS and (again or not only):  # a part has no claim, and so needs no second run
         reports.append(_not_repeated() if again is None else _repeated(golden, outputs, again, without))
     report = conclude(golden, reports, precision, level, notes, without, profile)
     if only:
@@ -389,9 +390,18 @@ def _taken(path: Path, root: Path, asked: Output, precision: Precision) -> NDArr
 
 
 def _identical(got: NDArray, other: NDArray | Refused | None, name: str) -> Verdict:
-    if isinstance(other, np.ndarray) and other.dtype == got.dtype and other.tobytes() == got.tobytes():
+    """Whether an output has the bits of another one; if not, with the first entry that differs."""
+    if not isinstance(other, np.ndarray):
+        return Verdict(False, f"{name}, whose bits it must have, is not there", 0.0, (), np.nan, np.nan)
+    if other.dtype != got.dtype or other.shape != got.shape:
+        reason = f"{got.dtype} {got.shape}; {name} is {other.dtype} {other.shape}"
+        return Verdict(False, reason, 0.0, (), np.nan, np.nan)
+    bits = [np.ascontiguousarray(a).reshape(-1).view(np.uint8).reshape(a.size, -1) for a in (got, other)]
+    unequal = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
+    if not unequal.size:
         return Verdict(True, "same bits", 0.0)
-    return Verdict(False, f"bits differ from {name}", 0.0)
+    worst = tuple(int(k) for k in np.unravel_index(int(unequal[0]), got.shape))
+    return Verdict(False, f"bits differ from {name}", 0.0, worst, float(got[worst]), float(other[worst]))
 
 
 def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:

@@ -65,11 +65,10 @@ def differences(golden: Golden, given: Certificate, report: Report, command: str
     if not report.passed:
         return [f"claim: the certificate says {given.claim!r}, the judge {report.claim!r}"]
     now = certified(golden, report, port_of(command))
-    return [
-        f"{name}: the certificate says {getattr(given, name)!r}, the judge {getattr(now, name)!r}"
-        for name in COMPARED
-        if getattr(given, name) != getattr(now, name)
-    ]
+    pairs = [(name, getattr(given, name), getattr(now, name)) for name in COMPARED]
+    limits = ("smallest", "largest")
+    pairs += [(f"tolerances.{one}", getattr(given.tolerances, one), getattr(now.tolerances, one)) for one in limits]
+    return [f"{name}: the certificate says {said!r}, the judge {one!r}" for name, said, one in pairs if said != one]
 
 
 def summary(given: Certificate, command: str, found: list[str]) -> list[str]:
