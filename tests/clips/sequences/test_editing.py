@@ -1,6 +1,7 @@
 """Editing a clip: frames by number and second, frames left out, a crop, masks united, a folder replaced."""
 
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,22 @@ def test_a_crop_moves_the_principal_point_of_every_camera():
 def test_a_crop_outside_is_refused(window):
     with pytest.raises(InputError, match="--crop"):
         next(cropped(recording(), window).pictures([0]))
+
+
+@pytest.mark.parametrize("other", ["depth", "pictures", "camera"])
+def test_a_crop_needs_one_size(other):
+    """The window of a plane of another size shows another place, and has the size of the crop all the same."""
+    camera = Intrinsics(30.0, 31.0, 16.0, 12.0, *((64, 48) if other == "camera" else (32, 24)))
+    depth = Depth(lambda i: np.ones((48, 64), np.float32))
+    clip = cropped(recording(intrinsics=camera, depth=depth), (5, 3, 20, 12))
+    if other == "pictures":
+        odd = replace(
+            recording(), pictures=lambda wanted: (PicturePair(np.zeros((48, 64, 3), np.uint8)) for _ in wanted)
+        )
+        clip = cropped(replace(odd, intrinsics=camera), (5, 3, 20, 12))
+    what, size = ("depth", "64x48") if other == "depth" else ("pictures", "64x48" if other == "pictures" else "32x24")
+    with pytest.raises(InputError, match=f"frame 7: {what} of {size} pixels, the camera is of"):
+        clip.depth(7) if other == "depth" else next(clip.pictures([7]))
 
 
 def test_a_cropped_clip_sees_the_same_world(tmp_path):
