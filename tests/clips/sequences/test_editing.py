@@ -126,6 +126,25 @@ def test_seconds_and_dropped_frames_of_a_video(tmp_path, capsys):
     assert read_sequence_file(tmp_path / "o") == found  # after an error the old folder is there
 
 
+def test_what_prepare_did_not_write_is_never_lost(tmp_path, capsys):
+    """A source inside the replaced folder, a run or notes were deleted with it."""
+    written(tmp_path / "raw")
+    words = ["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip")]
+    assert main(words) == 0
+    (tmp_path / "raw").rename(tmp_path / "clip/raw")
+    (tmp_path / "clip/notes.txt").write_text("mine")
+    inside = ["prepare", str(tmp_path / "clip/raw"), "--out", str(tmp_path / "clip"), "--replace"]
+    assert main(inside) == 2
+    assert "is not replaced: it also holds notes.txt, raw, which would be lost" in capsys.readouterr().err
+    assert (tmp_path / "clip/raw/sequence.toml").is_file() and (tmp_path / "clip/notes.txt").read_text() == "mine"
+
+
+def test_an_empty_folder_is_replaced_as_it_is_used_without_replace(tmp_path):
+    written(tmp_path / "raw")
+    (tmp_path / "clip").mkdir()
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), "--replace"]) == 0
+
+
 def test_masks_are_united(tmp_path, capsys):
     written(tmp_path / "clip")
     border = np.zeros((HEIGHT, WIDTH), np.uint8)

@@ -41,6 +41,7 @@ from endotsr.clips.sequences.sequence_file import (
     FORMAT,
     IMAGES,
     RIGHT,
+    WRITTEN,
     CameraEntry,
     DepthEntry,
     MaskEntry,
@@ -97,7 +98,7 @@ def prepare(
     refuse_no_lengths(clip, chosen)
     if not chosen:
         raise InputError(f"{clip.where}: no frame is left")
-    with new_folder(Path(out), FILE_NAME if replace else "") as folder:
+    with new_folder(Path(out), FILE_NAME if replace else "", WRITTEN) as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
         notes += _checked_poses(folder, found)

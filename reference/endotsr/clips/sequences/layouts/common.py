@@ -13,7 +13,17 @@ from endotsr.clips.sequences.checks.kinds import finding
 from endotsr.clips.sequences.clip import Clip, Depth, Masks
 from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout, without_faults
-from endotsr.clips.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
+from endotsr.clips.sequences.sequence_file import (
+    DEPTH,
+    FILE_NAME,
+    IMAGES,
+    MASKS,
+    RIGHT,
+    WRITTEN,
+    SequenceFile,
+    read_poses,
+    read_sequence_file,
+)
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import with_stated
 from endotsr.errors import InputError
@@ -107,6 +117,6 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_common,
     direct=True,
-    reads=(FILE_NAME, IMAGES, RIGHT, "proposed_masks.png", "transforms.json", "sparse", "masks_kept", "truth"),
+    reads=tuple(name for name in WRITTEN if name not in (MASKS, DEPTH)),
     takes=("masks", "depth"),
 )
