@@ -324,6 +324,19 @@ def test_wrong_statements_of_the_common_format(tmp_path, old, new, code):
     assert code in [f.code for f in check_sequence(tmp_path, PAPER).findings]
 
 
+@pytest.mark.parametrize(("baseline", "unit", "said"), [
+    ("0.004", "mm", "0.004 mm apart; it looks like metres"), ("4200.0", "mm", "it looks like micrometres"),
+    ("4.0", "mm", None), ("0.004", "m", None), ("540.0", "mm", None), ("0.004", "arbitrary", None),
+])  # fmt: skip
+def test_a_baseline_in_another_unit(tmp_path, baseline, unit, said):
+    written(tmp_path, depth=False, right=True)
+    file = tmp_path / FILE_NAME
+    text = file.read_text().replace("baseline = 4.0", f"baseline = {baseline}")
+    file.write_text(text.replace('unit = "mm"', f'unit = "{unit}"', 1))
+    found = [f.what for f in check_sequence(tmp_path, PAPER).findings if f.code == "baseline-unit"]
+    assert len(found) == (said is not None) and (said or "") in "".join(found)
+
+
 def test_what_the_common_format_lacks(tmp_path):
     written(tmp_path, masks=False, depth=False)
     found = {f.code: f for f in check_sequence(tmp_path, PAPER).findings}

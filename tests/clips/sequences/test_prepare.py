@@ -56,6 +56,22 @@ def test_a_lossless_video_gives_the_pictures_it_was_made_of(tmp_path):
         np.testing.assert_allclose(read_png(tmp_path / f"out/images/{k:06d}.png"), scene_picture(i), atol=2)
 
 
+@pytest.mark.parametrize("stated", ["baseline", "calibration"])
+def test_a_baseline_in_metres_is_named(tmp_path, stated):
+    both = np.stack([np.hstack([scene_picture(i), scene_picture(i, 3.0)]) for i in range(3)])
+    files(tmp_path, "clip", both)
+    (tmp_path / "scope.ini").write_text(ini(translation=(-0.004, 0.0, 0.0)))
+    of_pair = {"calibration": tmp_path / "scope.ini"}
+    known = {"camera": CAMERA, "baseline": 0.004} if stated == "baseline" else of_pair
+    _, notes = prepared(tmp_path / "clip", tmp_path / "out", stereo="side_by_side", **known)
+    said = [note for note in notes if "baseline-unit" in note]
+    assert len(said) == 1 and "0.004 mm apart; it looks like metres" in said[0]
+    (tmp_path / "scope.ini").write_text(ini())
+    known = {"camera": CAMERA, "baseline": 4.0} if stated == "baseline" else of_pair
+    _, notes = prepared(tmp_path / "clip", tmp_path / "right", stereo="side_by_side", **known)
+    assert "baseline-unit" not in " ".join(notes)
+
+
 @pytest.mark.parametrize(("stereo", "join"), [("side_by_side", np.hstack), ("stacked", np.vstack)])
 def test_halves_of_a_stereo_picture(tmp_path, stereo, join):
     files(tmp_path, "clip", [join([scene_picture(i), scene_picture(i, 5.0)]) for i in range(3)])

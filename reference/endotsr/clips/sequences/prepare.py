@@ -16,7 +16,7 @@ from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
-from endotsr.clips.sequences.checks.cameras import intrinsics_findings
+from endotsr.clips.sequences.checks.cameras import baseline_findings, intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.written import WrittenFrames
@@ -177,9 +177,10 @@ def _write_frames(
         seen.add(new.left, tissue, depth)
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    notes += notes_of(
-        frame_findings(facts, str(clip.where)) + intrinsics_findings(straight.intrinsics, str(clip.where))
-    )
+    where = str(clip.where)
+    of_cameras = intrinsics_findings(straight.intrinsics, where)
+    of_cameras += baseline_findings(straight.baseline, clip.arbitrary, where)
+    notes += notes_of(frame_findings(facts, where) + of_cameras)
     notes += seen.notes(clip, settings.border)
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
-from endotsr.clips.sequences.checks.cameras import camera_findings
+from endotsr.clips.sequences.checks.cameras import baseline_findings, camera_findings
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import (
@@ -138,6 +138,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
         run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
     run.findings += pair_findings(clip)
+    run.findings += baseline_findings(clip.baseline if clip.right else None, clip.arbitrary, str(clip.stated_in))
     if run.samples:
         _check_masks(clip, run, config)
     config, frames = _of_length(clip, config, run)

@@ -147,6 +147,9 @@ KINDS: dict[str, Kind] = {
     "principal-point": Kind("warning", "the calibration may belong to another picture size", "check width and height"),
     "pixel-shape": Kind("warning", "pixels are rarely so elongated; the pictures may have been stretched",
                         "check the calibration against the picture size"),
+    "baseline-unit": Kind("warning", "depth from the pairs has the scale of the baseline",
+                          "state it in millimetres: prepare --baseline, or T of a calibration; or with the unit of"
+                          " sequence.toml"),
     "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", f"check this pose, or {LEAVE_OUT}"),
     "pose-turn": Kind("warning", "such a turn between neighbouring frames is most likely a wrong pose",
                       "check axes and direction of the trajectory"),
