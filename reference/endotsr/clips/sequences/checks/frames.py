@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
@@ -150,7 +151,11 @@ def profile_findings(files: list[Path]) -> list[Finding]:
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:
-    """Missing frame numbers, for example of deleted or undecodable frames."""
+    """Missing frame numbers, for example of deleted or undecodable frames, and names in another order than time."""
+    return _number_gaps(files) + clock_findings(files)
+
+
+def _number_gaps(files: list[Path]) -> list[Finding]:
     numbers = frame_numbers(files)
     if numbers is None or len(files) < 3 or len(numbers[0]) != 1:
         return []
