@@ -380,3 +380,16 @@ def test_the_working_folder_as_a_source_has_its_name(tmp_path, monkeypatch):
     assert read_sequence_file(tmp_path / "o").source == "my clip (common)"
     monkeypatch.chdir("images")
     assert carrying_command(Path()).endswith("--out images_masks --replace")
+
+
+@pytest.mark.parametrize(("make", "option"), [(tum, "trajectory"), (tum, "depth"), (stereomis, "trajectory")])
+def test_an_arbitrary_unit_beside_known_lengths_is_refused(tmp_path, make, option, capsys):
+    """The numbers were written as millimetres."""
+    make(tmp_path / "raw")
+    words = [f"--{option}-unit", "arbitrary", *(["--camera", *map(str, CAMERA)] if make is tum else [])]
+    if option == "depth":
+        (tmp_path / "raw/depth").rename(tmp_path / "given")
+        words += ["--depth", str(tmp_path / "given")]
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "out"), *words]) == 2
+    said = capsys.readouterr().err
+    assert f"--{option}-unit arbitrary: the layout" in said and "allowed: um, mm, cm, m" in said
