@@ -81,6 +81,19 @@ def test_halves_of_a_stereo_picture(tmp_path, stereo, join):
     np.testing.assert_array_equal(read_png(tmp_path / "out/images_right/000002.png"), scene_picture(2, 5.0))
 
 
+@pytest.mark.parametrize("names", [("left", "right"), ("early_left", "early_right", "late_left", "late_right")])
+def test_pairs_whose_names_have_no_number(tmp_path, names):
+    """Left and right differ in their side alone; this counted as a missing partner."""
+    (tmp_path / "clip").mkdir()
+    for k, name in enumerate(names):
+        write_png(tmp_path / "clip" / f"{name}.png", scene_picture(k))
+    found, _ = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA, baseline=4.0)
+    assert found.frames == len(names) // 2
+    for k in range(len(names)):
+        place = tmp_path / "out" / ("images_right" if k % 2 else "images") / f"{k // 2:06d}.png"
+        np.testing.assert_array_equal(read_png(place), scene_picture(k))
+
+
 def test_resizing_moves_the_camera_along(tmp_path):
     written(tmp_path / "a", right=True, poses=moving())
     prepared(tmp_path / "a", tmp_path / "b", PrepareSettings(scale=0.75))
