@@ -206,6 +206,9 @@ def test_gaps_are_named_refused_left_out_or_filled(tmp_path, what):
         prepared(tmp_path / "raw", tmp_path / "a")
     assert not (tmp_path / "a").exists()
     assert prepared(tmp_path / "raw", tmp_path / "b", PrepareSettings(gaps="drop"))[0].frames == 5
+    for gaps in ("refuse", "drop", "fill"):
+        with pytest.raises(InputError, match=f"1 of 1 frames have no {word}: 2; allowed: --frames some of which have"):
+            prepared(tmp_path / "raw", tmp_path / "d", PrepareSettings(frames="2", gaps=gaps))
     found, notes = prepared(tmp_path / "raw", tmp_path / "c", PrepareSettings(gaps="fill"))
     assert found.frames == 6 and any(f"no {word}: 2" in note for note in notes)
     if word == "pose":

@@ -126,7 +126,9 @@ def _poses_and_masks(
         if not frames:
             continue
         named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
-        if gaps == "refuse" or len(frames) == len(chosen):
+        if len(frames) == len(chosen):
+            raise InputError(f"{clip.where}: {named}; allowed: --frames some of which have one")
+        if gaps == "refuse":
             raise InputError(f"{clip.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
         filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
