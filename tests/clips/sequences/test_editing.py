@@ -47,6 +47,7 @@ def test_frames_by_number_and_by_second(text, frames):
     ("3:3", "selects nothing"), ("20", "outside"), ("0:21", "outside"), ("a", "not a range"), (",", "not a range"),
     ("1s", "no span of seconds"), ("1:2s", "no span of seconds"), ("1s:9s", "ends after 1.900"), ("1:2:0", "the step"),
     ("1:2:3:4", "not a range.*several with commas"), ("5s:", "selects nothing"),
+    ("-1s:", "seconds count from the first frame"), ("0s:-0.5s", "seconds count from the first frame"),
 ])  # fmt: skip
 def test_what_is_no_frame_is_refused(text, said):
     with pytest.raises(InputError, match=said):
@@ -59,6 +60,15 @@ def test_seconds_need_a_rate_and_follow_time_stamps():
     stamps = np.cumsum(np.linspace(0.05, 0.3, 20))
     found = chosen_frames("1s:2s", recording(rate=5.0, times=stamps))
     assert found == [i for i in range(20) if 1 <= stamps[i] - stamps[0] < 2]
+
+
+def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
+    """--source-rate, which was named, is refused for it."""
+    written(tmp_path / "clip")
+    for words in (["--rate", "5"], ["--frames", "0s:1s"]):
+        assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 2
+        said = capsys.readouterr().err
+        assert "frame_rate in" in said and FILE_NAME in said and "--source-rate" not in said
 
 
 def test_frames_are_left_out():

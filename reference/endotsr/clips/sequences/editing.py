@@ -69,7 +69,7 @@ def _numbers(part: str, count: int) -> list[int]:
 def _seconds(part: str, clip: Clip) -> list[int]:
     """The frames of a time span such as `2.5s:8s`. The messages begin with the part, without the option."""
     if clip.times is None and not clip.rate:
-        raise InputError(f"{part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
+        raise InputError(f"{part!r}: the frame rate is unknown; allowed: {_stated_rate(clip)} with seconds")
     words = part.split(":")
     try:
         bounds = [float(word.removesuffix("s")) if word.strip() else None for word in words]
@@ -77,12 +77,19 @@ def _seconds(part: str, clip: Clip) -> list[int]:
         bounds = []
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
         raise InputError(f"{part!r}: no span of seconds; {ALLOWED}")
+    if any(bound is not None and bound < 0 for bound in bounds):
+        raise InputError(f"{part!r}: seconds count from the first frame; allowed: numbers from 0")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
     times = clip.times_of(range(clip.count))
     elapsed: FloatArray = times - times[0]
     if np.isfinite(last) and last > elapsed[-1] + 1.5 / (clip.rate or 1.0):
         raise InputError(f"{part!r}: the source ends after {elapsed[-1]:.3f} seconds")
     return np.flatnonzero((elapsed >= first - 1e-9) & (elapsed < last - 1e-9)).tolist()
+
+
+def _stated_rate(clip: Clip) -> str:
+    """Where a user states the frame rate of a clip."""
+    return f"frame_rate in {clip.stated_in}" if clip.layout == "common" else "--source-rate HZ"
 
 
 def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str]) -> list[int]:
@@ -92,7 +99,7 @@ def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str])
     if rate is None:
         return frames
     if clip.rate is None:
-        raise InputError(f"{clip.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
+        raise InputError(f"{clip.where}: the frame rate is unknown; allowed: {_stated_rate(clip)} with --rate")
     if rate > clip.rate:
         raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; allowed: no more")
     times = clip.times_of(frames)
