@@ -4,6 +4,7 @@ import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
@@ -17,7 +18,7 @@ from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
 from endotsr.clips.sequences.editing import chosen_frames, cropped, paired_by_time, thinned, with_partner, without
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
-from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
+from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.config import PAPER
 from endotsr.errors import InputError
 
@@ -153,6 +154,20 @@ def test_an_empty_folder_is_replaced_as_it_is_used_without_replace(tmp_path):
     written(tmp_path / "raw")
     (tmp_path / "clip").mkdir()
     assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), "--replace"]) == 0
+
+
+def test_filled_poses_follow_the_times_and_are_recorded(tmp_path):
+    """Without a pose, frame 2 is at three quarters of the way from frame 1 to frame 3."""
+    found = written(tmp_path / "clip", poses=moving(), times=[0.0, 1.0, 2.5, 3.0, 4.0])
+    rows = [[float(i)] * 12 if i == 2 else row for i, row in enumerate(found.poses.matrices)]  # no rotation
+    gap = msgspec.structs.replace(found, poses=PoseEntry(matrices=rows, origin="a tracker", interpolated=[4]))
+    write_sequence_file(gap, tmp_path / "clip")
+    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--gaps", "fill", "--frames", "1:5"]
+    assert main(words) == 0
+    poses = read_sequence_file(tmp_path / "o").poses
+    assert poses.origin == "a tracker" and poses.interpolated == [1, 3]
+    first, between, last = (row[3] for row in poses.matrices[:3])
+    assert between == pytest.approx(first + 0.75 * (last - first))
 
 
 def test_masks_are_united(tmp_path, capsys):

@@ -139,7 +139,7 @@ def _poses_and_masks(
         chosen = [i for i in chosen if i not in without]
     if clip.poses is None:
         return chosen, None
-    every = filled(clip.poses) if lacking["pose"] and gaps == "fill" else clip.poses
+    every = filled(clip.poses, clip.times) if lacking["pose"] and gaps == "fill" else clip.poses
     return chosen, [pose for pose in (every[i] for i in chosen) if pose is not None]
 
 
@@ -280,8 +280,15 @@ def _file_of(
         source_names=_source_names(clip, chosen),
         masks=masks,
         depth=entry if depth_scale else None,
-        poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
+        poses=_pose_entry(clip, chosen, poses) if poses else None,
     )
+
+
+def _pose_entry(clip: Clip, chosen: list[int], poses: list[CameraPose]) -> PoseEntry:
+    """The section of the poses, with their origin in a source that states it."""
+    known = clip.poses or []
+    between = [k for k, i in enumerate(chosen) if known[i] is None or i in clip.interpolated]
+    return PoseEntry(origin=clip.pose_origin, interpolated=between, matrices=[pose_row(pose) for pose in poses])
 
 
 def _source_names(clip: Clip, chosen: list[int]) -> list[str] | None:

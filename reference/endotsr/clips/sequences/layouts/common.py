@@ -64,6 +64,8 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         intrinsics=intrinsics,
         baseline=found.baseline or None,
         poses=poses,
+        pose_origin=found.poses.origin if found.poses else "given",
+        interpolated=tuple(found.poses.interpolated) if found.poses else (),
         rate=found.frame_rate or None,
         times=None if found.times is None else np.array(found.times, np.float64),
         notes=[*([f"source: {found.source}"] if found.source else []), *notes],
