@@ -18,7 +18,6 @@ from endotsr.clips.sequences.choices import Align, Pairing
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.clips.sequences.depth_stacks import stack_planes
-from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.pairing import every_frame
 from endotsr.clips.sequences.relative_depth import MadeDepth, moves, relative_depth
@@ -31,6 +30,7 @@ from endotsr.clips.sequences.sequence_file import (
     sequence_text,
 )
 from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.sources import files_of
 from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.errors import InputError
 from endotsr.untrusted.writing import replace_text, replacing_folder
@@ -101,7 +101,7 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
 def from_files(folder: Path, source: Path, kind: Kind, scale: float, pairing: Pairing = "auto") -> MadeDepth:
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
     clip = describe_prepared(folder)
-    files, note = every_frame(clip, stack_planes(source) or list_pictures(source, DEPTH_ENDINGS), pairing)
+    files, note = every_frame(clip, stack_planes(source) or files_of(source, DEPTH_ENDINGS), pairing)
     intrinsics, baseline = clip.intrinsics, clip.baseline
     assert intrinsics is not None
     frames = (
@@ -171,7 +171,7 @@ def from_relative(
         raise InputError(
             f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
-    files, note = every_frame(clip, stack_planes(source) or list_pictures(source, DEPTH_ENDINGS), pairing)
+    files, note = every_frame(clip, stack_planes(source) or files_of(source, DEPTH_ENDINGS), pairing)
     made = relative_depth(clip, source, files, align, farthest, trusted)
     return made._replace(note=note)
 
