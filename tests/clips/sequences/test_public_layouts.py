@@ -1,5 +1,7 @@
 """Public layouts, read from folders made as their documentation says: cameras, depth, poses and masks are true."""
 
+import json
+
 import numpy as np
 import public_layouts as made
 import pytest
@@ -257,3 +259,17 @@ def test_stated_masks_of_points_have_the_stated_polarity(tmp_path, excluded):
     assert describe(tmp_path / "raw").masks(0).mean() == 0.25
     stated = SourceOptions(masks=tmp_path / "other.png", excluded_value=excluded)
     assert describe(tmp_path / "raw", stated).masks(0).mean() == (0.75 if excluded == "white" else 0.25)
+
+
+def test_the_times_of_transforms_give_a_rate(tmp_path):
+    """`--rate` asked for --source-rate, which replaces the times."""
+    made.nerfstudio(tmp_path / "raw")
+    file = tmp_path / "raw/transforms.json"
+    stated = json.loads(file.read_text())
+    for i, entry in enumerate(stated["frames"]):
+        entry["time"] = 2.0 + i / 25
+    file.write_text(json.dumps(stated))
+    count = len(stated["frames"])
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "o"), "--rate", "12.5"]) == 0
+    found = describe(tmp_path / "o")
+    assert found.count == (count + 1) // 2 and found.rate == pytest.approx(12.5)
