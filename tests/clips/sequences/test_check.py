@@ -337,6 +337,12 @@ def test_a_baseline_in_another_unit(tmp_path, baseline, unit, said):
     assert len(found) == (said is not None) and (said or "") in "".join(found)
 
 
+@pytest.mark.parametrize(("last", "uneven"), [(0.16, False), (0.32, True)])
+def test_even_times_are_not_said_to_be_uneven(tmp_path, last, uneven):
+    written(tmp_path, times=[0.0, 0.04, 0.08, 0.12, last])
+    assert ("uneven-times" in [f.code for f in check_sequence(tmp_path, PAPER).findings]) == uneven
+
+
 def test_what_the_common_format_lacks(tmp_path):
     written(tmp_path, masks=False, depth=False)
     found = {f.code: f for f in check_sequence(tmp_path, PAPER).findings}

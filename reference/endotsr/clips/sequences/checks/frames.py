@@ -16,6 +16,7 @@ from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.clips.sequences.files import frame_numbers, shortened
 from endotsr.clips.sequences.picture_fields import colours_differ
+from endotsr.clips.sequences.splits import evenly_spaced
 
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
@@ -128,7 +129,7 @@ def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding
 
 def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding]:
     """A note on stated, uneven frame times."""
-    if times is None or len(times) < 2:
+    if times is None or len(times) < 2 or evenly_spaced(times):
         return []
     steps = np.diff(times)
     return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
