@@ -12,6 +12,10 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import rename
+from endotsr.untrusted.names import plain_line
+
+OF_SYSTEMS = ("thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir")  # written by systems into folders of pictures
+MOST_NAMED = 5
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
@@ -64,23 +68,39 @@ def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def new_folder(path: Path, mark: str = "") -> Iterator[Path]:
+def new_folder(path: Path, mark: str = "", written: tuple[str, ...] = ()) -> Iterator[Path]:
     """A temporary folder next to `path`. It becomes `path` after the block, or is removed if the block fails.
 
     mark     an existing folder that contains this file is replaced; "": no folder is replaced
+    written  names in such a folder; with any other one it is kept, because that would be lost
 
     Raises:  InputError if `path` is anything else, or cannot be written.
     """
-    if not mark or not path.exists():
+    if not mark or not path.exists() or (path.is_dir() and not any(path.iterdir())):
         refuse_existing(path)
     elif not (path / mark).is_file() or path.is_symlink():
         raise InputError(f"{path}: is not replaced: it holds no {mark}; choose another --out")
+    else:
+        _refuse_others(path, (mark, *written))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing_folder(path, replace=bool(mark)) as folder:
             yield folder
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _refuse_others(path: Path, written: tuple[str, ...]) -> None:
+    """Raises InputError for a folder with other entries than these. Files of the system do not count."""
+    others = sorted(entry.name for entry in path.iterdir() if entry.name.lower() not in (*written, *OF_SYSTEMS))
+    others = [name for name in others if not name.startswith(".")]
+    if others:
+        more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+        named = ", ".join(plain_line(name) for name in others[:MOST_NAMED])
+        raise InputError(
+            f"{path}: is not replaced: it also holds {named}{more}, which would be lost; move it elsewhere, or choose"
+            " another --out"
+        )
 
 
 def refuse_existing(path: Path) -> None:

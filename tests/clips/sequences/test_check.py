@@ -324,6 +324,38 @@ def test_wrong_statements_of_the_common_format(tmp_path, old, new, code):
     assert code in [f.code for f in check_sequence(tmp_path, PAPER).findings]
 
 
+@pytest.mark.parametrize(("baseline", "unit", "said"), [
+    ("0.004", "mm", "0.004 mm apart; it looks like metres"), ("4200.0", "mm", "it looks like micrometres"),
+    ("4.0", "mm", None), ("0.004", "m", None), ("540.0", "mm", None), ("0.004", "arbitrary", None),
+])  # fmt: skip
+def test_a_baseline_in_another_unit(tmp_path, baseline, unit, said):
+    written(tmp_path, depth=False, right=True)
+    file = tmp_path / FILE_NAME
+    text = file.read_text().replace("baseline = 4.0", f"baseline = {baseline}")
+    file.write_text(text.replace('unit = "mm"', f'unit = "{unit}"', 1))
+    found = [f.what for f in check_sequence(tmp_path, PAPER).findings if f.code == "baseline-unit"]
+    assert len(found) == (said is not None) and (said or "") in "".join(found)
+
+
+@pytest.mark.parametrize(
+    ("frames", "codes"), [("", {"mask"}), ("0:4", set()), ("1:5", {"mask"}), ("0:9", {"mask", "frames"})]
+)
+def test_a_damaged_file_counts_only_among_the_selected_frames(tmp_path, frames, codes):
+    """`train` reads no other frames, and accepts what `check` refused."""
+    written(tmp_path)
+    (tmp_path / "masks/000004.png").write_bytes(b"no mask")
+    config = config_from_dict({"sequence": {"frames": frames}}, PAPER)
+    checked = check_sequence(tmp_path, config)
+    assert {f.code for f in checked.findings if f.level == "refusal"} == codes
+    assert checked.facts["frames"] == (4 if frames in ("0:4", "1:5") else 5)
+
+
+@pytest.mark.parametrize(("last", "uneven"), [(0.16, False), (0.32, True)])
+def test_even_times_are_not_said_to_be_uneven(tmp_path, last, uneven):
+    written(tmp_path, times=[0.0, 0.04, 0.08, 0.12, last])
+    assert ("uneven-times" in [f.code for f in check_sequence(tmp_path, PAPER).findings]) == uneven
+
+
 def test_what_the_common_format_lacks(tmp_path):
     written(tmp_path, masks=False, depth=False)
     found = {f.code: f for f in check_sequence(tmp_path, PAPER).findings}

@@ -1,8 +1,10 @@
 """Editing a clip: frames by number and second, frames left out, a crop, masks united, a folder replaced."""
 
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
@@ -16,7 +18,7 @@ from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
 from endotsr.clips.sequences.editing import chosen_frames, cropped, paired_by_time, thinned, with_partner, without
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
-from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
+from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.config import PAPER
 from endotsr.errors import InputError
 
@@ -46,6 +48,7 @@ def test_frames_by_number_and_by_second(text, frames):
     ("3:3", "selects nothing"), ("20", "outside"), ("0:21", "outside"), ("a", "not a range"), (",", "not a range"),
     ("1s", "no span of seconds"), ("1:2s", "no span of seconds"), ("1s:9s", "ends after 1.900"), ("1:2:0", "the step"),
     ("1:2:3:4", "not a range.*several with commas"), ("5s:", "selects nothing"),
+    ("-1s:", "seconds count from the first frame"), ("0s:-0.5s", "seconds count from the first frame"),
 ])  # fmt: skip
 def test_what_is_no_frame_is_refused(text, said):
     with pytest.raises(InputError, match=said):
@@ -58,6 +61,15 @@ def test_seconds_need_a_rate_and_follow_time_stamps():
     stamps = np.cumsum(np.linspace(0.05, 0.3, 20))
     found = chosen_frames("1s:2s", recording(rate=5.0, times=stamps))
     assert found == [i for i in range(20) if 1 <= stamps[i] - stamps[0] < 2]
+
+
+def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
+    """--source-rate, which was named, is refused for it."""
+    written(tmp_path / "clip")
+    for words in (["--rate", "5"], ["--frames", "0s:1s"]):
+        assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 2
+        said = capsys.readouterr().err
+        assert "frame_rate in" in said and FILE_NAME in said and "--source-rate" not in said
 
 
 def test_frames_are_left_out():
@@ -85,6 +97,22 @@ def test_a_crop_outside_is_refused(window):
         next(cropped(recording(), window).pictures([0]))
 
 
+@pytest.mark.parametrize("other", ["depth", "pictures", "camera"])
+def test_a_crop_needs_one_size(other):
+    """The window of a plane of another size shows another place, and has the size of the crop all the same."""
+    camera = Intrinsics(30.0, 31.0, 16.0, 12.0, *((64, 48) if other == "camera" else (32, 24)))
+    depth = Depth(lambda i: np.ones((48, 64), np.float32))
+    clip = cropped(recording(intrinsics=camera, depth=depth), (5, 3, 20, 12))
+    if other == "pictures":
+        odd = replace(
+            recording(), pictures=lambda wanted: (PicturePair(np.zeros((48, 64, 3), np.uint8)) for _ in wanted)
+        )
+        clip = cropped(replace(odd, intrinsics=camera), (5, 3, 20, 12))
+    what, size = ("depth", "64x48") if other == "depth" else ("pictures", "64x48" if other == "pictures" else "32x24")
+    with pytest.raises(InputError, match=f"frame 7: {what} of {size} pixels, the camera is of"):
+        clip.depth(7) if other == "depth" else next(clip.pictures([7]))
+
+
 def test_a_cropped_clip_sees_the_same_world(tmp_path):
     """A pixel of the crop is the same ray as before: the camera of the crop projects it there."""
     written(tmp_path / "clip", poses=moving())
@@ -107,6 +135,39 @@ def test_seconds_and_dropped_frames_of_a_video(tmp_path, capsys):
     assert main([*words, "--drop", "0:12"]) == 2 and "exists already" in capsys.readouterr().err
     assert main([*words, "--drop", "0:12", "--replace"]) == 2 and "no frame is left" in capsys.readouterr().err
     assert read_sequence_file(tmp_path / "o") == found  # after an error the old folder is there
+
+
+def test_what_prepare_did_not_write_is_never_lost(tmp_path, capsys):
+    """A source inside the replaced folder, a run or notes were deleted with it."""
+    written(tmp_path / "raw")
+    words = ["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip")]
+    assert main(words) == 0
+    (tmp_path / "raw").rename(tmp_path / "clip/raw")
+    (tmp_path / "clip/notes.txt").write_text("mine")
+    inside = ["prepare", str(tmp_path / "clip/raw"), "--out", str(tmp_path / "clip"), "--replace"]
+    assert main(inside) == 2
+    assert "is not replaced: it also holds notes.txt, raw, which would be lost" in capsys.readouterr().err
+    assert (tmp_path / "clip/raw/sequence.toml").is_file() and (tmp_path / "clip/notes.txt").read_text() == "mine"
+
+
+def test_an_empty_folder_is_replaced_as_it_is_used_without_replace(tmp_path):
+    written(tmp_path / "raw")
+    (tmp_path / "clip").mkdir()
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), "--replace"]) == 0
+
+
+def test_filled_poses_follow_the_times_and_are_recorded(tmp_path):
+    """Without a pose, frame 2 is at three quarters of the way from frame 1 to frame 3."""
+    found = written(tmp_path / "clip", poses=moving(), times=[0.0, 1.0, 2.5, 3.0, 4.0])
+    rows = [[float(i)] * 12 if i == 2 else row for i, row in enumerate(found.poses.matrices)]  # no rotation
+    gap = msgspec.structs.replace(found, poses=PoseEntry(matrices=rows, origin="a tracker", interpolated=[4]))
+    write_sequence_file(gap, tmp_path / "clip")
+    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--gaps", "fill", "--frames", "1:5"]
+    assert main(words) == 0
+    poses = read_sequence_file(tmp_path / "o").poses
+    assert poses.origin == "a tracker" and poses.interpolated == [1, 3]
+    first, between, last = (row[3] for row in poses.matrices[:3])
+    assert between == pytest.approx(first + 0.75 * (last - first))
 
 
 def test_masks_are_united(tmp_path, capsys):

@@ -165,3 +165,11 @@ def test_source_names_are_checked(clip):
         file.write_text(text.replace(old, new, 1))
         with pytest.raises(InputError, match=said):
             read_sequence_file(clip)
+
+
+def test_a_single_file_is_said_to_be_that_of_all_frames(tmp_path):
+    """It may be the only frame that was finished."""
+    source = numbered(tmp_path / "raw", "pictures", range(4))
+    given = numbered(tmp_path / "masks", "masks", [2], frames=[2])
+    code, said = prepared(source, tmp_path / "o", *CAMERA, "--masks", given)
+    assert code == 0 and "000002.png: taken for all 4 frames" in said

@@ -56,6 +56,22 @@ def test_a_lossless_video_gives_the_pictures_it_was_made_of(tmp_path):
         np.testing.assert_allclose(read_png(tmp_path / f"out/images/{k:06d}.png"), scene_picture(i), atol=2)
 
 
+@pytest.mark.parametrize("stated", ["baseline", "calibration"])
+def test_a_baseline_in_metres_is_named(tmp_path, stated):
+    both = np.stack([np.hstack([scene_picture(i), scene_picture(i, 3.0)]) for i in range(3)])
+    files(tmp_path, "clip", both)
+    (tmp_path / "scope.ini").write_text(ini(translation=(-0.004, 0.0, 0.0)))
+    of_pair = {"calibration": tmp_path / "scope.ini"}
+    known = {"camera": CAMERA, "baseline": 0.004} if stated == "baseline" else of_pair
+    _, notes = prepared(tmp_path / "clip", tmp_path / "out", stereo="side_by_side", **known)
+    said = [note for note in notes if "baseline-unit" in note]
+    assert len(said) == 1 and "0.004 mm apart; it looks like metres" in said[0]
+    (tmp_path / "scope.ini").write_text(ini())
+    known = {"camera": CAMERA, "baseline": 4.0} if stated == "baseline" else of_pair
+    _, notes = prepared(tmp_path / "clip", tmp_path / "right", stereo="side_by_side", **known)
+    assert "baseline-unit" not in " ".join(notes)
+
+
 @pytest.mark.parametrize(("stereo", "join"), [("side_by_side", np.hstack), ("stacked", np.vstack)])
 def test_halves_of_a_stereo_picture(tmp_path, stereo, join):
     files(tmp_path, "clip", [join([scene_picture(i), scene_picture(i, 5.0)]) for i in range(3)])
@@ -63,6 +79,19 @@ def test_halves_of_a_stereo_picture(tmp_path, stereo, join):
     assert (found.camera.width, found.camera.height, found.camera.baseline) == (WIDTH, HEIGHT, 4.0)
     np.testing.assert_array_equal(read_png(tmp_path / "out/images/000002.png"), scene_picture(2))
     np.testing.assert_array_equal(read_png(tmp_path / "out/images_right/000002.png"), scene_picture(2, 5.0))
+
+
+@pytest.mark.parametrize("names", [("left", "right"), ("early_left", "early_right", "late_left", "late_right")])
+def test_pairs_whose_names_have_no_number(tmp_path, names):
+    """Left and right differ in their side alone; this counted as a missing partner."""
+    (tmp_path / "clip").mkdir()
+    for k, name in enumerate(names):
+        write_png(tmp_path / "clip" / f"{name}.png", scene_picture(k))
+    found, _ = prepared(tmp_path / "clip", tmp_path / "out", camera=CAMERA, baseline=4.0)
+    assert found.frames == len(names) // 2
+    for k in range(len(names)):
+        place = tmp_path / "out" / ("images_right" if k % 2 else "images") / f"{k // 2:06d}.png"
+        np.testing.assert_array_equal(read_png(place), scene_picture(k))
 
 
 def test_resizing_moves_the_camera_along(tmp_path):
@@ -177,6 +206,9 @@ def test_gaps_are_named_refused_left_out_or_filled(tmp_path, what):
         prepared(tmp_path / "raw", tmp_path / "a")
     assert not (tmp_path / "a").exists()
     assert prepared(tmp_path / "raw", tmp_path / "b", PrepareSettings(gaps="drop"))[0].frames == 5
+    for gaps in ("refuse", "drop", "fill"):
+        with pytest.raises(InputError, match=f"1 of 1 frames have no {word}: 2; allowed: --frames some of which have"):
+            prepared(tmp_path / "raw", tmp_path / "d", PrepareSettings(frames="2", gaps=gaps))
     found, notes = prepared(tmp_path / "raw", tmp_path / "c", PrepareSettings(gaps="fill"))
     assert found.frames == 6 and any(f"no {word}: 2" in note for note in notes)
     if word == "pose":
@@ -364,3 +396,16 @@ def test_the_working_folder_as_a_source_has_its_name(tmp_path, monkeypatch):
     assert read_sequence_file(tmp_path / "o").source == "my clip (common)"
     monkeypatch.chdir("images")
     assert carrying_command(Path()).endswith("--out images_masks --replace")
+
+
+@pytest.mark.parametrize(("make", "option"), [(tum, "trajectory"), (tum, "depth"), (stereomis, "trajectory")])
+def test_an_arbitrary_unit_beside_known_lengths_is_refused(tmp_path, make, option, capsys):
+    """The numbers were written as millimetres."""
+    make(tmp_path / "raw")
+    words = [f"--{option}-unit", "arbitrary", *(["--camera", *map(str, CAMERA)] if make is tum else [])]
+    if option == "depth":
+        (tmp_path / "raw/depth").rename(tmp_path / "given")
+        words += ["--depth", str(tmp_path / "given")]
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "out"), *words]) == 2
+    said = capsys.readouterr().err
+    assert f"--{option}-unit arbitrary: the layout" in said and "allowed: um, mm, cm, m" in said

@@ -1,5 +1,7 @@
 """Public layouts, read from folders made as their documentation says: cameras, depth, poses and masks are true."""
 
+import json
+
 import numpy as np
 import public_layouts as made
 import pytest
@@ -237,3 +239,37 @@ def test_points_of_nerfstudio_follow_applied_scale(tmp_path):
         (folder / "cloud.ply").write_text(head + "1 2 3\n")
         found.append(describe(folder).points(0))
     np.testing.assert_allclose(found[1], 0.25 * found[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("excluded", ["white", "black"])
+def test_stated_masks_of_points_have_the_stated_polarity(tmp_path, excluded):
+    """They were read as `mask.png`, whose white is tissue, and --excluded-value was ignored."""
+    (tmp_path / "raw/images").mkdir(parents=True)
+    for i in range(3):
+        write_png(tmp_path / f"raw/images/{i:06d}.png", np.full((48, 64, 3), (150, 60, 60), np.uint8))
+    poses, K = np.tile(np.eye(4), (3, 1, 1)), np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])
+    points, visible = np.array([[0.0, 0, 5], [1, 0, 6], [0, 1, 7], [1, 1, 5]]), np.ones((4, 3), bool)
+    np.savez(
+        tmp_path / "raw/cameras_points.npz", w2c=poses, K=K, points=points, visible=visible, frame_ids=np.arange(3)
+    )
+    tool = np.zeros((48, 64), np.uint8)
+    tool[:, :16] = 255
+    for file in (tmp_path / "raw/mask.png", tmp_path / "other.png"):
+        write_png(file, tool)
+    assert describe(tmp_path / "raw").masks(0).mean() == 0.25
+    stated = SourceOptions(masks=tmp_path / "other.png", excluded_value=excluded)
+    assert describe(tmp_path / "raw", stated).masks(0).mean() == (0.75 if excluded == "white" else 0.25)
+
+
+def test_the_times_of_transforms_give_a_rate(tmp_path):
+    """`--rate` asked for --source-rate, which replaces the times."""
+    made.nerfstudio(tmp_path / "raw")
+    file = tmp_path / "raw/transforms.json"
+    stated = json.loads(file.read_text())
+    for i, entry in enumerate(stated["frames"]):
+        entry["time"] = 2.0 + i / 25
+    file.write_text(json.dumps(stated))
+    count = len(stated["frames"])
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "o"), "--rate", "12.5"]) == 0
+    found = describe(tmp_path / "o")
+    assert found.count == (count + 1) // 2 and found.rate == pytest.approx(12.5)

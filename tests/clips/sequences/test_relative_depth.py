@@ -1,5 +1,6 @@
 """Depth of a clip from one camera: relative inverse depth with and without depth to compare with, and a plane."""
 
+import msgspec
 import numpy as np
 import pytest
 from common_folder import moving, written
@@ -11,7 +12,7 @@ from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.relative_depth import FEWEST, StraightLine, fitted_line
-from endotsr.clips.sequences.sequence_file import read_sequence_file
+from endotsr.clips.sequences.sequence_file import PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.config import PAPER
 
 
@@ -75,6 +76,21 @@ def test_scale_and_shift_come_from_points_in_every_frame(kind, tmp_path, capsys)
     assert entry.unit == entry.depth.unit == "mm" and entry.depth.assumed == ""
     assert "scale and shift from the depth before" in entry.depth.method
     assert "not metric" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_measured_depth_in_place_of_assumed_depth_is_in_millimetres(tmp_path, moved):
+    """The arbitrary unit came from the assumption; poses that were estimated with it keep it."""
+    where, files = clip(tmp_path, true_depth)
+    assert main(["depth", str(where), "--flat"]) == 0 and read_sequence_file(where).unit == "arbitrary"
+    if moved:
+        file = read_sequence_file(where)
+        rows = [np.eye(4)[:3] + np.array([[0, 0, 0, i], [0] * 4, [0] * 4]) for i in range(FRAMES)]
+        poses = PoseEntry(matrices=[row.ravel().tolist() for row in rows])
+        write_sequence_file(msgspec.structs.replace(file, poses=poses), where)
+    assert main(["depth", str(where), "--given", str(files), "--kind", "depth", "--replace"]) == 0
+    found = read_sequence_file(where)
+    assert found.unit == found.depth.unit == ("arbitrary" if moved else "mm") and found.depth.assumed == ""
 
 
 def test_one_line_for_the_sequence_does_not_follow_frames_that_differ(tmp_path):

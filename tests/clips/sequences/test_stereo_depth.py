@@ -12,6 +12,7 @@ from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.make_depth import depth_of_values, from_files, write_depth
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
@@ -117,6 +118,19 @@ def test_disparity_of_another_program(tmp_path, ending):
     np.testing.assert_allclose(sequence.depth[:, 2:], np.broadcast_to(expected, (FRAMES, HEIGHT - 2, WIDTH)), atol=0.01)
     assert report.coverage[0] == pytest.approx(1 - 2 / HEIGHT) and report.file.depth is not None
     assert "disparity from raft" in report.file.depth.method
+
+
+@pytest.mark.parametrize("ending", [".npy", ".tiff"])
+def test_one_file_is_the_depth_of_all_frames(tmp_path, ending, capsys):
+    """As in `prepare --depth`; it was said to be a missing folder."""
+    written(tmp_path / "clip", depth=False)
+    plane = np.tile(np.linspace(40.0, 60.0, WIDTH, dtype=np.float32), (HEIGHT, 1))
+    write_plane(tmp_path / f"rest{ending}", plane)
+    words = ["depth", str(tmp_path / "clip"), "--given", str(tmp_path / f"rest{ending}"), "--kind", "depth"]
+    assert main(words) == 0 and f"rest{ending}: taken for all {FRAMES} frames" in capsys.readouterr().out
+    found = describe(tmp_path / "clip").depth
+    for i in range(FRAMES):
+        np.testing.assert_allclose(found(i), plane, atol=0.02)
 
 
 def test_disparity_of_another_size_and_sign():

@@ -90,6 +90,8 @@ class Clip:
     baseline: float | None = None  # of a rectified pair, in `unit`
     poses: list[CameraPose | None] | None = None  # None: the camera rests at `rest`
     rest: CameraPose = REST
+    pose_origin: str = "given"  # where the poses come from, in words
+    interpolated: tuple[int, ...] = ()  # frames whose pose was interpolated between others
     rate: float | None = None  # frames per second
     times: NDArray[np.float64] | None = None  # seconds of every frame, ascending; None: evenly spaced
     notes: list[str] = field(default_factory=list)

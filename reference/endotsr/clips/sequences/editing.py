@@ -69,7 +69,7 @@ def _numbers(part: str, count: int) -> list[int]:
 def _seconds(part: str, clip: Clip) -> list[int]:
     """The frames of a time span such as `2.5s:8s`. The messages begin with the part, without the option."""
     if clip.times is None and not clip.rate:
-        raise InputError(f"{part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
+        raise InputError(f"{part!r}: the frame rate is unknown; allowed: {_stated_rate(clip)} with seconds")
     words = part.split(":")
     try:
         bounds = [float(word.removesuffix("s")) if word.strip() else None for word in words]
@@ -77,12 +77,19 @@ def _seconds(part: str, clip: Clip) -> list[int]:
         bounds = []
     if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
         raise InputError(f"{part!r}: no span of seconds; {ALLOWED}")
+    if any(bound is not None and bound < 0 for bound in bounds):
+        raise InputError(f"{part!r}: seconds count from the first frame; allowed: numbers from 0")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
     times = clip.times_of(range(clip.count))
     elapsed: FloatArray = times - times[0]
     if np.isfinite(last) and last > elapsed[-1] + 1.5 / (clip.rate or 1.0):
         raise InputError(f"{part!r}: the source ends after {elapsed[-1]:.3f} seconds")
     return np.flatnonzero((elapsed >= first - 1e-9) & (elapsed < last - 1e-9)).tolist()
+
+
+def _stated_rate(clip: Clip) -> str:
+    """Where a user states the frame rate of a clip."""
+    return f"frame_rate in {clip.stated_in}" if clip.layout == "common" else "--source-rate HZ"
 
 
 def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str]) -> list[int]:
@@ -92,7 +99,7 @@ def thinned(clip: Clip, frames: list[int], rate: float | None, notes: list[str])
     if rate is None:
         return frames
     if clip.rate is None:
-        raise InputError(f"{clip.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
+        raise InputError(f"{clip.where}: the frame rate is unknown; allowed: {_stated_rate(clip)} with --rate")
     if rate > clip.rate:
         raise InputError(f"rate {rate:g}: the source has {clip.rate:g} frames per second; allowed: no more")
     times = clip.times_of(frames)
@@ -138,26 +145,34 @@ def written_times(
 def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     """The clip cropped to a window x, y, width, height of its pictures, with the principal point shifted.
 
-    Raises:  InputError for an empty window. A window beyond the pictures is refused when a picture is read.
+    Raises:  InputError for an empty window. A window beyond the pictures, and a picture or depth of another size than
+             the camera, are refused when they are read.
     """
     if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
         raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
     x, y, width, height = window
+    camera = clip.calibration.left if clip.calibration else clip.intrinsics
 
-    def cut(plane: NDArray, what: str) -> NDArray:
-        if x + width > plane.shape[1] or y + height > plane.shape[0]:
+    def cut(plane: NDArray, what: str, i: int) -> NDArray:
+        size, part = plane.shape[1::-1], plane[y : y + height, x : x + width]
+        said = f"{what} of {size[0]}x{size[1]} pixels"
+        if camera and size != (camera.width, camera.height):
+            other = f"{camera.width}x{camera.height}"
             raise InputError(
-                f"{clip.where}: --crop {x} {y} {width} {height} leaves the {what} of"
-                f" {plane.shape[1]}x{plane.shape[0]} pixels"
+                f"{clip.where}: frame {clip.names[i]}: {said}, the camera is of {other}; allowed: one size"
             )
-        return np.ascontiguousarray(plane[y : y + height, x : x + width])
+        if part.shape[:2] != (height, width):
+            raise InputError(f"{clip.where}: --crop {x} {y} {width} {height} leaves the {said}")
+        return np.ascontiguousarray(part)
 
     def part(read: Callable[[int], NDArray | None], what: str, i: int) -> NDArray | None:
         plane = read(i)
-        return None if plane is None else cut(plane, what)
+        return None if plane is None else cut(plane, what, i)
 
-    def picture(found: Picture) -> Picture:
-        return cut(found, "pictures")
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
+        for i, pair in zip(wanted, clip.pictures(wanted)):
+            left, right = cut(pair.left, "pictures", i), pair.right
+            yield PicturePair(left, None if right is None else cut(right, "pictures", i))
 
     def intrinsics(old: Intrinsics) -> Intrinsics:
         return old._replace(cx=old.cx - x, cy=old.cy - y, width=width, height=height)
@@ -165,16 +180,12 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     masks, depth, calibration = clip.masks, clip.depth, clip.calibration
     return replace(
         clip,
-        pictures=lambda wanted: (
-            PicturePair(picture(pair.left), None if pair.right is None else picture(pair.right))
-            for pair in clip.pictures(wanted)
-        ),
+        pictures=pictures,
         masks=None if masks is None else replace(masks, read=partial(part, masks.read, "masks"), files=[]),
         depth=None if depth is None else replace(depth, read=partial(part, depth.read, "depth"), files=[]),
         intrinsics=None if clip.intrinsics is None else intrinsics(clip.intrinsics),
-        calibration=None
-        if calibration is None
-        else calibration._replace(left=intrinsics(calibration.left), right=intrinsics(calibration.right)),
+        calibration=calibration
+        and calibration._replace(left=intrinsics(calibration.left), right=intrinsics(calibration.right)),
         notes=[*clip.notes, f"cropped to {width}x{height} pixels from ({x}, {y}); the intrinsics follow"],
     )
 

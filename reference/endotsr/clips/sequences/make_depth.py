@@ -18,10 +18,9 @@ from endotsr.clips.sequences.choices import Align, Pairing
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, read_plane, step_of_depth, write_levels
 from endotsr.clips.sequences.depth_stacks import stack_planes
-from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.pairing import every_frame
-from endotsr.clips.sequences.relative_depth import MadeDepth, relative_depth
+from endotsr.clips.sequences.relative_depth import MadeDepth, moves, relative_depth
 from endotsr.clips.sequences.sequence_file import (
     DEPTH,
     FILE_NAME,
@@ -31,6 +30,7 @@ from endotsr.clips.sequences.sequence_file import (
     sequence_text,
 )
 from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.sources import files_of
 from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.errors import InputError
 from endotsr.untrusted.writing import replace_text, replacing_folder
@@ -101,7 +101,7 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
 def from_files(folder: Path, source: Path, kind: Kind, scale: float, pairing: Pairing = "auto") -> MadeDepth:
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
     clip = describe_prepared(folder)
-    files, note = every_frame(clip, stack_planes(source) or list_pictures(source, DEPTH_ENDINGS), pairing)
+    files, note = every_frame(clip, stack_planes(source) or files_of(source, DEPTH_ENDINGS), pairing)
     intrinsics, baseline = clip.intrinsics, clip.baseline
     assert intrinsics is not None
     frames = (
@@ -171,7 +171,7 @@ def from_relative(
         raise InputError(
             f"{folder}: has depth already; allowed: --replace, which fits scale and shift to it and fills the holes"
         )
-    files, note = every_frame(clip, stack_planes(source) or list_pictures(source, DEPTH_ENDINGS), pairing)
+    files, note = every_frame(clip, stack_planes(source) or files_of(source, DEPTH_ENDINGS), pairing)
     made = relative_depth(clip, source, files, align, farthest, trusted)
     return made._replace(note=note)
 
@@ -181,12 +181,14 @@ def write_depth(
 ) -> DepthReport:
     """Write the depth of a sequence and record it in its `sequence.toml`.
 
-    made      the depth; if any part of it is assumed, the unit of the sequence becomes arbitrary
+    made      the depth; if any part of it is assumed, the unit of the sequence becomes arbitrary, and measured depth
+              in its place gives it back millimetres, unless the poses have the assumed scale
     replace   whether existing depth may be replaced
 
     Raises:  InputError, leaving the folder unchanged.
     """
-    names, file = describe_prepared(folder).names, read_sequence_file(folder)
+    clip, file = describe_prepared(folder), read_sequence_file(folder)
+    names = clip.names
     if (file.depth or (folder / DEPTH).exists()) and not replace:
         raise InputError(f"{folder}: has depth already; allowed: --replace")
     coverage, medians, step, clipped = [], [], 0.0, 0
@@ -201,10 +203,18 @@ def write_depth(
             on_frame(k + 1, len(names))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
-    unit = ARBITRARY if file.arbitrary or made.assumed else "mm"
+    unit = ARBITRARY if made.assumed or (file.arbitrary and not _only_assumed(clip)) else "mm"
     entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
-    found = msgspec.structs.replace(file, depth=entry, unit=unit if made.assumed else file.unit)
+    found = msgspec.structs.replace(
+        file, depth=entry, unit=unit if (unit == ARBITRARY) != file.arbitrary else file.unit
+    )
     replace_text(folder / FILE_NAME, sequence_text(found))
     lost = f"{clipped} pixels are clipped at {65535 * step:g}, eight times the usual depth of the first frame"
     notes = [made.note] * bool(made.note) + [lost] * bool(clipped)
     return DepthReport(found, coverage, float(np.median(medians)), "; ".join(notes))
+
+
+def _only_assumed(clip: Clip) -> bool:
+    """Whether the unit of a clip is arbitrary for its assumed depth alone: no poses share its scale."""
+    poses = [pose for pose in clip.poses or [] if pose is not None]
+    return bool(clip.depth and clip.depth.assumed) and not moves(poses)

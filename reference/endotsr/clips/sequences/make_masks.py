@@ -196,7 +196,7 @@ def write_proposal(clip: Clip, out: Path, propose: Propose | None = None, replac
     proposal = (propose or _proposed)(clip)
     if not proposal.found:
         return proposal
-    with new_folder(out, PROPOSAL if replace else "") as place:
+    with new_folder(out, PROPOSAL if replace else "", (MASKS, OVERLAY)) as place:
         (place / MASKS).mkdir()
         _write_masks(place / MASKS, clip.names, proposal)
         write_png(place / OVERLAY, overlays(clip, proposal))

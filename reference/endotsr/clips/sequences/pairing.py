@@ -42,7 +42,7 @@ def paired(
     """
     count = frames if isinstance(frames, int) else len(frames)
     if len(files) == 1:
-        return Paired([files[0]] * count)
+        return Paired([files[0]] * count, f"{files[0].name}: taken for all {count} frames" if count > 1 else "")
     in_one_file = files[0].parent.is_file()  # planes of one array, which have an order and no names
     if pairing == "order" or (pairing == "auto" and in_one_file and len(files) == count):
         return _in_order(frames, files)

@@ -16,7 +16,7 @@ from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
-from endotsr.clips.sequences.checks.cameras import intrinsics_findings
+from endotsr.clips.sequences.checks.cameras import baseline_findings, intrinsics_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.written import WrittenFrames
@@ -41,6 +41,7 @@ from endotsr.clips.sequences.sequence_file import (
     FORMAT,
     IMAGES,
     RIGHT,
+    WRITTEN,
     CameraEntry,
     DepthEntry,
     MaskEntry,
@@ -97,7 +98,7 @@ def prepare(
     refuse_no_lengths(clip, chosen)
     if not chosen:
         raise InputError(f"{clip.where}: no frame is left")
-    with new_folder(Path(out), FILE_NAME if replace else "") as folder:
+    with new_folder(Path(out), FILE_NAME if replace else "", WRITTEN) as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
         notes += _checked_poses(folder, found)
@@ -125,7 +126,9 @@ def _poses_and_masks(
         if not frames:
             continue
         named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
-        if gaps == "refuse" or len(frames) == len(chosen):
+        if len(frames) == len(chosen):
+            raise InputError(f"{clip.where}: {named}; allowed: --frames some of which have one")
+        if gaps == "refuse":
             raise InputError(f"{clip.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
         filling = "poses are interpolated" if what == "pose" else "the mask of the nearest frame is used"
         notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
@@ -136,7 +139,7 @@ def _poses_and_masks(
         chosen = [i for i in chosen if i not in without]
     if clip.poses is None:
         return chosen, None
-    every = filled(clip.poses) if lacking["pose"] and gaps == "fill" else clip.poses
+    every = filled(clip.poses, clip.times) if lacking["pose"] and gaps == "fill" else clip.poses
     return chosen, [pose for pose in (every[i] for i in chosen) if pose is not None]
 
 
@@ -176,9 +179,10 @@ def _write_frames(
         seen.add(new.left, tissue, depth)
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    notes += notes_of(
-        frame_findings(facts, str(clip.where)) + intrinsics_findings(straight.intrinsics, str(clip.where))
-    )
+    where = str(clip.where)
+    of_cameras = intrinsics_findings(straight.intrinsics, where)
+    of_cameras += baseline_findings(straight.baseline, clip.arbitrary, where)
+    notes += notes_of(frame_findings(facts, where) + of_cameras)
     notes += seen.notes(clip, settings.border)
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
@@ -276,8 +280,15 @@ def _file_of(
         source_names=_source_names(clip, chosen),
         masks=masks,
         depth=entry if depth_scale else None,
-        poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
+        poses=_pose_entry(clip, chosen, poses) if poses else None,
     )
+
+
+def _pose_entry(clip: Clip, chosen: list[int], poses: list[CameraPose]) -> PoseEntry:
+    """The section of the poses, with their origin in a source that states it."""
+    known = clip.poses or []
+    between = [k for k, i in enumerate(chosen) if known[i] is None or i in clip.interpolated]
+    return PoseEntry(origin=clip.pose_origin, interpolated=between, matrices=[pose_row(pose) for pose in poses])
 
 
 def _source_names(clip: Clip, chosen: list[int]) -> list[str] | None:

@@ -25,6 +25,7 @@ from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.splatting.camera import CameraPose
 
 FEWEST, MOST = 20, 400  # pixels with both values: needed for a line, and used for its robust estimate
 SPREAD = 3 * 1.4826  # median absolute residuals; pixels beyond are excluded from the last fit
@@ -173,12 +174,17 @@ def _refuse_known_scale(clip: Clip) -> None:
     poses = [pose for pose in clip.poses or [] if pose is not None]
     if clip.right and clip.baseline:
         raise InputError(f"{clip.where}: a stereo pair gives lengths; allowed: `endotsr depth {clip.where}` first")
-    if any((pose.translation != poses[0].translation).any() for pose in poses):
+    if moves(poses):
         raise InputError(
             f"{clip.where}: the camera moves, and its poses fix the scale of the depth, which relative numbers do"
             " not have; allowed: a clip with some depth, such as that of the points of a COLMAP model (`endotsr prepare"
             " MODEL --points sparse`) or of `endotsr poses --sfm`"
         )
+
+
+def moves(poses: list[CameraPose]) -> bool:
+    """Whether the poses fix a scale: one has another translation than the first."""
+    return any((pose.translation != poses[0].translation).any() for pose in poses)
 
 
 def _assumed_line(

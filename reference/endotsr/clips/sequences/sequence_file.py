@@ -56,6 +56,10 @@ from endotsr.untrusted.toml import read_toml, toml_text
 FILE_NAME = "sequence.toml"
 FORMAT = "endotsr-sequence-1"
 IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
+# Names that commands write into a folder in the common format.
+WRITTEN = (
+    FILE_NAME, IMAGES, RIGHT, MASKS, DEPTH, "proposed_masks.png", "transforms.json", "sparse", "masks_kept", "truth",
+)  # fmt: skip
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 PositiveCount = Annotated[int, msgspec.Meta(ge=1)]

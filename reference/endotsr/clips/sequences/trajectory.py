@@ -163,8 +163,12 @@ def pose_between(a: CameraPose, b: CameraPose, fraction: float) -> CameraPose:
     return CameraPose(rotation, -rotation @ (centres[0] + fraction * (centres[1] - centres[0])))
 
 
-def filled(poses: list[CameraPose | None]) -> list[CameraPose]:
-    """The poses with gaps interpolated; before the first and after the last pose, the nearest one."""
+def filled(poses: list[CameraPose | None], times: FloatArray | None = None) -> list[CameraPose]:
+    """The poses with gaps interpolated; before the first and after the last pose, the nearest one.
+
+    times   (n,) seconds of the frames; None: evenly spaced
+    """
+    times = np.arange(len(poses), dtype=np.float64) if times is None else times
     known = [i for i, pose in enumerate(poses) if pose is not None]
     found = []
     for i, pose in enumerate(poses):
@@ -173,7 +177,8 @@ def filled(poses: list[CameraPose | None]) -> list[CameraPose]:
             after = min((k for k in known if k > i), default=None)
             ends = [poses[k] for k in (before, after) if k is not None]
             if before is not None and after is not None and ends[0] and ends[1]:
-                pose = pose_between(ends[0], ends[1], (i - before) / (after - before))
+                passed, whole = times[i] - times[before], times[after] - times[before]
+                pose = pose_between(ends[0], ends[1], float(passed / whole))
             else:
                 pose = ends[0]
         assert pose is not None

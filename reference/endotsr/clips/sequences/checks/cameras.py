@@ -15,6 +15,7 @@ FARTHEST_STEP = 2.0  # of the depth; with a larger step, neighbouring frames wou
 WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
 OFF_CENTRE = 0.25  # of the picture
 EXCHANGED, IN_TURN = 0.08, 3.0  # of the picture; times nearer to its centre with cx and cy exchanged
+SHORTEST_BASELINE, LONGEST_BASELINE = 0.1, 1000.0  # mm; between the views of an endoscope, and of a car
 SMALLER, LARGER, ALIKE = 0.75, 1.35, 0.05  # sizes whose centre is told from this one; difference of its two parts
 
 
@@ -68,6 +69,16 @@ def intrinsics_findings(camera: Camera | Intrinsics, where: str) -> list[Finding
     if not 0.8 < ratio < 1.25:
         found.append(finding("pixel-shape", where, f"fy / fx is {ratio:.2f}"))
     return found
+
+
+def baseline_findings(baseline: float | None, arbitrary: bool, where: str) -> list[Finding]:
+    """A baseline in millimetres that no pair of cameras has; none for lengths in an arbitrary unit."""
+    if not baseline or arbitrary or SHORTEST_BASELINE <= baseline <= LONGEST_BASELINE:
+        return []
+    units = ((1000.0, "metres"), (1e-3, "micrometres"))
+    likely = [unit for factor, unit in units if 1.0 <= factor * baseline <= LONGEST_BASELINE]
+    guess = f"; it looks like {likely[0]}" if likely else ""
+    return [finding("baseline-unit", where, f"the two cameras are {baseline:.4g} mm apart{guess}")]
 
 
 def _off_centre(camera: Camera | Intrinsics, x: float, y: float) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
-from endotsr.clips.sequences.checks.cameras import camera_findings
+from endotsr.clips.sequences.checks.cameras import baseline_findings, camera_findings
 from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import (
@@ -138,15 +138,25 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
         run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
     run.findings += pair_findings(clip)
+    run.findings += baseline_findings(clip.baseline if clip.right else None, clip.arbitrary, str(clip.stated_in))
     if run.samples:
         _check_masks(clip, run, config)
     config, frames = _of_length(clip, config, run)
     if size:
-        facts |= {"width": size[1], "height": size[0]}
+        facts |= {"frames": frames.total, "width": size[1], "height": size[0]}
         if not any(fault.code == "cameras" for fault in clip.faults):
             facts |= _check_cameras(clip, run, size)
         facts["cost"] = _cost(clip, size, config, frames, speed, run)._asdict()
-    return Checked(str(path), worst_first(run.findings), facts, run.pictures)
+    return Checked(str(path), worst_first(_of_frames(run.findings, clip, config)), facts, run.pictures)
+
+
+def _of_frames(findings: list[Finding], clip: Clip, config: Config) -> list[Finding]:
+    """The findings on the frames that the settings select, and on the whole clip. A wrong range is a finding."""
+    try:
+        chosen = parse_frame_range(config.sequence.frames, clip.count)
+    except InputError:
+        return findings
+    return [found for found in findings if found.frame is None or found.frame in chosen]
 
 
 def _origin(clip: Clip) -> str:

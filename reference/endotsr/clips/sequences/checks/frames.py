@@ -10,11 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.clips.sequences.files import frame_numbers, shortened
 from endotsr.clips.sequences.picture_fields import colours_differ
+from endotsr.clips.sequences.splits import evenly_spaced
 
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
@@ -127,7 +129,7 @@ def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding
 
 def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding]:
     """A note on stated, uneven frame times."""
-    if times is None or len(times) < 2:
+    if times is None or len(times) < 2 or evenly_spaced(times):
         return []
     steps = np.diff(times)
     return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
@@ -150,7 +152,11 @@ def profile_findings(files: list[Path]) -> list[Finding]:
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:
-    """Missing frame numbers, for example of deleted or undecodable frames."""
+    """Missing frame numbers, for example of deleted or undecodable frames, and names in another order than time."""
+    return _number_gaps(files) + clock_findings(files)
+
+
+def _number_gaps(files: list[Path]) -> list[Finding]:
     numbers = frame_numbers(files)
     if numbers is None or len(files) < 3 or len(numbers[0]) != 1:
         return []

@@ -36,6 +36,8 @@ KINDS: dict[str, Kind] = {
     "frames": Kind("refusal", REFUSED, "more frames, or another split"),
     "number-gap": Kind("warning", "frames count as evenly spaced in time",
                        "supply the missing frames, or cut the clip there"),
+    "order-of-names": Kind("warning", "frames are in the order of the numbers in their names",
+                           "put the date before the time and write 24 hours, or number the frames"),
     "not-read": Kind("note", "training knows nothing of it",
                      "none needed for files of other programs; endotsr prepare has options that read such files"),
     "frame-rate": Kind("warning", "times may be in milliseconds, or the time between two frames may stand for the rate",
@@ -147,6 +149,9 @@ KINDS: dict[str, Kind] = {
     "principal-point": Kind("warning", "the calibration may belong to another picture size", "check width and height"),
     "pixel-shape": Kind("warning", "pixels are rarely so elongated; the pictures may have been stretched",
                         "check the calibration against the picture size"),
+    "baseline-unit": Kind("warning", "depth from the pairs has the scale of the baseline",
+                          "state it in millimetres: prepare --baseline, or T of a calibration; or with the unit of"
+                          " sequence.toml"),
     "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", f"check this pose, or {LEAVE_OUT}"),
     "pose-turn": Kind("warning", "such a turn between neighbouring frames is most likely a wrong pose",
                       "check axes and direction of the trajectory"),

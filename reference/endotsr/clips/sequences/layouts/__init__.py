@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.sequences.camera import ARBITRARY, MILLIMETRES
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.files import shortened
@@ -109,6 +110,7 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
         raise InputError(f"{path}: not found")
     refuse_unused(layout, path, options)
     clip = without_faults(layout.describe(path, options))
+    _refuse_unknown_unit(clip, options)
     if clip.pose_faults and len(clip.pose_faults) == clip.count:
         raise InputError(next(iter(clip.pose_faults.values())))
     said = [*clip.notes, *clip.pose_faults.values()]
@@ -117,6 +119,18 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
     if options.calibration is not None:
         said.append(f"{options.calibration.name}: {HALF_A_PIXEL}")
     return replace(clip, notes=said)
+
+
+def _refuse_unknown_unit(clip: Clip, options: SourceOptions) -> None:
+    """Raises InputError for an arbitrary unit beside lengths that the layout has in a known one."""
+    stated = {"trajectory": options.trajectory_unit, "depth": options.depth_unit}
+    wrong = next((name for name, unit in stated.items() if unit == ARBITRARY), None)
+    if wrong and not clip.arbitrary:
+        allowed = ", ".join(MILLIMETRES)
+        raise InputError(
+            f"{clip.where}: --{wrong}-unit arbitrary: the layout {clip.layout} has lengths in a known unit; allowed:"
+            f" {allowed}"
+        )
 
 
 def _stated_folders(options: SourceOptions) -> dict[Path, tuple[str, ...]]:

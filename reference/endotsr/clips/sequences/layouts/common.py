@@ -13,7 +13,17 @@ from endotsr.clips.sequences.checks.kinds import finding
 from endotsr.clips.sequences.clip import Clip, Depth, Masks
 from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout, without_faults
-from endotsr.clips.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
+from endotsr.clips.sequences.sequence_file import (
+    DEPTH,
+    FILE_NAME,
+    IMAGES,
+    MASKS,
+    RIGHT,
+    WRITTEN,
+    SequenceFile,
+    read_poses,
+    read_sequence_file,
+)
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import with_stated
 from endotsr.errors import InputError
@@ -54,6 +64,8 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         intrinsics=intrinsics,
         baseline=found.baseline or None,
         poses=poses,
+        pose_origin=found.poses.origin if found.poses else "given",
+        interpolated=tuple(found.poses.interpolated) if found.poses else (),
         rate=found.frame_rate or None,
         times=None if found.times is None else np.array(found.times, np.float64),
         notes=[*([f"source: {found.source}"] if found.source else []), *notes],
@@ -107,6 +119,6 @@ LAYOUT = Layout(
     recognises=recognises,
     describe=describe_common,
     direct=True,
-    reads=(FILE_NAME, IMAGES, RIGHT, "proposed_masks.png", "transforms.json", "sparse", "masks_kept", "truth"),
+    reads=tuple(name for name in WRITTEN if name not in (MASKS, DEPTH)),
     takes=("masks", "depth"),
 )

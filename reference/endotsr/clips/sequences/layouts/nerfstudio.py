@@ -159,7 +159,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         unit=ARBITRARY if unit == ARBITRARY else "mm",
         intrinsics=shared_intrinsics(cameras, file, notes),
         poses=[_pose(entry, options, factor, f"{file}: frame {i}") for i, entry in enumerate(entries)],
-        rate=options.rate,
+        rate=options.rate or _rate(times),
         times=None if times is None else np.sort(times).astype(np.float64),
         read_here=_places(entries, data),
         inside=_inside(file, files, masked, planes, _places(entries, data)),
@@ -202,6 +202,11 @@ def _times(entries: list[Keys], rate: float | None, file: Path, notes: list[str]
     else:
         notes.append(f"time: read as seconds, {times.max():g} s in all; --source-rate states the mean rate instead")
     return times
+
+
+def _rate(times: FloatArray | None) -> float | None:
+    """Frames per second of the times of the frames, in any order; None without."""
+    return None if times is None or len(times) < 2 else float(1 / np.median(np.diff(np.sort(times))))
 
 
 def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray | None:

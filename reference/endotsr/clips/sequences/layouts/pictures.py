@@ -76,10 +76,13 @@ def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
     if not (found["l"] and found["r"]):
         return None
     for one in found.values():
-        order = dict(zip(one, frame_numbers(one) or []))
-        one.sort(key=lambda file, order=order: order.get(file, ()))
-    check_pairing(found["l"], found["r"])
-    return found["l"], found["r"]
+        order = dict(zip(one, frame_numbers(one) or [(SIDE.sub("", file.stem),) for file in one]))
+        one.sort(key=lambda file, order=order: order[file])
+    left, right = found["l"], found["r"]
+    named = frame_numbers(left) is None and frame_numbers(right) is None
+    if not named or [SIDE.sub("", file.stem) for file in left] != [SIDE.sub("", file.stem) for file in right]:
+        check_pairing(left, right)
+    return left, right
 
 
 def _numbers(files: list[Path]) -> list[int] | None:

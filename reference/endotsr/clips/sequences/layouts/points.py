@@ -15,7 +15,7 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.files import frame_numbers, list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_of
+from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_of, stated_masks
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.arrays import read_npz
@@ -60,16 +60,15 @@ def describe_points(path: Path, options: SourceOptions) -> Clip:
         for i, matrix in enumerate(found["w2c"].astype(np.float64))
         for turn, shift in [rows_of_motion(matrix, f"{where}: w2c: frame {i}")]
     ]
-    mask = options.masks or path / "mask.png"
-    if options.masks is not None and not mask.is_file():
-        raise InputError(f"{mask}: no file; allowed: one mask for all frames, white inside the field of view")
+    mask = path / "mask.png"
+    inside = masks_of([mask] * len(frames), "black", width, height) if mask.is_file() else None
     visible, points = found["visible"].astype(bool), found["points"].astype(np.float64)
     return Clip(
         layout="points",
         where=path,
         names=[file.stem for file in frames],
         pictures=pictures_from_files(frames, []),
-        masks=masks_of([mask] * len(frames), "black", width, height) if mask.is_file() else None,
+        masks=stated_masks(options, frames, width, height) or inside,
         points=lambda i: points[visible[:, i]],
         unit=ARBITRARY,
         intrinsics=intrinsics_of_matrix(found["K"], width, height, where=where),
