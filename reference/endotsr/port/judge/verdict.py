@@ -135,9 +135,8 @@ class Report(msgspec.Struct, kw_only=True):
 
     @property
     def passed(self) -> bool:
-        """Whether the requested level is complete; in a profile, the highest level up to it that has outputs."""
-        asked = [level for level, (_, count) in self.levels.items() if count] if self.profile else []
-        return self.level >= max(asked, default=self.asked_level)
+        """Whether the requested level is complete."""
+        return self.level >= self.asked_level
 
     @property
     def accepted(self) -> bool:
@@ -180,14 +179,19 @@ def judge(
 
 
 def asked_of(golden: Golden, only: str, profile: str, level: int) -> tuple[Golden, int]:
-    """The cases of a part or a profile, and the level up to which they are asked. Raises InputError if unknown."""
+    """The cases of a part or a profile, and the level up to which they are asked. Raises InputError if unknown.
+
+    In a profile, it is the highest level up to `level` at which the profile has an output.
+    """
     golden = only_of(golden, only)
     if not profile:
         return golden, level
     cases = of_profile(golden.cases, profile)
     if not cases:
         raise InputError(f"--profile {profile}: {only} is no part of it")
-    return golden._replace(cases=cases), min(level, last_level(profile))
+    highest = min(level, last_level(profile))
+    own = {output.level for case in cases for output in case.outputs.values()} | {BITS}
+    return golden._replace(cases=cases), max((k for k in own if k <= highest), default=highest)
 
 
 def only_of(golden: Golden, only: str) -> Golden:
