@@ -28,7 +28,7 @@ BRIGHT = 250  # of 255: the largest channel of a highlight, in the frame or in a
 NEAR = 8  # px from an excluded pixel or from the border of the picture
 STEEP = 0.9  # quantile of the gradient over the tissue of a frame
 KINDS = {
-    "excluded": "excluded in a neighbouring training frame: flow reads them, the model does not",
+    "excluded": "excluded in a neighbouring training frame: flow reads them; the model has no target colour there",
     "highlight": "highlights, here or in a neighbouring frame",
     "mask": f"within {NEAR} px of an excluded pixel",
     "border": f"within {NEAR} px of the border of the picture",
