@@ -77,6 +77,7 @@ def test_the_readme_states_the_minutes_that_were_timed():
     rows = json.loads((RESULTS / "minutes.json").read_text(encoding="utf-8"))["rows"]
     made = presets.table()
     assert all(f"| `{name}` |" in made for name in ("paper", "sharp", "quick")) and "--minutes" not in made
+    assert "| flow | - | 41.61 | 0.0125 | - |" in made and "| flow | - | - | - | 41.61 |" in presets.recorded()
     assert f"| {rows['quick'][0]['seconds'] / 60:.1f} |" in made and "this class of machine" in made
 
 

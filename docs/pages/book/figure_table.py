@@ -67,6 +67,10 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "truth.paper.depth": Figure(TRUTH, "scenes.motion.`paper`.*.depth_mm", "{:.2f}"),
     "truth.sharp.still": Figure(TRUTH, "scenes.light.`sharp`.*.scene_units", "{:.2f}"),
     "truth.paper.still": Figure(TRUTH, "scenes.light.`paper`.*.scene_units", "{:.2f}"),
+    "biker.largest": Figure("tradeoff_biker.json", "points.0.error.max", "{:.2f}"),  # of `paper`
+    "truth.paper.light": Figure(TRUTH, "scenes.light.`paper`.*.depth_mm", "{:.3f}"),
+    "truth.still.light": Figure(TRUTH, "scenes.light.`paper` without S.*.depth_mm", "{:.3f}"),
+    "truth.without_s": Formula(sub, ("truth.still.light", "truth.paper.light"), "{:.3f}"),
     "sharp.blocks16": Figure(BLOCKS16, "held_out.mean.psnr_tissue", "{:.2f}"),
     "sharp.fade16": Figure(BLOCKS16, "cross_fade.mean.psnr_tissue", "{:.2f}"),
     "sharp.blocks8": Figure("pulling_sharp_blocks8.json", "held_out.mean.psnr_tissue", "{:.2f}"),

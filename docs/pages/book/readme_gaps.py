@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.results.report.tables import markdown
 from pages.store.commands import loaded
-from pages.store.intervals import shown
+from pages.store.intervals import blocks, paired
 from pages.store.program import RESULTS, Program
 from pages.store.tables import noted
 
@@ -59,16 +59,13 @@ def predicted(gap: int, name: str, metric: str = "psnr_tissue") -> Values:
 
 def difference(gap: int, name: str, metric: str = "psnr_tissue") -> Values:
     """`sharp` minus a prediction: of every frame with a gap of 1, else of every block."""
-    frames = by_frame(runs_of(gap), metric=metric) - predicted(gap, name, metric)
-    if gap == 1:
-        return frames
-    places = np.split(np.arange(frames.size), np.flatnonzero(np.diff(frames_of(gap)) > 1) + 1)
-    return np.array([frames[block].mean() for block in places])
+    values = by_frame(runs_of(gap), metric=metric) - predicted(gap, name, metric)
+    return np.array(blocks(values, frames_of(gap)))
 
 
-def said(gap: int, values: Values) -> str:
+def said(gap: int, name: str) -> str:
     """A difference: with an interval over single frames, or block by block."""
-    return shown([*values], 2, "+") if gap == 1 else ", ".join(f"{value:+.2f}" for value in values)
+    return paired(by_frame(runs_of(gap)) - predicted(gap, name), frames_of(gap), 2)
 
 
 def held_out(gap: int) -> str:
@@ -80,7 +77,7 @@ def row(gap: int) -> list[str]:
     """The PSNR of one length of the gap."""
     levels = [f"{predicted(gap, name).mean():.2f}" for name in LEVELS]
     model = f"{by_frame(runs_of(gap)).mean():.2f}"
-    return [str(gap), held_out(gap), *levels, model, *(said(gap, difference(gap, name)) for name in AGAINST)]
+    return [str(gap), held_out(gap), *levels, model, *(said(gap, name) for name in AGAINST)]
 
 
 def row_of_lpips(gap: int) -> list[str]:

@@ -107,8 +107,8 @@ def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
     head = ["EndoNeRF", "published", "here", "its base", "blend", "flow", "blend, tissue only", "flow, tissue only"]
     about = (
         "PSNR of the whole image in dB, every eighth frame held out. ± is a 95 % interval over the seeds. Blend is the"
-        " mean of the two neighbouring frames; *tissue only* reads no pixel that the masks exclude, as the method does. *Level"
-        " with* means within the interval over the seeds."
+        " mean of the two neighbouring frames; *tissue only* reads no pixel that the masks exclude, as the method does."
+        " *Level with* means within the interval over the seeds."
     )
     return noted(head, rows, about + black(folder))
 
