@@ -70,13 +70,10 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "biker.largest": Figure("tradeoff_biker.json", "points.0.error.max", "{:.2f}"),  # of `paper`
     "truth.paper.light": Figure(TRUTH, "scenes.light.`paper`.*.depth_mm", "{:.3f}"),
     "truth.still.light": Figure(TRUTH, "scenes.light.`paper` without S.*.depth_mm", "{:.3f}"),
-    "truth.without_s": Formula(sub, ("truth.still.light", "truth.paper.light"), "{:.3f}"),
     "sharp.blocks16": Figure(BLOCKS16, "held_out.mean.psnr_tissue", "{:.2f}"),
     "sharp.fade16": Figure(BLOCKS16, "cross_fade.mean.psnr_tissue", "{:.2f}"),
     "sharp.blocks8": Figure("pulling_sharp_blocks8.json", "held_out.mean.psnr_tissue", "{:.2f}"),
     "rife.blocks8": Figure("network.json", f"{BLOCKS8}.network.psnr_tissue", "{:.2f}"),
-    "rife.over_sharp8": Formula(sub, ("rife.blocks8", "sharp.blocks8"), "{:.2f}"),
-    "flow_tissue.cutting.lpips": Figure("interpolation.json", f"{CUTTING}.flow_interpolation_tissue.lpips", "{:.4f}"),
     "flow.frame1": Figure(PULLING, "baselines.flow_interpolation.per_frame.0.psnr_tissue", "{:.2f}"),
     "workload.focal": Setting("endotsr.training.scene.workload:FOCAL"),
     "diverged.rise": Setting("endotsr.training.fitting.divergence:RISE"),

@@ -112,7 +112,8 @@ def table(result: dict[str, Any]) -> str:
     note = (
         f"{where(result)}. The last column is the difference in the PSNR of the"
         " tissue from the flow that reads the same pixels, with a 95 % interval over single frames, as if they were"
-        f" independent, or one mean for each block. RIFE has the lower LPIPS in {sum(lower)} of {len(lower)} comparisons with it."
+        f" independent, or one mean for each block. RIFE has the lower LPIPS in {sum(lower)} of {len(lower)}"
+        " comparisons with it."
     )
     return "\n\n".join([*parts, note])
 
