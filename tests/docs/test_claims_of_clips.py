@@ -40,5 +40,5 @@ def test_a_step_of_fewer_seeds_than_the_whole_says_so():
     rows = [row(name, seed, psnr) for name, psnr in (("base", 40.1), ("A+S+L", 40.8)) for seed in range(3)]
     rows += [row("S", 0, 40.2), row("A+S", 0, 40.7)]
     said = components({"cutting": {"rows": rows}})
-    assert "by 0.70 dB on cutting (95 % intervals over the seeds +0.70 to +0.70 dB on cutting; published" in said
-    assert "the step of A is +0.50 dB (one seed) on cutting (published" in said
+    assert "by +0.70 dB on cutting (95 % interval over the seeds +0.70 to +0.70 dB; direction reproduced" in said
+    assert "The step of A is +0.50 dB (one seed) on cutting (published" in said

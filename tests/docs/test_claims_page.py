@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pages.claims import page as claims
-from pages.claims.answer import against, answer, baselines
+from pages.claims.answer import against, answer, baselines, black
 from pages.claims.estimates import averaged, contrast, spread
 from pages.claims.parts import planned_hours, protocols, tables
 from pages.claims.power import least_size, pairs_needed, power
@@ -327,8 +327,10 @@ def test_the_answer_says_what_the_records_say():
     record = stored("pulling")
     text = claims.parts()["answer"]
     whole, step = psnr(record, "A+S+L") - psnr(record, "base"), psnr(record, "A+S") - psnr(record, "S")
-    assert f"by {whole.mean():.2f} dB on pulling and " in text
-    assert f"the step of A is {step.mean():+.2f} dB on pulling" in text
+    assert f"by {whole.mean():+.2f} dB on pulling (95 % interval over the seeds " in text
+    low, high = stats.ttest_1samp(whole, 0.0).confidence_interval(0.95)
+    assert low < 0 < high and f"{low:+.2f} to {high:+.2f} dB; not decided: the interval contains 0 too)" in text
+    assert f"The step of A is {step.mean():+.2f} dB on pulling" in text
     level, base = psnr(record, "A+S+L"), psnr(record, "base")
     assert f"| pulling | 39.34 | {level.mean():.2f} ± " in text and f"| {base.mean():.2f} ± " in text
     truth = json.loads((claims.RESULTS / "effects_truth.json").read_text(encoding="utf-8"))["scenes"]["motion"]
@@ -338,6 +340,17 @@ def test_the_answer_says_what_the_records_say():
     bare = answer(claims.RESULTS, {"pulling": record, "cutting": None}, [], "")
     assert "on cutting is not finished" in bare and "right camera" not in bare and "1 combinations" in bare
     assert "| cutting | 40.96 | - | - | 42.80 |" in bare
+
+
+def test_the_answer_says_what_excluded_pixels_add():
+    """Of the pixels of a frame a fraction is black in both pictures: the masks of the clip, not the prediction."""
+    rows = json.loads((claims.RESULTS / "interpolation.json").read_text(encoding="utf-8"))["clips"]
+    of = rows["endonerf_pulling"]["every eighth frame"]["baselines"]
+    added = [np.subtract(of[name]["psnr_full"], of[name]["psnr_tissue"]) for name in of]
+    assert all(row == pytest.approx(added[0], abs=1e-5) for row in added)
+    said = black(claims.RESULTS)
+    assert f"which adds {added[0].mean():.2f} dB, and" in said and said in claims.parts()["answer"]
+    assert f"{100 * np.mean(1 - 10 ** (-added[0] / 10)):.1f} % of the pixels of pulling" in said
 
 
 def test_the_answer_states_no_order_within_the_interval_of_the_level():

@@ -107,6 +107,7 @@ def test_the_answer_follows_the_results():
     half = one | {"psnr": 30.5, "seconds": 5.0}
     pairs = lambda auto: [{"everything": one, "auto": auto}] * 3
     same = effects_parts.answer({"real": ["clip"], "scenes": {"still": pairs(half), "clip": pairs(one)}})
+    assert same.startswith("**On 2 clips `--effects auto` saves 25% of the time in the median, and 0% to 50% by clip.")
     assert "saves 50% of the time" in same and "+0.50 ± 0.00 dB" in same and "`clip`, there is nothing to save" in same
     other = effects_parts.answer({"real": ["clip"], "scenes": {"still": pairs(half), "clip": pairs(half)}})
     assert "nothing to save" not in other and "it saves 50% of the time (+0.50 dB)" in other

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from pages.effects.truth import SCENES, VARIANTS, depth_error, light_courses, light_scores, table
+from pages.store.intervals import interval
+from pages.store.marks import read_json
+from pages.store.program import RESULTS
 
 from endotsr.api import train
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
@@ -23,6 +26,20 @@ def scene():
 @pytest.fixture(scope="module")
 def run(scene):
     return train(scene.sequence, on_message=lambda line: None, **TINY)
+
+
+def test_without_the_prior_or_s_one_number_of_paper_changes_by_more_than_its_interval():
+    """As docs/effects.md says: the depth error of the clip with light alone, without S."""
+    scenes = read_json(RESULTS / "effects_truth.json", "effects measure truth")["scenes"]
+    changed = []
+    for scene, rows in scenes.items():
+        for variant in ("`paper` without S", "`paper` without the prior"):
+            for key in rows["`paper`"][0]:
+                less = [a[key] - b[key] for a, b in zip(rows[variant], rows["`paper`"], strict=True)]
+                mean, half = interval(less)
+                if abs(mean) > half:
+                    changed.append((scene, variant, key))
+    assert changed == [("light", "`paper` without S", "depth_mm")]
 
 
 def test_true_courses_are_those_of_the_pictures(scene, run):

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pages.book import running_clip
 from pages.full_size import page as full_size
 from pages.full_size import pictures as full_size_pictures
 from pages.full_size import text as full_size_text
 from pages.full_size.text import psnr
+from pages.store.intervals import interval, paired
 
 from endotsr.errors import InputError
 
-RUNS = full_size.PROGRAM.read()
+RUNS, LATER = full_size.PROGRAM.read(), running_clip.PROGRAM.read()
 (PAGE,) = full_size.PROGRAM.pages
 NOTEBOOK = Path(__file__).parents[2] / "notebooks" / "14_full_sequence.py"
 LARGEST = 2_000_000  # bytes of all stored files
@@ -111,3 +113,16 @@ def test_the_first_sentences_of_the_page_are_true():
         assert round(ahead) == 2 if run["preset"] == "quick" else round(ahead, 1) == 0.6
     paper, sharp = (full_size_text.means(recorded["every_eighth", name]) for name in ("paper", "sharp"))
     assert paper["model"] < paper["blend"] and sharp["model"] > sharp["blend"]
+    of = {name: full_size_text.by_frame(RUNS["quick_eighth"], name) for name in ("model", "flow_interpolation")}
+    mean, half = interval(of["model"] - of["flow_interpolation"])
+    assert mean < -half, "flow is ahead of the run of this page"
+    later = [np.subtract(run["psnr"]["model"], run["psnr"]["flow_interpolation"]) for run in LATER["runs"]]
+    mean, half = interval(np.mean(later, axis=0))
+    assert len(later) == 3 and abs(mean) < half, "and level with the three later ones"
+
+
+def test_differences_of_blocks_have_no_interval():
+    assert paired([1.0, 3.0, 5.0, 5.0], [4, 5, 9, 10], 1) == "+2.0, +5.0"
+    assert paired([1.0, 3.0], [1, 9], 1) == "+2.0 ± 12.7"
+    lines = full_size_text.answer(RUNS).splitlines()
+    assert all(("±" in line) == ("every eighth" in line) for line in lines if line.startswith("- "))

@@ -98,6 +98,22 @@ def test_without_tracked_motion_the_paths_are_more_than_twice_as_wrong():
         assert mean["no tracked motion"] > 2 * mean["`sharp`"]
 
 
+def test_the_tracks_are_more_accurate_than_the_paths_after_training():
+    """As README, B15 and the results say, in every seed."""
+    record = json.loads((RESULTS / "levers.json").read_text(encoding="utf-8"))
+    for scene, path in record["chain"]["scenes"].items():
+        for preset in ("`sharp`", "`paper`"):
+            runs = record["scenes"][scene][preset]
+            assert all(path[key] < run[key] for run in runs for key in ("scene_units", "pixels"))
+
+
+def test_sharp_shows_more_motion_that_does_not_exist():
+    """Where the light alone changes, as README says; the records of `effects measure truth`."""
+    of = json.loads((RESULTS / "effects_truth.json").read_text(encoding="utf-8"))["scenes"]["light"]
+    paper, sharp = ([row["scene_units"] for row in of[name]] for name in ("`paper`", "`sharp`"))
+    assert max(paper) < min(sharp) and all(row["motion_scene_units"] == 0 for row in of["`sharp`"])
+
+
 def test_the_depth_of_sharp_is_not_more_accurate_with_motion_alone():
     """docs/guides/which_preset.md promises no depth; the records of `effects measure truth`."""
     of = json.loads((RESULTS / "effects_truth.json").read_text(encoding="utf-8"))["scenes"]["motion"]

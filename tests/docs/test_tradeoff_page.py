@@ -50,6 +50,7 @@ def test_the_headline_states_no_time_below_the_scatter_of_equal_arithmetic(resul
     paper, chosen = by_name["paper"], by_name["float32, cutoff 1e-4, stop 1e-6"]
     scatter = scatter_of_equal(result)
     assert scatter > 0.1 and "*float32, cutoff 1e-4, stop 1e-6*" in promise(result, {})
-    for factor, words in ((1 + 0.9 * scatter, "not distinguished"), (1 + 1.2 * scatter, "takes +")):
+    told = "A frame with *float32, cutoff 1e-4, stop 1e-6* takes +"
+    for factor, words in ((1 + 0.9 * scatter, "not distinguished"), (1 + 1.2 * scatter, told)):
         slower = chosen | {"forward": {"median": factor * paper["forward"]["median"]}}
         assert words in time_sentence(result, slower, paper)

@@ -199,7 +199,11 @@ def peers(found: Result) -> str:
     first = found["cases"][0]
     head = ["Gaussians", "precision", "endotsr, ms", "gsplat, ms", "its pair lists, ms", "ratio", "largest error"]
     versions = f"gsplat {first['versions']['gsplat']}, torch {first['versions']['torch']}"
-    about = f"Measured on {found['date'][:10]} with {versions}, {first['threads']} threads."
+    about = (
+        f"Measured on {found['date'][:10]} on {found['machine']['processor']} with {versions}, {first['threads']} "
+        "threads. gsplat uses its reference in tests, and it is not meant for speed; its counted time contains our "
+        "dense table."
+    )
     names = [name.replace("_", " ") for name in first["errors"]]
     return f"{markdown(head, rows)}\n\n{about}\n\n{markdown(['Gaussians', 'precision', *names], blocks)}"
 

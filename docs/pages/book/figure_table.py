@@ -35,6 +35,8 @@ PULLING, SHARP = "pulling_paper_seed0.json", "pulling_sharp_seed?.json"
 PAPER = "pulling_paper_seed?.json"
 ALONE = "clips.endonerf_pulling.every eighth frame.baselines"
 CUTTING = "clips.endonerf_cutting.every eighth frame.baselines"
+BLOCKS8, BLOCKS16 = "clips.endonerf_pulling.blocks of 8 frames.baselines", "pulling_sharp_blocks16.json"
+TRUTH, PULL = "effects_truth.json", "scenes.pull and breath"
 FIGURES: dict[str, Figure | Setting | Formula] = {
     "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
     "blend.tissue": Figure(PULLING, "baselines.two_neighbours.mean.psnr_tissue", "{:.2f}"),
@@ -56,6 +58,22 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "sharp.paths": Figure("levers.json", "scenes.demo.`sharp`.*.scene_units", "{:.2f}"),
     "paper.paths": Figure("levers.json", "scenes.demo.`paper`.*.scene_units", "{:.2f}"),
     "tissue.paths": Figure("levers.json", "scenes.demo.`paper`.*.motion_scene_units", "{:.2f}"),
+    "flow.paths": Figure("levers.json", "chain.scenes.demo.scene_units", "{:.2f}"),
+    "sharp.paths.pull": Figure("levers.json", f"{PULL}.`sharp`.*.scene_units", "{:.2f}"),
+    "paper.paths.pull": Figure("levers.json", f"{PULL}.`paper`.*.scene_units", "{:.2f}"),
+    "tissue.paths.pull": Figure("levers.json", f"{PULL}.`paper`.*.motion_scene_units", "{:.2f}"),
+    "flow.paths.pull": Figure("levers.json", "chain.scenes.pull and breath.scene_units", "{:.2f}"),
+    "truth.sharp.depth": Figure(TRUTH, "scenes.motion.`sharp`.*.depth_mm", "{:.2f}"),
+    "truth.paper.depth": Figure(TRUTH, "scenes.motion.`paper`.*.depth_mm", "{:.2f}"),
+    "truth.sharp.still": Figure(TRUTH, "scenes.light.`sharp`.*.scene_units", "{:.2f}"),
+    "truth.paper.still": Figure(TRUTH, "scenes.light.`paper`.*.scene_units", "{:.2f}"),
+    "biker.largest": Figure("tradeoff_biker.json", "points.0.error.max", "{:.2f}"),  # of `paper`
+    "truth.paper.light": Figure(TRUTH, "scenes.light.`paper`.*.depth_mm", "{:.3f}"),
+    "truth.still.light": Figure(TRUTH, "scenes.light.`paper` without S.*.depth_mm", "{:.3f}"),
+    "sharp.blocks16": Figure(BLOCKS16, "held_out.mean.psnr_tissue", "{:.2f}"),
+    "sharp.fade16": Figure(BLOCKS16, "cross_fade.mean.psnr_tissue", "{:.2f}"),
+    "sharp.blocks8": Figure("pulling_sharp_blocks8.json", "held_out.mean.psnr_tissue", "{:.2f}"),
+    "rife.blocks8": Figure("network.json", f"{BLOCKS8}.network.psnr_tissue", "{:.2f}"),
     "flow.frame1": Figure(PULLING, "baselines.flow_interpolation.per_frame.0.psnr_tissue", "{:.2f}"),
     "workload.focal": Setting("endotsr.training.scene.workload:FOCAL"),
     "diverged.rise": Setting("endotsr.training.fitting.divergence:RISE"),

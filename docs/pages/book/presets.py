@@ -39,7 +39,7 @@ def values(runs: Sequence[Mapping[str, Any]], columns: Columns) -> list[str]:
 
 
 def table(columns: Columns = MEASURED) -> str:
-    """One row per preset, the fastest first, means over the seeds; then the clip and the machine."""
+    """One row per preset, the fastest first, means over the seeds; predictions without a model; clip and machine."""
     found = loaded(RESULTS / "minutes.json")
     presets = {name: runs for name, runs in found["rows"].items() if name in PRESETS}
     rows = sorted((mean(run["seconds"] for run in runs), name, runs) for name, runs in presets.items())
@@ -52,6 +52,8 @@ def table(columns: Columns = MEASURED) -> str:
         ]
         for seconds, name, of in rows
     ]
+    for name, values_of in found["baselines"].items():
+        cells.append([name, "-", *values([values_of], columns), "-"])
     runs = [run for of in presets.values() for run in of]
     machines, threads = sorted({run["processor"] for run in runs}), sorted({run["threads"] for run in runs})
     clip = found["clip"]

@@ -1,6 +1,8 @@
-"""The table of README.md that compares `sharp` with interpolation.
+"""The tables of README.md that compare `sharp` with interpolation, by number of frames missing in a row.
 
-The records are those of `full_size.record` and of `full_size.interpolation`.
+The records are those of `full_size.record`, `full_size.interpolation` and `full_size.network`. A difference is paired
+by frame. Where every eighth frame is missing, it has an interval over the frames. The frames of one block are too alike
+for one, and blocks are few: the mean of each block is given instead.
 """
 
 from typing import Any
@@ -8,10 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.results.report.tables import markdown
 from pages.store.commands import loaded
-from pages.store.intervals import shown
+from pages.store.intervals import blocks, paired
 from pages.store.program import RESULTS, Program
 from pages.store.tables import noted
+
+Values = NDArray[np.float64]  # by held-out frame
 
 GAPS = {  # frames missing in a row: records of `sharp`, split of the interpolation
     1: ("pulling_sharp_seed?.json", "every eighth frame"),
@@ -19,44 +24,81 @@ GAPS = {  # frames missing in a row: records of `sharp`, split of the interpolat
     8: ("pulling_sharp_blocks8.json", "blocks of 8 frames"),
     16: ("pulling_sharp_blocks16.json", "blocks of 16 frames"),
 }
-HEADS = ("Frames missing in a row", "Blend", "Flow", "Flow, tissue only", "`sharp`", "Seeds", "`sharp` - flow",
-         "LPIPS of flow", "LPIPS of `sharp`")  # fmt: skip
-FLOW, BLEND = "flow_interpolation", "two_neighbours"
+FLOW, BLEND, COPY, RIFE = "flow_interpolation", "two_neighbours", "nearest_frame", "network"
+TISSUE = f"{FLOW}_tissue"
+NAMES = {COPY: "Copy", BLEND: "Blend", FLOW: "Flow", TISSUE: "Flow, tissue only", RIFE: "RIFE"}
+MISSING = "Frames missing in a row"
+LEVELS = (BLEND, FLOW, TISSUE, RIFE)  # columns of PSNR
+AGAINST = (FLOW, TISSUE)  # columns of differences
+CLIP = "endonerf_pulling"
 
 
-def by_frame(runs: list[dict[str, Any]], of: str = "", metric: str = "psnr_tissue") -> NDArray[np.float64]:
+def by_frame(runs: list[dict[str, Any]], of: str = "", metric: str = "psnr_tissue") -> Values:
     """A metric of every held-out frame, mean over the runs: of the model, or of a baseline."""
     rows = [(run["baselines"][of] if of else run["held_out"])["per_frame"] for run in runs]
     return np.array([[frame[metric] for frame in frames] for frames in rows]).mean(axis=0)
 
 
+def runs_of(gap: int) -> list[dict[str, Any]]:
+    """The recorded runs of `sharp` with this gap."""
+    return [loaded(file) for file in sorted(RESULTS.glob(GAPS[gap][0]))]
+
+
+def frames_of(gap: int) -> list[int]:
+    """The held-out frames."""
+    return [row["frame"] for row in runs_of(gap)[0]["held_out"]["per_frame"]]
+
+
+def predicted(gap: int, name: str, metric: str = "psnr_tissue") -> Values:
+    """A metric of a prediction without a model of the clip."""
+    record = loaded(RESULTS / ("network.json" if name == RIFE else "interpolation.json"))
+    part = record["clips"][CLIP][GAPS[gap][1]]
+    assert part["frames"] == frames_of(gap), f"{name}, {gap}: the records hold different frames"
+    return np.array(part["baselines"][name][metric])
+
+
+def difference(gap: int, name: str, metric: str = "psnr_tissue") -> Values:
+    """`sharp` minus a prediction: of every frame with a gap of 1, else of every block."""
+    values = by_frame(runs_of(gap), metric=metric) - predicted(gap, name, metric)
+    return np.array(blocks(values, frames_of(gap)))
+
+
+def said(gap: int, name: str) -> str:
+    """A difference: with an interval over single frames, or block by block."""
+    return paired(by_frame(runs_of(gap)) - predicted(gap, name), frames_of(gap), 2)
+
+
+def held_out(gap: int) -> str:
+    """The number of frames or blocks."""
+    return f"{difference(gap, FLOW).size} {'frames' if gap == 1 else 'blocks'}"
+
+
 def row(gap: int) -> list[str]:
-    """The cells of one length of the gap; the difference is paired by frame."""
-    pattern, split = GAPS[gap]
-    runs = [loaded(file) for file in sorted(RESULTS.glob(pattern))]
-    splits = loaded(RESULTS / "interpolation.json")["clips"]["endonerf_pulling"]
-    tissue = splits[split]["baselines"][f"{FLOW}_tissue"]["psnr_tissue"] if split in splits else None
-    model, flow = by_frame(runs), by_frame(runs, FLOW)
-    return [
-        str(gap),
-        f"{by_frame(runs, BLEND).mean():.2f}",
-        f"{flow.mean():.2f}",
-        "-" if tissue is None else f"{np.mean(tissue):.2f}",
-        f"{model.mean():.2f}",
-        str(len(runs)),
-        shown([*(model - flow)], 2, "+"),
-        f"{by_frame(runs, FLOW, 'lpips').mean():.4f}",
-        f"{by_frame(runs, '', 'lpips').mean():.4f}",
-    ]
+    """The PSNR of one length of the gap."""
+    levels = [f"{predicted(gap, name).mean():.2f}" for name in LEVELS]
+    model = f"{by_frame(runs_of(gap)).mean():.2f}"
+    return [str(gap), held_out(gap), *levels, model, *(said(gap, name) for name in AGAINST)]
+
+
+def row_of_lpips(gap: int) -> list[str]:
+    """The LPIPS of one length of the gap."""
+    without = [f"{predicted(gap, name, 'lpips').mean():.4f}" for name in NAMES]
+    return [str(gap), *without, f"{by_frame(runs_of(gap), metric='lpips').mean():.4f}"]
 
 
 def table() -> str:
-    """One row for each length of the gap."""
+    """PSNR and LPIPS, one row for each length of the gap."""
+    heads = (MISSING, "Held out", *(NAMES[name] for name in LEVELS), "`sharp`",
+             "`sharp` - flow", "`sharp` - flow, tissue only")  # fmt: skip
+    seeds = ", ".join(f"{len(runs_of(gap))} with {gap}" for gap in GAPS)
     about = (
-        "EndoNeRF pulling, 640x512, PSNR of the tissue in dB. ± is a 95 % interval over the held-out frames, as if "
-        "they were independent. Flow and blend read every pixel of the neighbours, instruments included."
+        "EndoNeRF pulling, 640x512, PSNR of the tissue in dB. A difference has a 95 % interval over the frames, or one "
+        f"mean for each block. Seeds of `sharp` by frames missing: {seeds}. Flow, blend and RIFE read every pixel of "
+        "the neighbours, instruments included."
     )
-    return noted(HEADS, [row(gap) for gap in GAPS], about)
+    psnr = noted(heads, [row(gap) for gap in GAPS], about)
+    lpips = markdown((f"{MISSING}, LPIPS", *NAMES.values(), "`sharp`"), [row_of_lpips(gap) for gap in GAPS])
+    return f"{psnr}\n\n{lpips}"
 
 
 PROGRAM = Program(__name__, "../README.md", {"table": table}, room="gaps")

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from endotsr.clips.simulator import SimulatorSettings
 from pages.claims.estimates import Estimate, contrast, runs_of
-from pages.claims.rules import LEAST_PAIRS, seeds_of
-from pages.claims.verdicts import CLIPS, FULL, STEPS, WHOLE
+from pages.claims.rules import LEAST_PAIRS, increment_verdict, seeds_of
+from pages.claims.verdicts import CLIPS, FULL, ROUNDED, STEPS, WHOLE
 from pages.store.commands import loaded
 from pages.store.intervals import shown, student
 from pages.store.published import MATCHED_PSNR, PUBLISHED
@@ -47,24 +48,31 @@ def components(known: Mapping[str, Record]) -> str:
     wholes = {clip: contrast(record, WHOLE, "psnr_full") for clip, record in known.items()}
     steps = {clip: contrast(record, STEPS["A"], "psnr_full") for clip, record in known.items()}
     least, most = MATCHED_PSNR
-    limits = [f"{gain.paired[0]:+.2f} to {gain.paired[1]:+.2f} dB on {clip}"
-              for clip, gain in wholes.items() if gain is not None and gain.paired is not None]  # fmt: skip
-    paired = f"95 % intervals over the seeds {' and '.join(limits)}; " if limits else ""
-    published = f"({paired}published medians {least} to {most} dB, by sequence)"
-    text = f"The three components together raise the PSNR of their base by {_by_clip(wholes, '')} {published}"
+    changes = [f"{gain.mean:+.2f} dB on {clip} ({_decided(gain)})" for clip, gain in wholes.items() if gain is not None]
+    text = f"The three components together change the PSNR of their base by {' and by '.join(changes)}"
+    text += f"; the published medians are {least:+.2f} to {most:+.2f} dB, by sequence."
     measured = {clip: step for clip, step in steps.items() if step is not None}
     if not measured:
-        return f"{text}."
-    return f"{text}; the step of A is {_by_clip(measured, '+')} (published +0.29 dB, mean of both clips)."
+        return text
+    return f"{text} The step of A is {_by_clip(measured)} (published +0.29 dB, mean of both clips)."
 
 
-def _by_clip(gains: Mapping[str, Estimate | None], sign: str) -> str:
+def _decided(gain: Estimate) -> str:
+    """The interval of a gain over the seeds and the verdict on the published range."""
+    least, most = (MATCHED_PSNR[0] - ROUNDED["psnr_full"], MATCHED_PSNR[1] + ROUNDED["psnr_full"])
+    verdict = increment_verdict(least, gain.paired, len(gain.values), most)
+    if gain.paired is None:
+        return verdict
+    low, high = gain.paired
+    return f"95 % interval over the seeds {low:+.2f} to {high:+.2f} dB; {verdict}"
+
+
+def _by_clip(gains: Mapping[str, Estimate]) -> str:
     """Gains with the clip of each, and with the number of seeds where that is not the usual one."""
     texts = []
     for clip, gain in gains.items():
-        if gain is not None:
-            seeds = f" ({seeds_of(len(gain.values))})" if len(gain.values) < LEAST_PAIRS else ""
-            texts.append(f"{gain.mean:{sign}.2f} dB{seeds} on {clip}")
+        seeds = f" ({seeds_of(len(gain.values))})" if len(gain.values) < LEAST_PAIRS else ""
+        texts.append(f"{gain.mean:+.2f} dB{seeds} on {clip}")
     return " and ".join(texts)
 
 
@@ -100,8 +108,25 @@ def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
     about = (
         "PSNR of the whole image in dB, every eighth frame held out. ± is a 95 % interval over the seeds. Blend is the"
         " mean of the two neighbouring frames; *tissue only* reads no pixel that the masks exclude, as the method does."
+        " *Level with* means within the interval over the seeds."
     )
-    return noted(head, rows, about)
+    return noted(head, rows, about + black(folder))
+
+
+def black(folder: Path) -> str:
+    """What the excluded pixels, black in both pictures, add to the PSNR of the whole image."""
+    path = folder / "interpolation.json"
+    clips = loaded(path)["clips"] if path.exists() else {}
+    texts = []
+    for clip in CLIPS:
+        rows = clips.get(f"endonerf_{clip}", {}).get("every eighth frame", {}).get("baselines", {}).get(PREDICTIONS[0])
+        if rows:
+            added = np.array(rows["psnr_full"]) - rows["psnr_tissue"]  # of a frame: of its masks alone
+            fraction = np.mean(1 - 10 ** (-added / 10))
+            texts.append(f"{100 * fraction:.1f} % of the pixels of {clip}, which adds {added.mean():.2f} dB")
+    if not texts:
+        return ""
+    return f" Excluded pixels are black in both pictures and count as right: {', and '.join(texts)}."
 
 
 def baselines(folder: Path, clip: str) -> dict[str, float]:
@@ -128,10 +153,10 @@ def beaten(folder: Path, clip: str, record: Record) -> str:
     for name, value in zip(NAMES, of.values(), strict=True):
         stands.setdefault(against(mean, value, half), []).append(name)
     if len(stands) == 1:
-        return f"On {clip} the reproduction is {next(iter(stands))} all four predictions without a model."
+        return f"On {clip} the mean over the seeds is {next(iter(stands))} all four predictions without a model."
     texts = [f"{how} {', '.join(names[:-1])} and {names[-1]}" if names[1:] else f"{how} {names[0]}"
              for how, names in stands.items()]  # fmt: skip
-    return f"On {clip} the reproduction is {', and '.join(texts)}."
+    return f"On {clip} the mean over the seeds is {', and '.join(texts)}."
 
 
 def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str:
@@ -158,5 +183,8 @@ def truth(found: Record) -> str:
         for name, scene in found["scenes"].items()
     }
     light, motion = (shown(gains[name], 2, "+") for name in ("light", "motion"))
-    where = "On simulated clips with a known truth, A changes the held-out PSNR by"
+    of = SimulatorSettings()
+    size = f"{found['frames']} frames of {of.width}x{of.height}"
+    runs = f"{METHOD} with {found['iterations']} iterations on {size}, {seeds_of(found['seeds'])} of clip and training"
+    where = f"On small simulated clips with a known truth ({runs}), A changes the held-out PSNR by"
     return f"{where} {light} dB where only the light changes and by {motion} dB where only the tissue moves."

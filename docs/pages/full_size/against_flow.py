@@ -28,7 +28,7 @@ BRIGHT = 250  # of 255: the largest channel of a highlight, in the frame or in a
 NEAR = 8  # px from an excluded pixel or from the border of the picture
 STEEP = 0.9  # quantile of the gradient over the tissue of a frame
 KINDS = {
-    "excluded": "excluded in a neighbouring training frame: flow reads them, the model does not",
+    "excluded": "excluded in a neighbouring training frame",
     "highlight": "highlights, here or in a neighbouring frame",
     "mask": f"within {NEAR} px of an excluded pixel",
     "border": f"within {NEAR} px of the border of the picture",
@@ -114,7 +114,7 @@ def tables(result: dict[str, Any]) -> str:
     return (
         markdown(head, by_frame) + "\n\n" + markdown(other, by_kind) + "\n\n"
         "PSNR over the tissue. *Model minus flow* is the difference of the squared errors as a fraction of the whole "
-        "squared error of flow. On the pixels that both can read, the squared error of the model is "
+        "squared error of flow. On the pixels that no neighbour excludes, the squared error of the model is "
         f"{100 * abs(ratio):.1f} % {'below' if ratio < 0 else 'above'} that of flow. {result['sequence']}, "
         f"{result['date'][:10]}."
     )

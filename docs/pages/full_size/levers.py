@@ -1,11 +1,13 @@
 """Train `sharp`, `paper`, and `sharp` with one of its changes reverted at a time, over seeds and scenes: two tables.
 
     python docs/make.py full_size.levers measure [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
+    python docs/make.py full_size.levers measure --chain      the paths of flow alone, into the stored record
 
 Two scenes are simulated, so their true motion is known. A CLIP is a sequence folder, read at half size. Its held-out
 frames are excluded, and every eighth frame of the others is held out instead: no frame on which a preset is evaluated
 is used. Every run has the length `--iterations` and the initial points of `demo`. Finished runs are kept, and a stopped
-command continues with the missing runs.
+command continues with the missing runs. The paths of flow, chained from frame to frame and lifted by the prior depth
+(`full_size.chain`), need no training.
 """
 
 # A record of a page is complete, or the KeyError says what it lacks.
@@ -21,7 +23,10 @@ import numpy as np
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import DEMO
+from endotsr.training.runs.machine import dated
+from pages.full_size import chain
 from pages.store import kept
+from pages.store.commands import loaded
 from pages.store.intervals import shown
 from pages.store.program import CLIPS, Program
 from pages.store.tables import means, noted, where
@@ -109,16 +114,40 @@ def trained(options: argparse.Namespace, rows: Rows) -> dict[str, Any]:
     return {"seeds": options.seeds, "iterations": options.iterations, "scenes": found}
 
 
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """The trainings with the paths of flow; with `--chain` the stored trainings."""
+    trainings = loaded(options.record) if options.chain else dated(trained(options, CHANGES))
+    paths = {scene: chain.measured(settings) for scene, settings in SIMULATED.items()}
+    return trainings | {"chain": dated({"scenes": paths})}
+
+
 def motion_table(result: dict[str, Any]) -> str:
-    """Both presets on the simulated scenes: means with intervals, and the motion of the tissue."""
+    """The paths of flow and of both presets on the simulated scenes, and the motion of the tissue."""
     rows = []
+    paths = result["chain"]["scenes"]
     for scene in SIMULATED:
+        rows.append([f"{scene}, flow from frame to frame", moves(result, scene), *chain_cells(paths[scene])])
         for label in (PAPER, SHARP):
-            runs = result["scenes"][scene][label]
-            cells = means(runs, [(key, digits) for key, _, digits in MOTION])
-            rows.append([f"{scene}, {label}", f"{runs[0]['motion_scene_units']:.3f}", *cells])
-    head = ["Scene and preset", "the tissue moves, mm", *(label for _, label, _ in MOTION)]
-    return noted(head, rows, f"Mean ± 95 % interval; {about(result)}")
+            cells = means(result["scenes"][scene][label], [(key, digits) for key, _, digits in MOTION])
+            rows.append([f"{scene}, {label}", moves(result, scene), *cells])
+    head = ["Scene and paths", "the tissue moves, mm", *(label for _, label, _ in MOTION)]
+    least = min(path["followed"] for path in paths.values())
+    note = (
+        f"Mean ± 95 % interval; {about(result)} *Flow from frame to frame* is the tracked motion (B15) with which "
+        f"{SHARP} starts, before any training; flow follows {100 * least:.0f} % of its points or more, and the others "
+        f"move with their neighbours; {where(result['chain'])}."
+    )
+    return noted(head, rows, note)
+
+
+def moves(result: dict[str, Any], scene: str) -> str:
+    """The mean motion of the tissue."""
+    return f"{result['scenes'][scene][PAPER][0]['motion_scene_units']:.3f}"
+
+
+def chain_cells(path: dict[str, float]) -> list[str]:
+    """The errors of the paths of flow; they have no pictures."""
+    return [f"{path[key]:.{digits}f}" if key in path else "-" for key, _, digits in MOTION]
 
 
 def table(result: dict[str, Any]) -> str:
@@ -148,6 +177,7 @@ def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, 
 
 OPTIONS = {"clips": CLIPS, "--seeds": 3, "--iterations": 1500, "--jobs": 2}
 PROGRAM = Program(
-    __name__, "results/README.md", {"table": table, "motion": motion_table}, "levers.json",
-    partial(trained, rows=CHANGES), OPTIONS,
+    __name__, "results/README.md", {"table": table, "motion": motion_table}, "levers.json", measured,
+    OPTIONS | {"--chain": {"action": "store_true", "help": "keep the trainings, measure the paths of flow alone"}},
+    stamped=False,
 )  # fmt: skip

@@ -27,7 +27,7 @@ from endotsr.results.evaluation.tissue_baselines import filled_picture
 from endotsr.results.report.tables import markdown
 from pages.full_size import interpolation
 from pages.full_size.interpolation import LEFT_OUT, SPLITS, held_out_text, mean
-from pages.store.intervals import interval
+from pages.store.intervals import paired
 from pages.store.program import Program
 from pages.store.tables import where
 
@@ -90,8 +90,7 @@ def row(label: str, part: dict[str, Any], other: dict[str, Any], name: str, with
     cells = [f"{mean(part, name, key):.{digits}f}" for key, digits in (("psnr_full", 2), ("psnr_tissue", 2))]
     cells.append(f"{mean(part, name, 'lpips'):.4f}")
     pairs = zip(part["baselines"][name]["psnr_tissue"], other["baselines"][against]["psnr_tissue"], strict=True)
-    middle, half = interval([a - b for a, b in pairs])
-    cells.append("" if name == against else f"{middle:+.2f} ± {half:.2f}")
+    cells.append("" if name == against else paired([a - b for a, b in pairs], part["frames"], 2))
     if without:
         cells[1] += f" ({mean(part, name, 'psnr_tissue', without):.2f})"
     return [label, *cells]
@@ -112,8 +111,9 @@ def table(result: dict[str, Any]) -> str:
             lower += [mean(part, a, "lpips") < mean(other, b, "lpips") for a, b in zip(NAMES, BESIDE, strict=True)]
     note = (
         f"{where(result)}. The last column is the difference in the PSNR of the"
-        " tissue from the flow that reads the same pixels; ± is a 95 % interval over the frames, as if they were"
-        f" independent. RIFE has the lower LPIPS in {sum(lower)} of {len(lower)} comparisons with it."
+        " tissue from the flow that reads the same pixels, with a 95 % interval over single frames, as if they were"
+        f" independent, or one mean for each block. RIFE has the lower LPIPS in {sum(lower)} of {len(lower)}"
+        " comparisons with it."
     )
     return "\n\n".join([*parts, note])
 

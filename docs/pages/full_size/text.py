@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from endotsr.results.report.tables import markdown
 from pages.full_size.against_flow import KINDS
 from pages.store.commands import loaded
+from pages.store.intervals import blocks, paired
 from pages.store.program import RESULTS
 from pages.store.tables import where_with_cores
 
@@ -17,6 +18,7 @@ LABELS = {"model": "model", "nearest_frame": "copy", "two_neighbours": "blend", 
 SPLITS = {"eighth": "every eighth frame held out", "blocks8": "blocks of 8 frames held out"}
 RECORDED = {"every_eighth": "every eighth frame", "blocks 4": "blocks of 4", "blocks 8": "blocks of 8",
             "blocks 16": "blocks of 16"}  # fmt: skip
+AGAINST = ("model", "two_neighbours", "flow_interpolation")  # in the answer
 PRESETS = ("paper", "quick", "sharp")
 
 
@@ -34,7 +36,7 @@ def psnr(squared_error: float) -> float:
 
 def mean_psnr(run: dict[str, Any], name: str) -> float:
     """Mean over the held-out frames of the PSNR over the tissue, dB."""
-    return float(np.mean([psnr(row["squared_error"][name]) for row in run["frames"]]))
+    return float(by_frame(run, name).mean())
 
 
 def ahead(run: dict[str, Any]) -> float:
@@ -67,20 +69,37 @@ def fragments(runs: dict[str, Any]) -> dict[str, str]:
 
 
 def answer(runs: dict[str, Any]) -> str:
-    """Model against the blend of two frames, on the simulated clip and on the recorded one."""
+    """Model against blend and flow, on the simulated clip and on the recorded one."""
     lines = []
     for run in runs.values():
-        model, blend = mean_psnr(run, "model"), mean_psnr(run, "two_neighbours")
-        lines.append(_line(f"Simulated clip, {SPLITS[run['split']]}, `{run['preset']}`", model, blend))
+        values = {name: by_frame(run, name) for name in AGAINST}
+        frames = [row["frame"] for row in run["frames"]]
+        lines.append(_line(f"Simulated clip, {SPLITS[run['split']]}, `{run['preset']}`", values, frames))
     for (split, preset), records in recorded().items():
-        values = means(records)
-        lines.append(_line(f"Recorded clip, {RECORDED[split]} held out, `{preset}`", values["model"], values["blend"]))
-    return "\n".join(lines)
+        values = {name: recorded_by_frame(records, name) for name in AGAINST}
+        frames = [row["frame"] for row in records[0]["held_out"]["per_frame"]]
+        lines.append(_line(f"Recorded clip, {RECORDED[split]} held out, `{preset}`", values, frames))
+    note = "A difference has a 95 % interval over the frames, as if they were independent, or one mean for each block."
+    return "\n".join(lines) + f"\n\n{note}"
 
 
-def _line(what: str, model: float, blend: float) -> str:
-    word = "above" if model > blend else "below"
-    return f"- {what}: {model:.2f} dB, **{abs(model - blend):.2f} dB {word} the blend**."
+def _line(what: str, values: dict[str, NDArray[np.float64]], frames: list[int]) -> str:
+    model = values["model"]
+    count = len(blocks(model, frames))
+    held_out = f"{count} frames" if count == len(frames) else f"{count} blocks"
+    less = [f"{paired(model - values[name], frames, 2)} dB" for name in AGAINST[1:]]
+    return f"- {what} ({held_out}): {model.mean():.2f} dB; **minus the blend {less[0]}; minus flow {less[1]}**."
+
+
+def by_frame(run: dict[str, Any], name: str) -> NDArray[np.float64]:
+    """PSNR over the tissue of every held-out frame of a stored run, dB."""
+    return np.array([psnr(row["squared_error"][name]) for row in run["frames"]])
+
+
+def recorded_by_frame(records: list[dict[str, Any]], name: str) -> NDArray[np.float64]:
+    """The same of recorded runs, mean over the runs."""
+    parts = [record["held_out"] if name == "model" else record["baselines"][name] for record in records]
+    return np.array([[row["psnr_tissue"] for row in part["per_frame"]] for part in parts]).mean(axis=0)
 
 
 def recorded() -> dict[tuple[str, str], list[dict[str, Any]]]:

@@ -24,6 +24,23 @@ def student(values: Sequence[float]) -> tuple[float, Interval]:
     return mean, None if len(values) < 2 else (mean - half, mean + half)
 
 
+def blocks(values: Sequence[float], frames: Sequence[int]) -> list[float]:
+    """The mean of the values of every block of successive frames."""
+    ends = np.flatnonzero(np.diff(frames) > 1) + 1
+    return [float(np.mean(part)) for part in np.split(np.asarray(values), ends)]
+
+
+def paired(values: Sequence[float], frames: Sequence[int], digits: int) -> str:
+    """Differences by frame: their mean with an interval, or the mean of each block where frames follow each other.
+
+    The frames of a block are too alike for an interval, and the blocks of a clip are few.
+    """
+    found = blocks(values, frames)
+    if len(found) == len(values):
+        return shown(values, digits, "+")
+    return ", ".join(f"{value:+.{digits}f}" for value in found)
+
+
 def shown(values: Sequence[float], digits: int, sign: str = "") -> str:
     """The mean with its 95 % interval; no interval for one value, a dash for none. sign = "+" shows the sign."""
     if not len(values):

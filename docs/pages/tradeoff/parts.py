@@ -69,10 +69,13 @@ def time_sentence(result: dict[str, Any], point: dict[str, Any], paper: dict[str
     more, scatter = point["forward"]["median"] / paper["forward"]["median"] - 1, scatter_of_equal(result)
     if abs(more) <= scatter:
         return (
-            f"Its time per frame is not distinguished from that of `paper`: settings with equal visits differ by up to "
-            f"{100 * scatter:.0f} % in this record."
+            f"The time of a frame with *{point['name']}* is not distinguished from that with `paper`: settings with "
+            f"equal visits differ by up to {100 * scatter:.0f} % in this record."
         )
-    return f"A frame takes {100 * more:+.0f} % time; settings with equal visits differ by up to {100 * scatter:.0f} %."
+    return (
+        f"A frame with *{point['name']}* takes {100 * more:+.0f} % time; settings with equal visits differ by up to "
+        f"{100 * scatter:.0f} %."
+    )
 
 
 def scatter_of_equal(result: dict[str, Any]) -> float:
@@ -101,8 +104,8 @@ def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> st
     best = min(kept, key=lambda name: (sum(kept[name]), name))
     listed = ", ".join(f"{ratio:.1f} ({scene})" for scene, ratio in zip(every, kept[best], strict=True))
     return (
-        f" The setting *{best}* is never off by more than one level of 8 bits on all {len(every)} scenes of this page. "
-        f"Its visited pairs, as multiples of those of `paper`: {listed}."
+        f" The setting *{best}* is off by at most one level of 8 bits in the measured view of each of the {len(every)} "
+        f"scenes of this page. Its visited pairs, as multiples of those of `paper`: {listed}."
     )
 
 

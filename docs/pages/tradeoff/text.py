@@ -25,11 +25,12 @@ def advice(result: dict[str, Any]) -> list[str]:
     if chosen is not None:
         raster = chosen["setting"]["raster"]
         sentences.append(
-            f"For an image that is never off by more than one level of 8 bits, lower the cutoff to "
+            f"For an image of this scene that is off by at most one level of 8 bits, lower the cutoff to "
             f"{small(raster['alpha_cutoff'])} "
             f"and the stop to {small(raster['transmittance_stop'])}, in float32: "
             f"{chosen['visits'] / paper['visits']:.1f} times the visits of `paper`, and a largest error of "
-            f"{levels(chosen['error']['max'])}."
+            f"{levels(chosen['error']['max'])}. The table of the [other scenes](#on-trained-real-scenes) says where "
+            "this does not suffice."
         )
     if result["joint"]:
         sentences.append(
