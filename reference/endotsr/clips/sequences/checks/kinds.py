@@ -37,7 +37,7 @@ KINDS: dict[str, Kind] = {
     "number-gap": Kind("warning", "frames count as evenly spaced in time",
                        "supply the missing frames, or cut the clip there"),
     "order-of-names": Kind("warning", "frames are in the order of the numbers in their names",
-                           "put the date before the time and write 24 hours, or number the frames"),
+                           "put the date before the time and write hours from 0 to 23, or number the frames"),
     "not-read": Kind("note", "training knows nothing of it",
                      "none needed for files of other programs; endotsr prepare has options that read such files"),
     "frame-rate": Kind("warning", "times may be in milliseconds, or the time between two frames may stand for the rate",
