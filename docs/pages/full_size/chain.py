@@ -22,9 +22,11 @@ Points = NDArray[np.float64]  # (3, P) or (n, 3, P) scene units
 def measured(settings: dict[str, Any]) -> dict[str, float]:
     """Errors of the paths in a simulated scene, with the fraction of the points that are followed."""
     import endotsr
+    from endotsr.clips.simulator.settings import SimulatorSettings
     from endotsr.training.runs.sources import SIMULATED, true_positions_of
 
     sequence = endotsr.load_sequence("simulated", simulator=settings)
+    assert isinstance(sequence.simulator, SimulatorSettings)
     truth = true_positions_of(SIMULATED, sequence.simulator, endotsr.make_config("sharp"), sequence)
     assert truth is not None
     return errors(sequence, truth)
