@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.simulator import SimulatorSettings
+from endotsr.studies.sweeps.ablation import COMPARISONS
 from pages.claims.estimates import Estimate, contrast, runs_of
 from pages.claims.rules import LEAST_PAIRS, increment_verdict, seeds_of
 from pages.claims.verdicts import CLIPS, FULL, ROUNDED, STEPS, WHOLE
@@ -23,6 +24,7 @@ from pages.store.tables import noted
 
 PREDICTIONS = ("two_neighbours", "flow_interpolation", "two_neighbours_tissue", "flow_interpolation_tissue")
 NAMES = ("the blend", "flow", "the tissue-only blend", "the tissue-only flow")  # of the predictions, in their order
+FIXED_GAIN = next(one for one in COMPARISONS if one.claim == "A and L added to S, fixed count")
 METHOD, WITHOUT_A = "`paper`", "`paper` without A"
 Record = Any  # content of a file of docs/results
 
@@ -33,7 +35,7 @@ def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record |
     right_eye   mean and interval of the gain on the right camera at held-out times as text, or ""
     """
     known = {clip: found[clip] for clip in CLIPS if contrast(found[clip], WHOLE, "psnr_full") is not None}
-    parts = [components(known), reached(known)] if known else []
+    parts = [components(known), at_fixed_count(known), reached(known)] if known else []
     parts += [beaten(folder, clip, record) for clip, record in known.items()]
     parts.append(splits(found, half))
     if right_eye:
@@ -48,7 +50,7 @@ def components(known: Mapping[str, Record]) -> str:
     wholes = {clip: contrast(record, WHOLE, "psnr_full") for clip, record in known.items()}
     steps = {clip: contrast(record, STEPS["A"], "psnr_full") for clip, record in known.items()}
     least, most = MATCHED_PSNR
-    changes = [f"{gain.mean:+.2f} dB on {clip} ({_decided(gain)})" for clip, gain in wholes.items() if gain is not None]
+    changes = [f"{gain.mean:+.2f} dB on {clip} ({_decided(gain, least, most)})" for clip, gain in wholes.items() if gain is not None]
     text = f"The three components together change the PSNR of their base by {' and by '.join(changes)}"
     text += f"; the published medians are {least:+.2f} to {most:+.2f} dB, by sequence."
     measured = {clip: step for clip, step in steps.items() if step is not None}
@@ -57,9 +59,23 @@ def components(known: Mapping[str, Record]) -> str:
     return f"{text} The step of A is {_by_clip(measured)} (published +0.29 dB, mean of both clips)."
 
 
-def _decided(gain: Estimate) -> str:
-    """The interval of a gain over the seeds and the verdict on the published range."""
-    least, most = (MATCHED_PSNR[0] - ROUNDED["psnr_full"], MATCHED_PSNR[1] + ROUNDED["psnr_full"])
+def at_fixed_count(known: Mapping[str, Record]) -> str:
+    """The gain of A and L over S alone with the same number of Gaussians, clip by clip; "" if it is not measured."""
+    texts = []
+    for clip, record in known.items():
+        gain = contrast(record, {FIXED_GAIN.with_: 1, FIXED_GAIN.without: -1}, "psnr_full")
+        if gain is not None:
+            published = FIXED_GAIN.published[clip]["psnr_full"]
+            verdict = f"published {published:+.2f} dB, {_decided(gain, published, published)}"
+            texts.append(f"{gain.mean:+.2f} dB on {clip} ({verdict})")
+    if not texts:
+        return ""
+    return f"With a fixed number of Gaussians, A and L together change the PSNR of S by {' and by '.join(texts)}."
+
+
+def _decided(gain: Estimate, least: float, most: float) -> str:
+    """The interval of a gain over the seeds and the verdict on the published range, of rounded values in dB."""
+    least, most = least - ROUNDED["psnr_full"], most + ROUNDED["psnr_full"]
     verdict = increment_verdict(least, gain.paired, len(gain.values), most)
     if gain.paired is None:
         return verdict
