@@ -87,9 +87,15 @@ def specs_of(command: str, wanted: set[str]) -> list[Spec]:
 
 
 def other_files(folder: Path, published: Manifest, wanted: set[str]) -> list[CaseFiles]:
-    """The stored files of all cases that a command does not name; none if it names nothing and so computes all."""
+    """The stored files of all cases that a command does not name; none if it names nothing and so computes all.
+
+    Raises: InputError for a file that is missing.
+    """
     names = [f"{family}/{name}" for family, cases in published.families.items() for name in cases] if wanted else []
-    return [stored_files(folder, published, name) for name in names if not wanted & {name.split("/")[0], name}]
+    try:
+        return [stored_files(folder, published, name) for name in names if not wanted & {name.split("/")[0], name}]
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read: {error.strerror}; name no family, or this one") from None
 
 
 def moved(folder: Path, one: Solved) -> list[str]:

@@ -263,6 +263,9 @@ def test_one_case_is_checked_alone(copy, capsys):
     wrong = copy / "cases/masked_l1/equal/expected/d_rendered.npy"
     wrong.write_bytes(npy_bytes(np.load(wrong) + 1))
     assert make.main(command) == 1 and "masked_l1/equal/d_rendered: " in capsys.readouterr().out
+    other.unlink()
+    with pytest.raises(SystemExit, match=r"error: .*translation\.npy: cannot be read: .*; name no family"):
+        make.main(command)
     with pytest.raises(SystemExit, match="check: 'masked_l2' is no family and no case; families: adam, "):
         make.main(["check", "masked_l2", "--golden", str(copy)])
 
