@@ -1,16 +1,16 @@
 """Generate the golden vectors of this folder, and ports with one mistake each.
 
-    python golden/make.py check [--within-tolerance] [--golden DIR]    compare the files with a fresh computation
+    python golden/make.py check [FAMILY[/CASE] ...] [--within-tolerance]   compare the files with a fresh computation
     python golden/make.py write [FAMILY[/CASE] ...] [--golden DIR]    replace the files, and print what moved
     python golden/make.py pack DIR [--golden DIR]                      write the files to hand on: see below
     python golden/make.py wrong                                        list the mistakes
     python golden/make.py wrong FLAG OUTDIR [--golden DIR]             write what a port with this mistake answers
 
 `check` compares bitwise on the class of machine named in the manifest, and otherwise, or with `--within-tolerance`,
-within the float64 tolerance. It ends with exit code 1 if anything differs. `write` computes the named families or
-cases, or all, and keeps the stored bytes of values that agree within the tolerance. It always ends with exit code 1: no
-test run may rewrite its own expected values. `wrong` writes in float64. `pack` writes the vectors as an archive with
-its hash, the judge as a program that needs NumPy alone, and the data wheel `endotsr-golden`.
+within the float64 tolerance. It ends with exit code 1 if anything differs. `check` and `write` compute the named
+families or cases, or all; `write` keeps the stored bytes of values that agree within the tolerance. It always ends with
+exit code 1: no test run may rewrite its own expected values. `wrong` writes in float64. `pack` writes the vectors as an
+archive with its hash, the judge as a program that needs NumPy alone, and the data wheel `endotsr-golden`.
 """
 
 import argparse
@@ -29,7 +29,7 @@ HERE = Path(__file__).parent
 
 def run_check(options: argparse.Namespace) -> int:
     """Compare the folder with a fresh computation."""
-    lines, summary = check(golden_folder(options.golden), bitwise=not options.within_tolerance)
+    lines, summary = check(golden_folder(options.golden), options.families, bitwise=not options.within_tolerance)
     print("\n".join([*lines, f"golden: {summary}, {len(lines)} differ"]))
     return 1 if lines else 0
 
@@ -73,7 +73,7 @@ def main(words: list[str]) -> int:
         command.set_defaults(call=call)
         if name == "check":
             command.add_argument("--within-tolerance", action="store_true", help="accept other bits on any machine")
-        if name == "write":
+        if name in ("check", "write"):
             command.add_argument("families", nargs="*", metavar="FAMILY[/CASE]", help="only these; default: all")
         if name == "pack":
             command.add_argument("outdir", type=Path, metavar="DIR", help="folder for the files")

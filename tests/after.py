@@ -1,8 +1,9 @@
 """What to run after a change: python tests/after.py [REVISION] [--run]
 
 Compares the working tree with REVISION (the last commit by default; with a clean tree, the commit before it), and
-prints the commands in order: lint, types of the changed files, the programs whose output depends on the change, and the
-tests of the rooms that it touches. `--run` runs them and stops at the first that fails. It leaves out `golden/make.py
+prints the commands in order: lint, types of the changed files, the lists that have to name a new component, the
+programs whose output depends on the change, the tests of the rooms that it touches, and all other tests that import a
+changed module, which take longest. `--run` runs them and stops at the first that fails. It leaves out `golden/make.py
 write`: no run of tests rewrites its expected values.
 """
 
@@ -16,6 +17,15 @@ PACKAGE = "reference/endotsr/"
 FORMATTED = ("reference", "golden", "tests", "notebooks", "docs/_extensions", "docs/pages", "docs/make.py")
 # Hold for the whole package: names, words, layers. Less than a minute together.
 ALWAYS = ("tests/test_layout.py", "tests/test_conventions.py", "tests/docs/test_glossary.py")
+# Compare lists that are written by hand with the package: what is missing there shows in seconds, not after minutes.
+LISTS = (
+    "tests/definition/test_door.py",
+    "tests/port/judge/test_recognise.py::test_the_first_wrong_operation_is_that_of_the_method",
+    "tests/port/vectors/test_hard_coded.py::test_every_setting_takes_two_values",
+    "tests/training/fitting/test_objective.py::test_every_term_of_the_objective_is_in_this_file",
+    "tests/training/fitting/test_zero_cost.py::test_every_term_of_the_objective_is_switched_off_here",
+)
+LISTED = ("golden/", *(f"{PACKAGE}{room}" for room in ("config.py", "definition/", "method/", "port/", "training/")))
 WRITE = "python golden/make.py write"
 # Beginning of a changed path -> commands whose output depends on it.
 CONSTANTS, INVENTORIES = "python tests/port/unseen/by_hand/constants.py", "python docs/make.py recordings.inventories"
@@ -23,6 +33,7 @@ MAKERS = {
     f"{PACKAGE}config.py": ("python docs/make.py book.settings", CONSTANTS),
     f"{PACKAGE}definition/": ("python docs/make.py book.definitions",),
     f"{PACKAGE}clips/sequences/layouts/": (INVENTORIES,),
+    f"{PACKAGE}clips/sequences/checks/kinds.py": (INVENTORIES,),
     f"{PACKAGE}clips/sequences/calibration_fields.py": (INVENTORIES,),
     f"{PACKAGE}cli/parts/related_options.py": (INVENTORIES,),
     "notebooks/": ("python docs/make.py book.chapters",),
@@ -103,22 +114,30 @@ def importing(paths: list[str]) -> list[str]:
     return found
 
 
+def tested(paths: list[str]) -> list[str]:
+    """The tests of the rooms, then the other tests that import a changed module; a folder stands for its files."""
+    tests = dict.fromkeys([*ALWAYS, *(test for path in paths for test in tests_of(path))])
+    folders = {test for test in tests if not test.endswith(".py")}
+    outside = lambda test: not any(str(up) in folders for up in Path(test).parents)
+    near = filter(outside, tests)
+    far = (test for test in importing(paths) if outside(test) and test not in tests)
+    return [f"pytest -q {words}" for words in map(" ".join, (near, far)) if words]
+
+
 def commands(paths: list[str]) -> list[str]:
     """All commands, in the order in which they fail fastest."""
     typed = [
         p for p in paths if p.endswith(".py") and p.startswith(("reference/", "golden/make", "docs/make", "docs/pages"))
     ]
-    tests = [*ALWAYS, *(test for path in paths for test in tests_of(path)), *importing(paths)]
-    folders = {test for test in tests if not test.endswith(".py")}
-    kept = [test for test in dict.fromkeys(tests) if not any(str(up) in folders for up in Path(test).parents)]
     rooms = " ".join(FORMATTED)
     return [
         f"ruff check {rooms}",
         f"ruff format --check {rooms}",
         "lint-imports",
         *([f"pyright {' '.join(typed)}"] if typed else []),
+        *([f"pytest -q -n 0 {' '.join(LISTS)}"] if any(path.startswith(LISTED) for path in paths) else []),
         *makers(paths),
-        f"pytest -q {' '.join(kept)}",
+        *tested(paths),
     ]
 
 

@@ -6,8 +6,18 @@ import after
 def test_a_kernel_reaches_its_room_its_gradients_and_its_twin():
     found = after.commands(["reference/endotsr/method/losses/depth.py"])
     assert "pyright reference/endotsr/method/losses/depth.py" in found
-    for test in ("tests/method/losses", "tests/test_gradcheck.py", "tests/definition/test_twins.py"):
-        assert test in found[-1].split()
+    near, far = (set(command.split()) for command in found[-2:])
+    assert near >= {"tests/method/losses", "tests/test_gradcheck.py", "tests/definition/test_twins.py"}
+    assert "tests/training/fitting/test_objective.py" in far - near and "tests/method/losses/test_depth.py" not in far
+
+
+def test_lists_that_lack_a_new_component_come_before_the_programs():
+    found = after.commands(["reference/endotsr/config.py"])
+    lists = f"pytest -q -n 0 {' '.join(after.LISTS)}"
+    assert found.index(lists) < found.index(after.CONSTANTS)
+    assert lists in after.commands(["golden/makers/depth.toml"]) and lists not in after.commands(["README.md"])
+    for path, _, test in (name.partition("::") for name in after.LISTS):
+        assert f"def {test}" in (after.ROOT / path).read_text(encoding="utf-8")
 
 
 def test_a_record_reaches_the_pages_that_read_it():
@@ -19,7 +29,7 @@ def test_a_record_reaches_the_pages_that_read_it():
 
 def test_a_folder_takes_the_place_of_its_files():
     path = "reference/endotsr/clips/sequences/splits.py"
-    words = after.commands([path, "tests/clips/sequences/test_splits.py"])[-1].split()
+    words = " ".join(after.tested([path, "tests/clips/sequences/test_splits.py"])).split()
     assert "tests/clips/sequences" in words and "tests/clips/sequences/test_splits.py" not in words
 
 

@@ -105,6 +105,11 @@ def test_every_setting_is_documented_with_its_default():
     assert text == settings.completed(text), "run: python docs/make.py book.settings"
 
 
+def test_a_new_setting_gets_the_page_of_its_term_before_that_of_the_objective():
+    assert settings.equation_of("loss.smoothness_weight") == "{eq}`eq-b9`"  # both pages name it
+    assert settings.equation_of("training.no_such_key") == "-"
+
+
 def test_no_setting_is_documented_that_does_not_exist():
     known = set(settings_by_key(PAPER))
     sections = {key.split(".")[0] for key in known if "." in key}

@@ -42,6 +42,10 @@ FREE = {
     "training.checkpoint_every": "changes no result",
 }
 """Settings that no case must vary, with the reason. `preset` and the section `sequence` belong to the reader."""
+REMEDIES = (
+    "give it two values in the cases of golden/makers/objective.py or of its own family, or add a line"
+    " '{}' with the reason to FREE of golden/makers/hard_coded.py"
+)
 ALONE = {
     "appearance": "model.beta", "matern": "model.correlation_length", "deformation": "model.basis",
     "laplacian": "loss.upsampling", "calibration": "loss.gradient_ratio",
@@ -62,6 +66,15 @@ class Row(NamedTuple):
     def gaps(self) -> list[str]:
         """Values that a port could hard-code undetected."""
         return [value for value, case in self.refused_by.items() if not case]
+
+    @property
+    def fault(self) -> str:
+        """What the cases do not show of the setting, with both remedies; "" if they show all of it."""
+        few, remedies = len(self.refused_by) < 2, REMEDIES.format(self.setting)
+        if few or self.gaps:
+            only = f"the cases give {list(self.refused_by)} only"
+            return f"{self.setting}: {only if few else f'a port that always uses {self.gaps} passes'}; {remedies}"
+        return ""
 
 
 def wanted_settings() -> dict[str, Any]:
@@ -115,12 +128,21 @@ def refuses(golden: Golden, case: Case, settings: dict[str, Any], precision: str
     return False
 
 
+def held_by(golden: Golden, setting: str) -> list[tuple[Case, Place]]:
+    """The cases that state a setting, with the place of it."""
+    return [(case, place) for case in golden.cases for place in places(case, setting)]
+
+
+def values_of(held: list[tuple[Case, Place]], published: Any) -> dict[str, Any]:
+    """The published value of a setting and those of the cases, each once, by its text."""
+    return {msgspec.json.encode(v).decode(): v for v in (published, *(_at(c.settings, p) for c, p in held))}
+
+
 def row_of(golden: Golden, setting: str, published: Any, precision: str = "float64") -> Row:
     """Every value of a setting in the cases, and the published one, with the first case that rejects it."""
-    held = [(case, place) for case in golden.cases for place in places(case, setting)]
-    values = {msgspec.json.encode(v).decode(): v for v in (published, *(_at(c.settings, p) for c, p in held))}
+    held = held_by(golden, setting)
     refused = {}
-    for text, value in values.items():
+    for text, value in values_of(held, published).items():
         others = [(case, place) for case, place in held if _at(case.settings, place) != value]
         wrong = (c.name for c, p in others if refuses(golden, c, dict(with_value(c.settings, p, value)), precision))
         refused[text] = next(wrong, "")

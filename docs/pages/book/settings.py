@@ -1,7 +1,8 @@
 """Complete the tables of docs/specification/settings.md from `endotsr.config`: python docs/make.py book.settings
 
 A key without a row gets one: its default and meaning as the code has them, and the equation of the first page of the
-specification that names it. Every default is written again, and the row of a key that is gone is removed.
+specification that names it. The page of the objective names the settings of all terms and comes last. Every default is
+written again, and the row of a key that is gone is removed.
 """
 
 import re
@@ -16,12 +17,13 @@ from endotsr.untrusted.writing import replace_text
 
 FOLDER = Path(__file__).parents[2] / "specification"
 PAGE = FOLDER / "settings.md"
+OBJECTIVE = "06_objective"
 RULE = "|---|---|---|---|\n"
 
 
 def equation_of(key: str) -> str:
     """A link to the equation whose page names the key; "-" without one."""
-    for page in sorted(FOLDER.glob("[0-9b]*_*.md")):
+    for page in sorted(FOLDER.glob("[0-9b]*_*.md"), key=lambda page: (page.stem == OBJECTIVE, page.name)):
         text = page.read_text(encoding="utf-8")
         if f"`{key}`" in text and (label := re.search(r"^\$\$ \((eq-\w+)\)$", text, re.MULTILINE)):
             return f"{{eq}}`{label[1]}`"

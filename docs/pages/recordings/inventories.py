@@ -1,15 +1,18 @@
-"""Write the tables of the fields of file formats and of related options in docs/guides/prepare.md.
+"""Write the tables of the fields of file formats, of related options and of findings in docs/guides/prepare.md.
 
     python docs/make.py recordings.inventories
 
-The tables are the inventories beside the readers and the relations of the commands; nothing is measured.
+The tables are the inventories beside the readers, the relations of the commands and the kinds of findings of `endotsr
+check`; nothing is measured.
 """
 
+from collections import Counter
 from collections.abc import Iterable
 
 from endotsr.cli.parts.related_options import RELATIONS
 from endotsr.cli.parts.relations import Needs, shown
 from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.sequences.checks.kinds import KINDS
 from endotsr.clips.sequences.depth_files import FILES as DEPTH
 from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import c3vd, hamlyn, scared, servct
@@ -61,8 +64,17 @@ def options() -> str:
     return markdown(("Command", "Option", "Relation", "Other option", "Reason"), rows)
 
 
+def findings() -> str:
+    """How many kinds of findings there are, and each with its level, reason and remedy."""
+    of = Counter(kind.level for kind in KINDS.values())
+    numbers = f"{of['refusal']} refusals, {of['warning']} warnings and {of['note']} notes"
+    rows = [(_code([code]), kind.level, kind.why, kind.remedy) for code, kind in KINDS.items()]
+    table = markdown(("Finding", "Level", "Why it matters", "Remedy"), rows)
+    return f"There are {len(KINDS)} findings: {numbers}.\n\n{table}"
+
+
 def _code(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-PROGRAM = Program(__name__, "guides/prepare.md", {"fields": fields, "options": options})
+PROGRAM = Program(__name__, "guides/prepare.md", {"fields": fields, "options": options, "findings": findings})

@@ -66,7 +66,8 @@ def test_a_name_that_explains_everything_stands_above_a_line_of_the_search():
 
 
 def test_the_first_wrong_operation_is_that_of_the_method(golden):
-    assert {case.operation for case in golden.cases} == set(ORDER)
+    new = sorted({case.operation for case in golden.cases} ^ set(ORDER))
+    assert not new, f"operations of the cases and ORDER of reference/endotsr/port/judge/diagnose.py differ in {new}"
     refused = [OutputReport(name="d_rendered", level=2, status="refused", reason="")]
     reports = [
         CaseReport(name=name, title="", operation=name.split("/")[0], level=1, status="refused", outputs=refused)

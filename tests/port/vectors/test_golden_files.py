@@ -253,6 +253,23 @@ def test_one_family_is_written_alone_and_other_bits_are_not_noise(copy):
         make.main(["write", "motoin", "--golden", str(copy)])
 
 
+def test_one_case_is_checked_alone(copy, capsys):
+    """A wrong value of the case is named; one of another case is not read again."""
+    command = ["check", "masked_l1/equal", "--within-tolerance", "--golden", str(copy)]
+    assert make.main(command) == 0 and "golden: 1 cases compared within tolerance" in capsys.readouterr().out
+    (other,) = copy.glob("cases/motion/generic/expected/translation.npy")
+    other.write_bytes(npy_bytes(2 * np.load(other)))
+    assert make.main(command) == 0
+    wrong = copy / "cases/masked_l1/equal/expected/d_rendered.npy"
+    wrong.write_bytes(npy_bytes(np.load(wrong) + 1))
+    assert make.main(command) == 1 and "masked_l1/equal/d_rendered: " in capsys.readouterr().out
+    other.unlink()
+    with pytest.raises(SystemExit, match=r"error: .*translation\.npy: cannot be read: .*; name no family"):
+        make.main(command)
+    with pytest.raises(SystemExit, match="check: 'masked_l2' is no family and no case; families: adam, "):
+        make.main(["check", "masked_l2", "--golden", str(copy)])
+
+
 @pytest.mark.slow
 def test_the_folder_equals_a_fresh_computation_and_writing_ends_with_exit_code_1(copy, monkeypatch):
     solved = solve_all()

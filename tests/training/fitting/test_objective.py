@@ -84,7 +84,12 @@ def parts(rendered, frame):
     }
 
 
-@pytest.mark.parametrize("on", ["all", "none", "ssim", "depth", "smoothness", "laplacian"])
+def test_every_term_of_the_objective_is_in_this_file(frame, rendered):
+    assert parts(rendered, frame).keys() == {"l1", *LossWeights._fields}, "a term is missing in `parts` of this file"
+    assert all(WEIGHTS), "a term has no weight in WEIGHTS of this file"
+
+
+@pytest.mark.parametrize("on", ["all", "none", *LossWeights._fields])
 def test_the_objective_is_the_weighted_sum_of_its_terms(frame, rendered, on):
     weights = WEIGHTS if on == "all" else OFF if on == "none" else OFF._replace(**{on: getattr(WEIGHTS, on)})
     found = image_loss(rendered, frame_targets(frame, PAPER), weights, PAPER.loss)

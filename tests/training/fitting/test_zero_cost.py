@@ -118,6 +118,10 @@ LOSSES = {
 }
 
 
+def test_every_term_of_the_objective_is_switched_off_here():
+    assert LOSSES.keys() == set(LossWeights._fields), "a term is missing in LOSSES of this file"
+
+
 @pytest.mark.parametrize("name", LOSSES)
 def test_a_loss_that_is_off_equals_the_loss_of_weight_zero_bitwise(name, monkeypatch):
     """Loss and gradients; when it is off its functions are not called, and its targets are not made."""

@@ -164,7 +164,7 @@ def image_loss(
         timed(timer, "L1 and SSIM", lambda: photometric_loss(colour, targets, weights.ssim)),
         *(timed(timer, TERM_STAGES[name], call) for name, call in calls.items()),
     )
-    loss, terms, d_colour, _ = photometric
+    loss, terms, d_colour = photometric.loss, photometric.terms, photometric.d_colour
     d_depth = np.zeros_like(rendered.depth)
     for name, term in zip(calls, others, strict=True):
         loss += getattr(weights, name) * term.value

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[4] / "golden"))
 import hand_port
 
+from endotsr.errors import InputError
 from endotsr.port.judge.compare import judged
 from endotsr.port.judge.store import golden_folder, read_golden
 from makers import hard_coded
@@ -84,11 +85,12 @@ def rows_of_constants(golden) -> list[tuple[str, str, str]]:
 
 
 def page(golden) -> str:
-    """The page with both tables."""
-    ordered = golden._replace(cases=sorted(golden.cases, key=lambda case: case.level))
+    """The page with both tables. Raises: InputError for a setting that the cases do not move and that is not free."""
+    rows = hard_coded.table(golden._replace(cases=sorted(golden.cases, key=lambda case: case.level)))
+    if faults := [row.fault for row in rows if row.fault]:
+        raise InputError("\n".join(faults))
     moved = [
-        (f"`{row.setting}`", ", ".join(f"{value}: `{case}`" for value, case in row.refused_by.items()))
-        for row in hard_coded.table(ordered)
+        (f"`{row.setting}`", ", ".join(f"{value}: `{case}`" for value, case in row.refused_by.items())) for row in rows
     ]
     free = [(f"`{name}`", reason) for name, reason in hard_coded.FREE.items()]
     lines = [
@@ -102,6 +104,15 @@ def page(golden) -> str:
     return "".join(lines)
 
 
-if __name__ == "__main__":
-    PAGE.write_text(page(read_golden(golden_folder())), encoding="utf-8", newline="\n")
+def main() -> None:
+    """The command; a fault leaves the page as it is."""
+    try:
+        text = page(read_golden(golden_folder()))
+    except InputError as error:
+        sys.exit(f"error: {error}")
+    PAGE.write_text(text, encoding="utf-8", newline="\n")
     print(f"{PAGE} written")
+
+
+if __name__ == "__main__":
+    main()

@@ -89,3 +89,12 @@ def test_the_page_names_every_setting():
     text = constants.PAGE.read_text(encoding="utf-8")
     for setting in (*constants.hard_coded.wanted_settings(), *constants.hard_coded.FREE):
         assert f"\n| `{setting}` | " in text, setting
+
+
+def test_a_setting_that_no_case_moves_ends_the_writer_of_the_page(tmp_path, monkeypatch):
+    row = constants.hard_coded.Row("loss.new", {"0.0": ""})
+    monkeypatch.setattr(constants.hard_coded, "table", lambda golden: [row])
+    monkeypatch.setattr(constants, "PAGE", tmp_path / "SETTINGS.md")
+    with pytest.raises(SystemExit, match=r"(?s)^error: loss\.new: .*hard_coded\.py$"):
+        constants.main()
+    assert not constants.PAGE.exists()
