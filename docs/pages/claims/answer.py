@@ -50,7 +50,11 @@ def components(known: Mapping[str, Record]) -> str:
     wholes = {clip: contrast(record, WHOLE, "psnr_full") for clip, record in known.items()}
     steps = {clip: contrast(record, STEPS["A"], "psnr_full") for clip, record in known.items()}
     least, most = MATCHED_PSNR
-    changes = [f"{gain.mean:+.2f} dB on {clip} ({_decided(gain, least, most)})" for clip, gain in wholes.items() if gain is not None]
+    changes = [
+        f"{gain.mean:+.2f} dB on {clip} ({_decided(gain, least, most)})"
+        for clip, gain in wholes.items()
+        if gain is not None
+    ]
     text = f"The three components together change the PSNR of their base by {' and by '.join(changes)}"
     text += f"; the published medians are {least:+.2f} to {most:+.2f} dB, by sequence."
     measured = {clip: step for clip, step in steps.items() if step is not None}
