@@ -107,7 +107,7 @@ N = 6
 # def covariance_forward(quaternion, log_scale):
 #     """Equation (B2): Shape from raw quaternions (4, N) w, x, y, z and log-scales (3, N), clipped to +-40."""
 #     # The square of a scale beyond exp(44) overflows in float32; of exp(-44) it is 0.
-#     scale = np.exp(np.where(np.abs(log_scale.real) <= 40, log_scale, np.copysign(40, log_scale.real)))
+#     scale = np.exp(np.where(np.abs(log_scale.real) > 40, np.copysign(40, log_scale.real), log_scale))
 #     return Shape(rotation_of(unit(quaternion)[0]), scale), CovarianceSaved(quaternion, log_scale)
 # ```
 #

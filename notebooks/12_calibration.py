@@ -119,7 +119,7 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 #
 #     Raises: ValueError if no view remains or the median is 0.
 #     """
-#     ratios = np.array([fine / rgb for _, rgb, fine in views if rgb > 0 and np.isfinite(fine / rgb)])  # (12.6)
+#     ratios = np.array([fine / rgb for _, rgb, fine in views if 0 < rgb < np.inf and np.isfinite(fine / rgb)])  # (12.6)
 #     if ratios.size == 0 or np.median(ratios) == 0:
 #         raise ValueError("calibration: no view has a ratio, or their median is 0")
 #     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (12.3), (12.4)
