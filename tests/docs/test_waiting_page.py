@@ -12,19 +12,22 @@ RISEN = {  # asked for: 0.1; the page shows these rises
     # before the parts of an iteration depended on the vectors, and the second thread slowed it by more than its share
     ("simulated_breathing", "sharp", "wall"): 0.15,
 }
-TOO_LONG = {("endonerf_cutting", "sharp", "wall", "forecast"): 0.23}  # the page says so
+TOO_LONG = {  # the page says so; by the bytes of a register: 32 = AVX2, 64 = AVX-512
+    ("endonerf_cutting", "sharp", "wall", 32, "forecast"): 0.23,
+    ("endonerf_pulling", "quick", "wall", 64, "minute"): 0.35,
+}
 
 
 @pytest.mark.parametrize("row", RECORD["rows"], ids=waiting_text.named)
-def test_the_recorded_forecasts_hold_within_15_percent_but_one(row):
-    """The first line too, if the speed was measured; one is as in `TOO_LONG`. The time left rises by a tenth, or as in
+def test_the_recorded_forecasts_hold_within_15_percent_but_two(row):
+    """The first line too, if the speed was measured; two are as in `TOO_LONG`. The time left rises by a tenth, or as in
     `RISEN`."""
     for when in ("start", "forecast", "minute"):
         said = row["said"].get(when)
         if said is None or said.get("speed") == "assumed":
             continue
         left = row["whole"] - said["at"]
-        allowed = TOO_LONG.get((row["clip"], row["preset"], row["clock"], when), 0.15)
+        allowed = TOO_LONG.get((row["clip"], row["preset"], row["clock"], row["register_bytes"], when), 0.15)
         assert abs(said["left"] - left) <= allowed * left, when
     assert row["largest_rise"] <= RISEN.get((row["clip"], row["preset"], row["clock"]), 0.1)
 
