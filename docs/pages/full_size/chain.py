@@ -59,8 +59,7 @@ def errors(sequence: Sequence, truth: TruePositions) -> dict[str, float]:
 
 def at_time(sequence: Sequence, values: NDArray[np.float64], frame: int) -> NDArray[np.float64]:
     """Values (n, ...) at the training frames, at the time of any frame: linear between two, constant outside."""
+    from scipy.interpolate import make_interp_spline
+
     times = sequence.times[sequence.train_index]
-    after = int(np.clip(np.searchsorted(times, sequence.times[frame]), 1, len(times) - 1))
-    part = (sequence.times[frame] - times[after - 1]) / (times[after] - times[after - 1])
-    part = float(np.clip(part, 0, 1))
-    return (1 - part) * values[after - 1] + part * values[after]
+    return make_interp_spline(times, values, k=1)(np.clip(sequence.times[frame], times[0], times[-1]))

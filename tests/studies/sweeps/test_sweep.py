@@ -11,7 +11,7 @@ from tiny_sweep import BASE, CONFIGURATIONS, assert_same_arrays, iterations, row
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError
-from endotsr.studies.sweeps import cluster, local
+from endotsr.studies.sweeps import cluster, jobs, local
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, INTERRUPTED, Outcome, execute
 from endotsr.studies.sweeps.jobs import finished_folder, jobs_of
 from endotsr.studies.sweeps.locks import file_lock, run_lock
@@ -19,6 +19,7 @@ from endotsr.studies.sweeps.results import results_markdown
 from endotsr.studies.sweeps.spec import read_spec
 from endotsr.studies.sweeps.sweep import Inputs, planned, run_sweep
 from endotsr.training.runs.folder import open_run
+from endotsr.training.runs.sources import load_sequence
 from synthetic_folder import write_synthetic_folder
 
 pytestmark = pytest.mark.slow
@@ -180,8 +181,11 @@ def test_finished_runs_of_other_frames_are_refused(tmp_path, monkeypatch):
     write_synthetic_folder(clip, frames=9)
     rows = sweep(spec, tmp_path / "out")
     monkeypatch.setattr("endotsr.clips.sequences.read.file_hashes", lambda path, config: {"other": ""})
-    again = sweep(spec, tmp_path / "out", make=lambda job: pytest.fail(f"made {job.name} again"))
-    assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows]
+    loaded = []
+    with monkeypatch.context() as patched:
+        patched.setattr(jobs, "load_sequence", lambda *words: loaded.append(words) or load_sequence(*words))
+        again = sweep(spec, tmp_path / "out", make=lambda job: pytest.fail(f"made {job.name} again"))
+    assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows] and len(loaded) == 1
     picture = sorted((clip / "images").iterdir())[3]
     picture.write_bytes(sorted((clip / "images").iterdir())[4].read_bytes())
     with pytest.raises(InputError, match=r"clip: images differ from those the run .*base-seed0 was trained on"):

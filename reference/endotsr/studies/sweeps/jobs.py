@@ -166,18 +166,21 @@ def refuse_other_clip(finished: list[Job]) -> None:
 
     The arrays are read and compared only where a file differs: a comment in sequence.toml changes no array.
     """
-    today: dict[str, dict[str, str]] = {}
+    from endotsr.clips.sequences.read import file_hashes
+
+    files: dict[str, dict[str, str]] = {}  # by input_key
+    frames: dict[str, Sequence] = {}  # the latest clip alone: each is whole in memory
     for job in finished:
-        before = open_run(Path(job.folder)).record().get("input", {}).get("files_sha256")
+        run, key = open_run(Path(job.folder)), job.input_key
+        before = run.record().get("input", {}).get("files_sha256")
         if job.source == SIMULATED or not before:
             continue
-        if job.input_key not in today:
-            from endotsr.clips.sequences.read import file_hashes
-
-            today[job.input_key] = file_hashes(Path(job.source), job.config.sequence)
-        if before != today[job.input_key]:
-            sequence = load_sequence(job.source, job.config, job.simulator)
-            check_same_input(open_run(Path(job.folder)), sequence, job.source)
+        if key not in files:
+            files[key] = file_hashes(Path(job.source), job.config.sequence)
+        if before != files[key]:
+            if key not in frames:
+                frames = {key: load_sequence(job.source, job.config, job.simulator)}
+            check_same_input(run, frames[key], job.source)
 
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:
