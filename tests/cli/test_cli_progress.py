@@ -11,6 +11,7 @@ from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.waiting import in_words, waiting_line
 from endotsr.clips.sequences.checks.duration import (
     PAGES,
+    Beside,
     TimedCommand,
     assumed_unit,
     at_start,
@@ -256,3 +257,44 @@ def test_the_evaluation_follows_the_speed_of_the_iterations_in_part_and_the_gaus
     more = many.config.density.maximum - few.config.density.maximum
     found = estimated_seconds(many, 0.1).evaluation - estimated_seconds(few, 0.1).evaluation
     assert more > 0 and found == pytest.approx(few.evaluating(0.1) * PAGES * more)
+
+
+def begun(monkeypatch, plan, seconds, iteration=0):
+    """A training whose initial motion took this time, at the end of its iterations; and what it remembers."""
+    clock, kept = Clock(), []
+    monkeypatch.setattr(progress, "time", clock)
+    monkeypatch.setattr("endotsr.training.runs.speed.remember_beside", lambda _, beside, pixels: kept.append(beside))
+    shown = Progress(plan)
+    clock.now += seconds
+    shown.begin(SimpleNamespace(iteration=iteration))
+    shown.remember_speed()
+    return shown, clock, kept
+
+
+def test_the_time_of_the_initial_motion_tells_the_speed_of_the_libraries(monkeypatch):
+    """They took half of the time that follows from the iterations, on a processor whose two cores share their parts."""
+    plan = plan_of("quick", 63, 2)._replace(perceived=True)
+    said = estimated_seconds(plan, UNIT)
+    shown, _, kept = begun(monkeypatch, plan, said.start / 2)
+    found = estimated_seconds(shown._plan, UNIT)
+    assert kept[-1].start == pytest.approx(plan.alone(UNIT) / 2)
+    assert found.start == pytest.approx(said.start / 2) and found.targets == pytest.approx(said.targets / 2)
+    assert found.evaluation == pytest.approx(said.evaluation / 2**0.5) and found.iterations == said.iterations
+    for seconds, iteration in ((2.9, 0), (9.0, 1)):  # too short; resumed
+        assert begun(monkeypatch, plan, seconds, iteration)[2] == [Beside()]
+    still = plan._replace(config=with_settings(plan.config, initialisation={"motion": "none"}))
+    assert begun(monkeypatch, still, 9.0)[2] == [Beside()]
+
+
+def test_the_next_command_forecasts_the_evaluation_with_the_time_of_this_one(monkeypatch):
+    plan = plan_of("quick", 63, 2)._replace(perceived=True)
+    shown, clock, kept = begun(monkeypatch, plan, 0.0)
+    clock.now += 34.0
+    shown.remember_evaluation()
+    assert estimated_seconds(plan._replace(beside=kept[-1]), UNIT).evaluation == pytest.approx(34.0)
+    more = plan._replace(beside=kept[-1], perceived=False)
+    assert 0 < estimated_seconds(more, UNIT).evaluation < 34.0, "the unit, not the seconds"
+    shown, clock, kept = begun(monkeypatch, plan._replace(perceived=None), 0.0)
+    clock.now += 34.0
+    shown.remember_evaluation()
+    assert kept == [Beside()], "nothing was evaluated"

@@ -2,6 +2,7 @@
 
 import pytest
 
+from endotsr.clips.sequences.checks.duration import Beside
 from endotsr.training.runs import speed
 
 
@@ -33,3 +34,16 @@ def test_a_folder_that_cannot_be_written_does_not_stop_a_training(tmp_path, monk
     monkeypatch.setattr(speed, "speed_file", lambda threads: tmp_path / "missing" / "speed.json")
     speed.remember_unit(2, 0.1, 900, 90_000)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_speeds_of_the_parts_are_kept_beside_one_another(kept):
+    assert speed.remembered_beside(2) == Beside()
+    speed.remember_unit(2, 0.1, 900, 90_000)
+    speed.remember_beside(2, Beside(start=0.2), 90_000)
+    speed.remember_beside(2, Beside(evaluation=0.3), 90_000)
+    assert speed.remembered_unit(2) == 0.1 and speed.remembered_beside(2) == Beside(0.2, 0.3)
+    speed.remember_beside(2, Beside(9.0, 9.0), 79_999)
+    speed.remember_beside(2, Beside(float("inf"), 0.0), 90_000)
+    assert speed.remembered_beside(2) == Beside(0.2, 0.3)
+    kept.write_text(kept.read_text().replace("0.2", '"fast"'))
+    assert speed.remembered_beside(2) == Beside(None, 0.3), "one damaged number"

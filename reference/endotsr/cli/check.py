@@ -67,7 +67,8 @@ def _speed(settings: Config) -> "Speed":
     from endotsr.clips.sequences.checks.duration import Speed, assumed_unit, vector_factor
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.evaluation.lpips import lpips_file
-    from endotsr.training.runs.speed import remembered_unit
+    from endotsr.training.runs.speed import remembered_beside, remembered_unit
 
     threads = use_threads(settings.training.threads)
-    return Speed(remembered_unit(threads) or assumed_unit(threads), threads, lpips_file() is not None, vector_factor())
+    unit, perceived = remembered_unit(threads) or assumed_unit(threads), lpips_file() is not None
+    return Speed(unit, threads, perceived, vector_factor(), remembered_beside(threads))

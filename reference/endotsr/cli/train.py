@@ -90,13 +90,14 @@ def run(words: list[str]) -> int:
     if options.windows is not None or (options.resume and is_windowed(options.out)):
         return _train_windows(options, words)
     if options.resume:
-        folder, sequence = _resume(options, words)
+        folder, sequence, shown = _resume(options, words)
     else:
-        folder, sequence = _train_new(options, words, schedule_note)
+        folder, sequence, shown = _train_new(options, words, schedule_note)
     if options.evaluate:
         from endotsr.cli.evaluate import evaluate_run
 
         found = evaluate_run(folder, sequence, lpips=options.lpips, source=options.sequence or None)
+        shown.remember_evaluation()
         write_result(options.json, **found)
     return 0
 
@@ -151,7 +152,7 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
     return 0
 
 
-def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
+def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence", Progress]:
     """Check everything, print the settings and the sequence, and train to the end."""
     from endotsr.clips.effects.auto import planned_settings
     from endotsr.clips.simulator.recorded import recorded_positions
@@ -190,7 +191,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads)
     folder = train_new_run(options.out, {**record, **found}, sequence, config, shown)
     shown.remember_speed()
-    return folder, sequence
+    return folder, sequence, shown
 
 
 def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
@@ -210,7 +211,7 @@ def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Confi
     )
 
 
-def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence"]:
+def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence", Progress]:
     """Check the settings, and train a run from its last checkpoint to the end."""
     from endotsr.method.kernels.threads import use_threads
     from endotsr.training.runs.sources import check_same_input, load_sequence, run_source
@@ -233,7 +234,7 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     config = folder.config()
     shown = _progress(folder, source, sequence, config, options, _reached(folder, config))
     resume_run(folder, sequence, threads, shown)
-    return folder, sequence
+    return folder, sequence, shown
 
 
 def _reached(folder: RunFolder, config: Config) -> "Standing":
@@ -269,13 +270,14 @@ def _progress(
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before
     from endotsr.training.runs.sources import SIMULATED
-    from endotsr.training.runs.speed import remembered_unit
+    from endotsr.training.runs.speed import remembered_beside, remembered_unit
 
     frames, threads = frames_of(sequence.train_index, sequence.test_index), numba.get_num_threads()
     if source == SIMULATED or has_truth(Path(source)):
         frames = frames.with_true_motion()
     perceived = lpips_file(options.lpips) is not None if options.evaluate else None
-    plan = TimedCommand(config, frames, sequence.width * sequence.height, threads, perceived, vector_factor())
+    pixels, beside = sequence.width * sequence.height, remembered_beside(threads)
+    plan = TimedCommand(config, frames, pixels, threads, perceived, vector_factor(), beside)
     print(waiting_line(plan, remembered_unit(threads), done_before(config).exists(), at))
     print(f"progress page: {folder.path / LIVE_PAGE}", flush=True)
     return Progress(plan, LivePage(folder, sequence, config))

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from endotsr.clips.sequences.checks.duration import Standing, TimedCommand, estimated_seconds, expected_gaussians
+from endotsr.clips.sequences.checks.duration import (
+    Beside,
+    Standing,
+    TimedCommand,
+    estimated_seconds,
+    evaluation_units,
+    expected_gaussians,
+    start_units,
+)
 from endotsr.results.report.tables import duration
 from endotsr.training.fitting.records import LogEntry
 from endotsr.training.runs.time_left import TimeLeft
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
 QUIET_SECONDS = 30.0  # between lines if standard error is no terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the postfix contains the time left
 FORECAST_AFTER = 60  # iterations of this process; a coarse start is first checked after 50
+LEAST_SECONDS = 3.0  # of the initial motion and of the evaluation, to tell a speed; shorter ones mostly load code
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR: every tenth iteration)
 
 
@@ -41,6 +50,10 @@ class Progress:
     def begin(self, state: "TrainingState") -> None:
         """The training begins with `state`."""
         self._training = state
+        seconds, units = time.monotonic() - self._ended, start_units(self._plan)
+        if state.iteration == 0 and units and seconds >= LEAST_SECONDS:
+            self._plan = self._plan._replace(beside=self._plan.beside._replace(start=seconds / units))
+            self.time_left = TimeLeft(self._plan)
         if self._page is not None:
             self._page.begin(state)
         self._said = self._ended = time.monotonic()
@@ -92,9 +105,19 @@ class Progress:
 
     def remember_speed(self) -> None:
         """Store the speed of this machine for later forecasts, if the training was long enough to tell."""
-        from endotsr.training.runs.speed import remember_unit
+        from endotsr.training.runs.speed import remember_beside, remember_unit
 
         remember_unit(self._plan.threads, self.time_left.unit, self._done, self._plan.pixels)
+        remember_beside(self._plan.threads, self._plan.beside, self._plan.pixels)
+        self._ended = time.monotonic()
+
+    def remember_evaluation(self) -> None:
+        """The same for the evaluation, which has taken the time since the end of the training."""
+        from endotsr.training.runs.speed import remember_beside
+
+        seconds, units = time.monotonic() - self._ended, evaluation_units(self._plan)
+        if units and seconds >= LEAST_SECONDS:
+            remember_beside(self._plan.threads, Beside(evaluation=seconds / units), self._plan.pixels)
 
     def say(self, message: str) -> None:
         """Print a line without breaking the bar."""

@@ -1,19 +1,22 @@
 """The speed of this machine, remembered between trainings beside the compiled kernels.
 
-A training stores its seconds per unit of work (`clips/sequences/checks/duration.py`) by its number of threads if it
-timed at least LEAST_ITERATIONS on frames of at least LEAST_PIXELS. Forecasts read it; no result depends on it.
+A training stores its seconds per unit of work (`clips/sequences/checks/duration.py`) by its number of threads: of the
+iterations if it timed at least LEAST_ITERATIONS, of the initial motion and of the evaluation; each on frames of at
+least LEAST_PIXELS. Forecasts read them; no result depends on them.
 """
 
 import contextlib
 import json
 from pathlib import Path
 
+from endotsr.clips.sequences.checks.duration import Beside
 from endotsr.errors import InputError
 from endotsr.untrusted.json import number, read_json
 from endotsr.untrusted.writing import replace_text
 
 LEAST_ITERATIONS, LEAST_PIXELS = 200, 80_000
 FASTEST, SLOWEST = 1e-4, 100.0  # seconds per unit; other numbers are no speed
+ITERATIONS, START, EVALUATION = "seconds_per_unit", "start_seconds_per_unit", "evaluation_seconds_per_unit"
 
 
 def speed_file(threads: int) -> Path:
@@ -27,16 +30,38 @@ def speed_file(threads: int) -> Path:
 
 def remembered_unit(threads: int) -> float | None:
     """Seconds per unit of work in the last training with these threads; None if unknown or unreadable."""
-    path = speed_file(threads)
-    try:
-        return number(read_json(path).get("seconds_per_unit"), f"{path}: seconds_per_unit", FASTEST, SLOWEST)
-    except InputError:
-        return None
+    return _remembered(threads).get(ITERATIONS)
+
+
+def remembered_beside(threads: int) -> Beside:
+    """Seconds per unit of the other parts in the last commands with these threads; None as in `remembered_unit`."""
+    found = _remembered(threads)
+    return Beside(found.get(START), found.get(EVALUATION))
 
 
 def remember_unit(threads: int, unit: float | None, iterations: int, pixels: int) -> None:
     """Store the seconds per unit of work of a training, if it timed enough. A folder that refuses is ignored."""
-    if unit is None or not FASTEST <= unit <= SLOWEST or iterations < LEAST_ITERATIONS or pixels < LEAST_PIXELS:
-        return
-    with contextlib.suppress(OSError):
-        replace_text(speed_file(threads), json.dumps({"seconds_per_unit": unit}))
+    if iterations >= LEAST_ITERATIONS:
+        _remember(threads, {ITERATIONS: unit}, pixels)
+
+
+def remember_beside(threads: int, beside: Beside, pixels: int) -> None:
+    """Store the seconds per unit of the other parts, as `remember_unit` does; None leaves the stored number."""
+    _remember(threads, {START: beside.start, EVALUATION: beside.evaluation}, pixels)
+
+
+def _remembered(threads: int) -> dict[str, float]:
+    """The usable numbers of the file."""
+    path, found = speed_file(threads), {}
+    for key in (ITERATIONS, START, EVALUATION):
+        with contextlib.suppress(InputError):
+            found[key] = number(read_json(path).get(key), f"{path}: {key}", FASTEST, SLOWEST)
+    return found
+
+
+def _remember(threads: int, units: dict[str, float | None], pixels: int) -> None:
+    """Replace these numbers of the file."""
+    usable = {key: unit for key, unit in units.items() if unit is not None and FASTEST <= unit <= SLOWEST}
+    if usable and pixels >= LEAST_PIXELS:
+        with contextlib.suppress(OSError):
+            replace_text(speed_file(threads), json.dumps(_remembered(threads) | usable))

@@ -42,6 +42,6 @@ def estimated_cost(frames: Frames, width: int, height: int, config: Config, spee
     small = pixels * count * PIXEL_BYTES if scale != 1.0 else 0.0  # both sizes exist during scaling
     working = PROGRAM_BYTES + IMAGE_BYTES * pixels / PIXELS + GAUSSIAN_BYTES * gaussians
     total = (0 if in_file else read) + min(small, limit / 2) + kept + working
-    plan = TimedCommand(config, frames, round(pixels), speed.threads, speed.perceived, speed.vectors)
+    plan = TimedCommand(config, frames, round(pixels), speed.threads, speed.perceived, speed.vectors, speed.beside)
     found = estimated_seconds(plan, speed.unit)
     return Cost(read, total, read if in_file else 0.0, found.training / 60, sum(found) / 60, gaussians)

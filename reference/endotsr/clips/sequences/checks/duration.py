@@ -170,6 +170,13 @@ class Frames(NamedTuple):
         return self._replace(compared=references * (min(self.total, MOST_TIMES) - 1))
 
 
+class Beside(NamedTuple):
+    """Seconds per unit of the parts beside the iterations, as they were timed on this machine; None = not yet."""
+
+    start: float | None = None  # the initial motion, on one thread
+    evaluation: float | None = None  # with the threads of the command
+
+
 class Speed(NamedTuple):
     """What a machine contributes to the time of a command; the default is an assumed machine."""
 
@@ -177,6 +184,7 @@ class Speed(NamedTuple):
     threads: int = 2
     perceived: bool = True  # whether it has LPIPS weights for the evaluation
     vectors: float = 1.0  # `vector_factor` of its processor
+    beside: Beside = Beside()
 
 
 ASSUMED = Speed()
@@ -191,20 +199,23 @@ class TimedCommand(NamedTuple):
     threads: int = 2  # with more than one, a second thread makes the targets between the frames
     perceived: bool | None = True  # whether the evaluation computes LPIPS; None = no evaluation
     vectors: float = 1.0  # `vector_factor` of the processor
+    beside: Beside = Beside()
 
     def alone(self, unit: float) -> float:
-        """Seconds per unit of the parts beside the iterations, on one thread; AVX-512 is assumed to be no gain there.
+        """Seconds per unit of the parts beside the iterations, on one thread: timed, or from `unit`.
 
         unit   seconds per unit of the iterations, with the threads of the plan
+
+        Edges:   untimed, AVX-512 is assumed to be no gain there.
         """
-        return unit * (SERIAL if self.threads > 1 else 1.0) / self.vectors
+        return self.beside.start or unit * (SERIAL if self.threads > 1 else 1.0) / self.vectors
 
     def evaluating(self, unit: float) -> float:
-        """Seconds per unit of the evaluation: the geometric mean of `alone` and of its value for an assumed machine.
+        """Seconds per unit of the evaluation: timed, or the geometric mean of `alone` and of an assumed machine.
 
         Libraries do most of this work, and their speed follows that of the iterations in part. The mean is a guess.
         """
-        return float(np.sqrt(self.alone(unit) * SECONDS * SERIAL))
+        return self.beside.evaluation or float(np.sqrt(self.alone(unit) * SECONDS * SERIAL))
 
 
 class PartSeconds(NamedTuple):
@@ -246,21 +257,34 @@ def estimated_seconds(plan: TimedCommand, unit: float = SECONDS, at: Standing | 
     """
     config, frames, size = plan.config, plan.frames, plan.pixels / PIXELS
     alone, at = plan.alone(unit), at_start(config) if at is None else at
-    tracks = config.initialisation.motion != "none" and config.model.spectral_motion and at.iteration == 0
-    tracked = (TRACKED + TRACKED_POINTS * at.gaussians) * tracks
     sizes = 1.25 if config.training.coarse_start else 1.0
     visits = visited(config, frames.gaps, config.training.iterations - at.iteration)
     targets = sizes * gap_units(frames) * frames.gaps * visits
-    pictures = frames.held_out * METHODS * (MEASURED + PERCEIVED * bool(plan.perceived))
-    pictures += MEASURED * frames.training / EVERY_TRAINING_FRAME + COMPARED * frames.compared
     return PartSeconds(
         alone * size * READ * frames.total,
-        alone * size * tracked * frames.training,
+        alone * start_units(plan) * (at.iteration == 0),
         unit * calibration_work(config, plan.pixels, at, plan.vectors),
         alone * size * targets / plan.threads,
         unit * work_left(config, plan.pixels, at, plan.vectors),
-        0.0 if plan.perceived is None else plan.evaluating(unit) * (PAGES * gaussians_at_end(config) + size * pictures),
+        plan.evaluating(unit) * evaluation_units(plan),
     )
+
+
+def start_units(plan: TimedCommand) -> float:
+    """Units of the initial motion; 0 without tracked motion."""
+    config = plan.config
+    tracks = config.initialisation.motion != "none" and config.model.spectral_motion
+    points = TRACKED_POINTS * at_start(config).gaussians
+    return plan.pixels / PIXELS * (TRACKED + points) * tracks * plan.frames.training
+
+
+def evaluation_units(plan: TimedCommand) -> float:
+    """Units of the evaluation with its pages; 0 without evaluation."""
+    if plan.perceived is None:
+        return 0.0
+    pictures = plan.frames.held_out * METHODS * (MEASURED + PERCEIVED * plan.perceived)
+    pictures += MEASURED * plan.frames.training / EVERY_TRAINING_FRAME + COMPARED * plan.frames.compared
+    return PAGES * gaussians_at_end(plan.config) + plan.pixels / PIXELS * pictures
 
 
 def gap_units(frames: Frames) -> float:
