@@ -185,9 +185,10 @@ assert swing[both] < swing[alone] - 2
 # square of $1/255$, the smallest difference of 8-bit pictures, is added, so that two equal pairs have $q=\frac12$ and
 # not $0/0$.
 #
-# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue,
-# this one is the target. Where one of the four pictures is excluded, the comparison with the static pair says nothing,
-# and $q=0$.
+# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. In the code, such pixels of both frames have
+# colours of tissue, because the interpolation of (18.1) and the window of (18.8) also read neighbours of a pixel; only
+# the flow reads the whole pictures. Where only one of $J_0,J_1$ is tissue, this one is the target. Where one of the four
+# pictures is excluded, the comparison with the static pair says nothing, and $q=0$.
 #
 # <!-- definition: endotsr.clips.sequences.between.motion_between -->
 # ```python
@@ -222,7 +223,8 @@ assert swing[both] < swing[alone] - 2
 #     weights = np.array([1.0 - fraction, fraction], np.float32)
 #     field = motion_between(flows, fraction)
 #     factors = np.array([-a, 1 - a], np.float32)  # (18.1)
-#     images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
+#     images = np.stack([tissue_colours(sequence, k) for k in pair]).astype(np.float32) / np.float32(255)
+#     tissue = sequence.masks[pair]
 #     seen, known, depth = moved_priors(tissue, sequence.depth[pair].astype(np.float32, copy=False), field, factors)
 #     both = seen[0] & seen[1] & tissue[0] & tissue[1]
 #     moved = np.stack([warp_cubic(image, factor * field) for image, factor in zip(images, factors, strict=True)])

@@ -119,6 +119,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "registration.window": Setting("endotsr.clips.poses.levels:LOCAL"),
     "tracks.depth": Setting("endotsr.clips.sequences.tracks:DEPTH_JUMP", scale=2 * 100),
     "tracks.again": Setting("endotsr.clips.sequences.tracks:DEPTH_JUMP", "{:.1f}", 100 / 4),
+    "between.nearest": Setting("endotsr.clips.sequences.tissue_colours:NEAREST"),
     "between.window": Setting("endotsr.clips.sequences.between:NEARBY"),
     "window.warm": Setting("endotsr.studies.windows.make:WARM", scale=100),
     "window.carried": Setting("endotsr.studies.windows.carry:CARRIED", scale=100),

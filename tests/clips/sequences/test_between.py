@@ -132,6 +132,21 @@ def test_what_both_frames_exclude_is_no_target():
     assert np.array_equal(frame.mask, mask[0])
 
 
+def test_no_colour_that_a_mask_excludes_enters_a_target():
+    """Bitwise, for a given flow: not by the warp of sixteen pixels, not by the window of the differences."""
+    rng = np.random.default_rng(0)
+    mask = np.ones((2, HEIGHT, WIDTH), bool)
+    mask[0, 30:50, 40:60], mask[1, 35:60, 50:70], mask[:, 80:, 100:] = False, False, False  # the last in both
+    flow = Flows(*rng.uniform(-3, 3, (2, 2, HEIGHT, WIDTH)).astype(np.float32))
+    one, other = (two_frames(4.0, mask) for _ in range(2))
+    other.images[...] = np.where(mask[:, None], other.images, rng.integers(0, 256, other.images.shape))
+    for fraction in (0.25, 0.5):
+        a, b = (frame_between(sequence, 0, 1, fraction, flow) for sequence in (one, other))
+        assert a.mask.sum() > 0.8 * a.mask.size
+        for found, again in zip(a[:3], b[:3], strict=True):
+            np.testing.assert_array_equal(found, again)
+
+
 def test_depth_is_that_of_the_frame_that_has_one():
     sequence = two_frames(4.0)
     sequence.depth[0, :, :20], sequence.depth[1, :, 20:] = 0, 6.0

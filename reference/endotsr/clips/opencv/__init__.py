@@ -192,6 +192,22 @@ def grown(mask: NDArray[np.bool_], pixels: float) -> NDArray[np.bool_]:
     return distance <= pixels
 
 
+def nearest_pixels(missing: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """(H, W) flat index of the nearest pixel that is not missing; its own, if a pixel is not missing itself.
+
+    Distances are those of OpenCV's mask of 5x5 pixels, within 2 % of the Euclidean ones.
+
+    Edges:   at least one pixel must not be missing.
+    """
+    cv2 = _cv2()
+    kind = {"distanceType": cv2.DIST_L2, "maskSize": 5, "labelType": cv2.DIST_LABEL_PIXEL}
+    labels = cv2.distanceTransformWithLabels(missing.astype(np.uint8), **kind)[1]
+    places = np.zeros(labels.max() + 1, np.intp)
+    known = np.flatnonzero(~missing)
+    places[labels.ravel()[known]] = known
+    return places[labels]
+
+
 def outlines(mask: NDArray[np.bool_], tolerance: float) -> list[tuple[NDArray[np.float64], bool]]:
     """Outlines of the regions of a mask (H, W) as polygons (n, 2) in x and y, px, and whether each is that of a hole.
 

@@ -8,7 +8,8 @@ solves
 A pixel x blends the warped pair I_0(x - a v(x)) and I_1(x + (1 - a) v(x)) in time, and likewise the unwarped pair
 I_0(x) and I_1(x). The two blends are mixed with weights inverse to the local squared difference within each pair: where
 the flow is wrong, the warped pictures disagree. A pixel is tissue if at least one frame is tissue at its warped
-position, and is blended from those frames only.
+position, and is blended from those frames only. No colour that a mask excludes enters a target: the warps and the
+differences read `tissue_colours`. The flow alone is computed from whole pictures.
 
 In: a sequence and the indices of two training frames. Out: a `Frame`. No held-out picture is read.
 """
@@ -20,6 +21,7 @@ import numpy as np
 from endotsr.clips.sequences.between_kernels import WHOLE as WHOLE
 from endotsr.clips.sequences.between_kernels import motion_field, moved_priors
 from endotsr.clips.sequences.sequence import Frame, Sequence
+from endotsr.clips.sequences.tissue_colours import tissue_colours
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 
@@ -71,7 +73,8 @@ def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float,
     weights = np.array([1.0 - fraction, fraction], np.float32)
     field = motion_between(flows, fraction)
     factors = np.array([-a, 1 - a], np.float32)  # (18.1)
-    images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
+    images = np.stack([tissue_colours(sequence, k) for k in pair]).astype(np.float32) / np.float32(255)
+    tissue = sequence.masks[pair]
     seen, known, depth = moved_priors(tissue, sequence.depth[pair].astype(np.float32, copy=False), field, factors)
     both = seen[0] & seen[1] & tissue[0] & tissue[1]
     moved = np.stack([warp_cubic(image, factor * field) for image, factor in zip(images, factors, strict=True)])

@@ -19,23 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.tissue_colours import by_nearness
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.results.evaluation.baselines import MakeRenderer, neighbours, unit, unit_image
 
 WHOLE = 0.999  # bilinear weight of tissue above which all four pixels are tissue, as in `between`
 
 
-def by_nearness(sequence: Sequence, time: float, frames: NDArray[np.integer]) -> NDArray[np.integer]:
-    """Frames in the order of their distance in time from `time`; of two equally near ones, the earlier first."""
-    distance = np.abs(sequence.times[frames] - time)
-    return frames[np.lexsort((frames, np.round(distance, 9)))]  # times i / n have rounding errors
-
-
 def nearest_tissue(sequence: Sequence, time: float) -> NDArray[np.uint8]:
     """At every pixel, the training frame nearest in time in which it is tissue; 0 where none is. (3, H, W) uint8."""
     image = np.zeros(sequence.images.shape[1:], np.uint8)
     missing = np.ones(sequence.images.shape[2:], bool)
-    for k in by_nearness(sequence, time, np.asarray(sequence.train_index)):
+    for k in by_nearness(sequence, time):
         found = missing & sequence.masks[k]
         np.copyto(image, sequence.images[k], where=found)
         missing &= ~found
