@@ -185,9 +185,9 @@ assert swing[both] < swing[alone] - 2
 # square of $1/255$, the smallest difference of 8-bit pictures, is added, so that two equal pairs have $q=\frac12$ and
 # not $0/0$.
 #
-# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. In the code, such pixels of both frames have
-# colours of tissue, because the interpolation of (18.1) and the window of (18.8) also read neighbours of a pixel; only
-# the flow reads the whole pictures. Where only one of $J_0,J_1$ is tissue, this one is the target. Where one of the four
+# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. The interpolation of (18.1) and
+# the window of (18.8) also read neighbours of a pixel. In the code, such pixels of both frames have colours of tissue.
+# The flow reads the whole pictures. Where only one of $J_0,J_1$ is tissue, this one is the target. Where one of the four
 # pictures is excluded, the comparison with the static pair says nothing, and $q=0$.
 #
 # <!-- definition: endotsr.clips.sequences.between.motion_between -->
