@@ -12,6 +12,7 @@ import numpy as np
 
 from endotsr.clips.effects.inspect import Inspection
 from endotsr.clips.effects.savings import memory_fraction, time_fraction
+from endotsr.clips.effects.verdict import UNKNOWN
 from endotsr.clips.effects.views import harmonic_sizes
 from endotsr.config import Config, config_from_dict
 from endotsr.method.equations.dictionary import AtomReport, frequencies, report_atoms
@@ -184,7 +185,7 @@ def _remarks(inspection: Inspection) -> tuple[str, ...]:
     camera, motion = verdicts["camera motion"], verdicts["motion"]
     if camera.present and camera.false_positive_rate is None:
         said.append("The camera moves, but its poses do not: a training takes its motion for motion of the tissue.")
-    if motion.present:
+    if motion.present and motion.kind != UNKNOWN:
         waves = motion.details["half_waves"]
         said.append(f"{waves} half waves over time hold 99 % of the motion; a time base resolves about one.")
     if verdicts["highlights"].present:
