@@ -9,7 +9,7 @@ from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.training.runs.files import refuse_folder, write_json
+from endotsr.training.runs.files import refuse_folder, refuse_read_only, write_json
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
@@ -94,6 +94,8 @@ def _measure(options: TradeoffOptions) -> "DatedMeasurement":
     use_threads(options.threads)
     out = options.out
     refuse_folder(out)
+    if out.is_dir():
+        refuse_read_only(out)
     scene = chosen_scene(options)
     out.mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:
