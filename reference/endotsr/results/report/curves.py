@@ -116,8 +116,17 @@ def _draw(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
     chart.draw(axes, theme)
     name_axes(axes, chart.along, title=chart.title if title else "", theme=theme)
     plain_axes(axes, theme)
-    if len(axes.get_legend_handles_labels()[1]) > 0:
-        legend(axes, theme, ncols=2 if len(axes.lines) > 4 else 1)
+    if len(axes.lines) > 4:  # no place between the curves is sure to be free
+        _leave_room_above(axes, 0.36)
+        legend(axes, theme, ncols=2, loc="upper left")
+    elif len(axes.get_legend_handles_labels()[1]) > 0:
+        legend(axes, theme)
+
+
+def _leave_room_above(axes: Any, fraction: float) -> None:
+    """Raise the upper end of the vertical axis, so that this fraction of the height is above the curves."""
+    (low, high), more = axes.get_ylim(), fraction / (1 - fraction)
+    axes.set_ylim(top=high * (high / low) ** more if axes.get_yscale() == "log" else high + (high - low) * more)
 
 
 def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: bool = True) -> None:
