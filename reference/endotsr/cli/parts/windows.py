@@ -82,8 +82,8 @@ def _row(row: "WindowRow") -> str:
 
 def _seam_line(seams: "Seams") -> str:
     def shown(values: "Flicker") -> str:
-        if values["ratio"] is None:
-            return "not measured"
-        return f"{values['seams']:.2f} at seams, {values['inside']:.2f} inside (ratio {values['ratio']:.2f})"
+        places = (("at seams", values["seams"]), ("inside", values["inside"]))
+        found = ", ".join(f"{value:.2f} {where}" for where, value in places if value is not None) or "not measured"
+        return found if values["ratio"] is None else f"{found} (ratio {values['ratio']:.2f})"
 
     return f"flicker, grey levels: model {shown(seams['model'])}; recorded frames {shown(seams['recorded'])}"
