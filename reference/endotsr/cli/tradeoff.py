@@ -9,6 +9,7 @@ from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
+from endotsr.studies.windows.record import FOLDER, is_windowed
 from endotsr.training.runs.files import refuse_folder, refuse_read_only, write_json
 from endotsr.untrusted.writing import replace_text
 
@@ -66,6 +67,9 @@ def run(words: list[str]) -> int:
 def _refuse(options: TradeoffOptions) -> None:
     if options.run is not None and options.splats is not None:
         raise InputError("tradeoff: --run with --splats is not allowed; allowed: one of them")
+    if options.run is not None and is_windowed(options.run):
+        one = options.run / FOLDER / "000"
+        raise InputError(f"{options.run}: is a run of windows, of which each has a scene; allowed: a window, such as {one}")
     if options.json is not None and options.budget is None:
         raise InputError(f"tradeoff: --json needs --budget; the measurement itself is DIR/{RESULT}")
     if not 0 < options.scale <= 8:

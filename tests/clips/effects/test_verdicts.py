@@ -94,8 +94,10 @@ def test_too_little_tissue_leaves_motion_open():
     sequence = clip("noise", "camera_motion")
     masks = np.zeros_like(sequence.masks)
     masks[:, 40:70, 40:70] = True
-    verdict = inspect_sequence(replace(sequence, masks=masks)).verdicts["motion"]
+    found = inspect_sequence(replace(sequence, masks=masks))
+    verdict, kept = found.verdicts["motion"], dict(make_plan(found, PAPER).kept)
     assert verdict.present and verdict.kind == "unknown"
+    assert kept["model.deformation"] == kept["model.spectral_motion"] == verdict.reason
 
 
 def test_too_little_tissue_leaves_light_open():

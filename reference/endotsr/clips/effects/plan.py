@@ -164,8 +164,13 @@ def carried(inspection: Inspection, config: Config) -> Dictionary:
 
 
 def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Config) -> tuple[bool, str]:
-    """Whether a rate requires the Fourier translation, or any motion if tracks initialise it (B15)."""
+    """Whether a rate requires the Fourier translation, or any motion if tracks initialise it (B15).
+
+    Motion that is assumed may have a rate.
+    """
     motion = inspection.verdicts["motion"]
+    if motion.kind == UNKNOWN:
+        return True, motion.reason
     if motion.present and config.initialisation.motion != "none":
         return True, f"{motion.reason[:-1]}: the Gaussians start with the motion that flow shows."
     periodic = any(line.cycles <= dictionary.frequency_max for line in inspection.lines)
