@@ -69,7 +69,7 @@ def _refuse(options: TradeoffOptions) -> None:
         raise InputError("tradeoff: --run with --splats is not allowed; allowed: one of them")
     if options.run is not None and is_windowed(options.run):
         one = options.run / FOLDER / "000"
-        raise InputError(f"{options.run}: is a run of windows, of which each has a scene; allowed: a window, such as {one}")
+        raise InputError(f"{options.run}: is a run of windows, each with its scene; allowed: a window, such as {one}")
     if options.json is not None and options.budget is None:
         raise InputError(f"tradeoff: --json needs --budget; the measurement itself is DIR/{RESULT}")
     if not 0 < options.scale <= 8:

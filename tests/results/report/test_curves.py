@@ -71,7 +71,7 @@ def test_the_names_of_many_curves_cover_none_of_them():
     (chart,) = (c for c in curves.charts(log) if c.title == "Loss terms")
     figure = style.new_figure(4.4, 2.75, constrained=False)
     axes = figure.add_subplot()
-    curves._draw(axes, chart, style.LIGHT, title=False)
+    curves.draw_chart(axes, chart, style.LIGHT, title=False)
     figure.draw_without_rendering()
     box = axes.get_legend().get_window_extent(figure.canvas.get_renderer())
     assert len(axes.lines) == 6 and box.y1 <= axes.bbox.y1

@@ -38,14 +38,15 @@ def test_the_page_holds_the_front_the_answers_and_the_diagram():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "said"), [(3.642, "3640 ms"), (0.9996, "1000 ms"), (0.04, "40 ms"), (0.0111, "11.1 ms"), (61.0, "61000 ms")]
+    ("seconds", "said"),
+    [(3.642, "3640 ms"), (0.9996, "1000 ms"), (0.04, "40 ms"), (0.0111, "11.1 ms"), (61, "61000 ms")],
 )
 def test_a_time_is_written_without_a_power_of_ten(seconds, said):
     assert milliseconds(seconds) == said
 
 
 @pytest.mark.parametrize(
-    ("error", "said"), [(1.0, "255/255"), (0.45, "115/255"), (45 / 255, "45/255"), (0.2 / 255, "0.2/255"), (0.0, "0/255")]
+    ("error", "said"), [(1.0, "255/255"), (0.45, "115/255"), (45 / 255, "45/255"), (0.2 / 255, "0.2/255"), (0, "0/255")]
 )
 def test_a_large_error_is_written_in_whole_levels(error, said):
     assert levels(error) == said

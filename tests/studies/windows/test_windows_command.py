@@ -8,7 +8,7 @@ import pytest
 from small_recording import write_recording
 
 from endotsr.cli.main import main
-from endotsr.cli.parts.windows import _seam_line
+from endotsr.cli.parts.windows import seam_line
 
 SMALL = [
     "--preset", "demo", "--iterations", "6", "--initialisation.first-frame-points", "200", "--density.maximum", "400",
@@ -97,7 +97,7 @@ def test_flicker_is_said_of_a_recording_without_seams():
     alone = {"seams": None, "inside": 1.342, "ratio": None}
     both = {"seams": 3.0, "inside": 1.5, "ratio": 2.0}
     none = {"seams": None, "inside": None, "ratio": None}
-    line = lambda model, recorded: _seam_line(
+    line = lambda model, recorded: seam_line(
         {"seam_frames": 0, "inside_frames": 9, "model": model, "recorded": recorded}
     ).partition(": ")[2]
     assert line(alone, none) == "model 1.34 inside; recorded frames not measured"

@@ -90,7 +90,7 @@ def chart_png(chart: Chart, theme: str, dots: int = 220) -> bytes:
     """One chart as a PNG file with a transparent background, 4.4 x 2.75 inches."""
     figure = new_figure(4.4, 2.75, constrained=False)
     figure.subplots_adjust(left=0.13, right=0.93, top=0.97, bottom=0.17)
-    _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
+    draw_chart(figure.add_subplot(), chart, THEMES[theme], title=False)
     return encoded(figure, "png", dots, transparent=True)
 
 
@@ -108,11 +108,12 @@ def curves_png(log: LogEntries, evaluation: EvaluationRecord | None = None) -> b
     rows = (len(found) + 1) // 2
     figure = new_figure(10.4, 3.3 * rows)
     for position, chart in enumerate(found):
-        _draw(figure.add_subplot(rows, 2, position + 1), chart, LIGHT, title=True)
+        draw_chart(figure.add_subplot(rows, 2, position + 1), chart, LIGHT, title=True)
     return encoded(figure)
 
 
-def _draw(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
+def draw_chart(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
+    """Draw a chart with names and legend; five or more curves have their names above them."""
     chart.draw(axes, theme)
     name_axes(axes, chart.along, title=chart.title if title else "", theme=theme)
     plain_axes(axes, theme)
