@@ -306,6 +306,10 @@ def test_film_view_and_export_are_those_of_the_commands(run, tmp_path):
         assert (tmp_path / f"a.{ending}").read_bytes() == (tmp_path / f"b.{ending}").read_bytes(), ending
     with pytest.raises(endotsr.InputError, match="not a film"):
         run.film(tmp_path / "a.avi")
+    place = {"rotation": np.eye(3).tolist(), "translation": [0, 0, 0]}
+    (tmp_path / "path.json").write_text(json.dumps({"cameras": [place, {**place, "width": 20}]}))
+    with pytest.raises(endotsr.InputError, match="allowed: one size"):
+        run.film(tmp_path / "c.gif", count=2, camera=str(tmp_path / "path.json"))
 
 
 def test_runs_that_cannot_be_opened(tmp_path):

@@ -327,6 +327,7 @@ class Run:
         path, look, scene = Path(path), pictures.Look(), self._scene()
         pictures.check_outputs(None, path, rate, slow)
         views = pictures.requested_views(scene, ViewRequest(Times(count=count), camera), "all")
+        pictures.check_panels(look.panels, views)
         chosen = rate or film.film_rate(path, [view.time for view in views], scene.record.duration, slow)
         film.write_film(path, pictures.film_pictures(pictures.rendered(scene, views, look), look), chosen)
         return path

@@ -44,6 +44,15 @@ def plan_of(preset, count, threads):
     return TimedCommand(lengthened(PRESETS[preset], frames.training), frames, PIXELS, threads, perceived=None)
 
 
+@pytest.mark.parametrize(("psnr", "said"), [(None, "loss 0.2500, 90 Gaussians, 0:05 left"),
+                                            (30.0, "loss 0.2500, PSNR 30.00 dB, 90 Gaussians, 0:05 left")])  # fmt: skip
+def test_a_psnr_that_no_view_has_yet_is_not_printed(psnr, said):
+    """It is logged every tenth iteration; a resumed training began with nan dB."""
+    shown = Progress(plan_of("demo", 24, 2))
+    shown._means = {"loss": 0.25} | ({} if psnr is None else {"psnr": psnr})
+    assert shown._state({"iteration": 56, "gaussians": 90}, "0:05") == said
+
+
 class Told:
     """A training on a made-up machine, what it says, and the time left that it shows at every iteration.
 

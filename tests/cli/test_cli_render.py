@@ -64,6 +64,20 @@ def test_cameras_of_a_file_that_render_json_names_give_the_same_picture(finished
         assert np.array_equal(a, b)
 
 
+@pytest.mark.parametrize("film", ["a.mp4", "a.gif"])
+def test_a_film_of_cameras_of_several_sizes_is_refused(film, finished_run, tmp_path, capsys):
+    """They were written into one film, distorted or beside one another; pictures may have them."""
+    about = render(finished_run, tmp_path / "a", "--count", "3", "--camera", "orbit")
+    cameras = [p["camera"] for p in about["pictures"]]
+    cameras[1] = {**cameras[1], "width": 20}
+    (tmp_path / "path.json").write_text(json.dumps({"cameras": cameras}))
+    words = ["render", str(finished_run), "--count", "3", "--camera", str(tmp_path / "path.json")]
+    assert main([*words, "--film", str(tmp_path / film)]) == 2
+    assert "views of 48x32, 20x32; allowed: one size" in capsys.readouterr().err
+    assert main([*words, "--film", str(tmp_path / film), "--size", "24x16"]) == 0
+    assert main([*words, "--out", str(tmp_path / "b")]) == 0
+
+
 def test_a_film_of_panels_beside_its_pictures(finished_run, tmp_path, capsys):
     film = tmp_path / "film.webm"
     words = ["--frames", "train", "--film", str(film), "--panels", "render", "truth", "error", "depth"]

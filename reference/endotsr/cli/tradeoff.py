@@ -9,7 +9,8 @@ from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.training.runs.files import refuse_folder, write_json
+from endotsr.studies.windows.record import FOLDER, is_windowed
+from endotsr.training.runs.files import refuse_folder, refuse_read_only, write_json
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
@@ -66,6 +67,9 @@ def run(words: list[str]) -> int:
 def _refuse(options: TradeoffOptions) -> None:
     if options.run is not None and options.splats is not None:
         raise InputError("tradeoff: --run with --splats is not allowed; allowed: one of them")
+    if options.run is not None and is_windowed(options.run):
+        one = options.run / FOLDER / "000"
+        raise InputError(f"{options.run}: is a run of windows, each with its scene; allowed: a window, such as {one}")
     if options.json is not None and options.budget is None:
         raise InputError(f"tradeoff: --json needs --budget; the measurement itself is DIR/{RESULT}")
     if not 0 < options.scale <= 8:
@@ -94,6 +98,8 @@ def _measure(options: TradeoffOptions) -> "DatedMeasurement":
     use_threads(options.threads)
     out = options.out
     refuse_folder(out)
+    if out.is_dir():
+        refuse_read_only(out)
     scene = chosen_scene(options)
     out.mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:

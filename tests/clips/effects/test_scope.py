@@ -43,6 +43,17 @@ def test_poses_that_differ_are_a_fact():
     assert (found.kind, found.confidence) == ("moving", 1.0) and "moves by up to" in found.reason
 
 
+def test_a_camera_that_only_turns_is_said_to_turn():
+    """It moved by up to 0 mm before."""
+    from scipy.spatial.transform import Rotation
+
+    sequence = clip("noise")
+    turned = [Rotation.from_rotvec([0, 0.01 * k, 0]).as_matrix() for k in range(sequence.count)]
+    cameras = [camera._replace(rotation=turn) for camera, turn in zip(sequence.cameras, turned)]
+    found = verdict(replace(sequence, cameras=cameras, static_camera=False))
+    assert "moves by up to 0 mm and turns by up to 13.18 degrees" in found.reason and "rotation" in found.unit
+
+
 @pytest.mark.parametrize("seed", [21, 22])
 def test_without_poses_a_moving_camera_is_seen(seed):
     found = verdict(without_poses(clip("noise", "camera_motion", seed=seed, amplitude=SWING)))

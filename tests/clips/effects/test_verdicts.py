@@ -10,11 +10,13 @@ from scenes import clip, inspected
 from endotsr.clips.effects.frames import reduced_frames
 from endotsr.clips.effects.inspect import EFFECTS, inspect_sequence, inspection_record
 from endotsr.clips.effects.noise import estimate_noise
+from endotsr.clips.effects.plan import make_plan
 from endotsr.clips.effects.verdict import EffectVerdict
 from endotsr.clips.effects.views import view_verdict
 from endotsr.clips.simulator.cameras import make_cameras
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import PAPER
 from endotsr.errors import InputError
 from endotsr.training.runs.files import finite
 
@@ -92,8 +94,23 @@ def test_too_little_tissue_leaves_motion_open():
     sequence = clip("noise", "camera_motion")
     masks = np.zeros_like(sequence.masks)
     masks[:, 40:70, 40:70] = True
-    verdict = inspect_sequence(replace(sequence, masks=masks)).verdicts["motion"]
+    found = inspect_sequence(replace(sequence, masks=masks))
+    verdict, kept = found.verdicts["motion"], dict(make_plan(found, PAPER).kept)
     assert verdict.present and verdict.kind == "unknown"
+    assert kept["model.deformation"] == kept["model.spectral_motion"] == verdict.reason
+
+
+def test_too_little_tissue_leaves_light_open():
+    """A change is then assumed, so that neither colour over time nor exposure is switched off by mistake."""
+    sequence = clip("noise", "exposure")
+    masks = np.zeros_like(sequence.masks)
+    masks[:, 48:64, 48:64] = True
+    found = inspect_sequence(replace(sequence, masks=masks))
+    verdict = found.verdicts["photometric"]
+    assert verdict.present and verdict.kind == "unknown" and verdict.confidence == 0.5
+    plan = make_plan(found, PAPER)
+    assert "model.appearance" in dict(plan.kept)
+    assert found.verdicts["motion"].kind == "unknown" and "half waves" not in " ".join(plan.remarks)
 
 
 def test_a_moving_camera_without_depth_keeps_every_degree_and_gives_numbers():

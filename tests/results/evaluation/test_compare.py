@@ -73,6 +73,14 @@ def test_files_that_are_no_metrics_are_refused(metrics):
         methods_of(metrics, "a", "found.json")
 
 
+@pytest.mark.parametrize("value", ["30", [30.0], True, {}])
+def test_a_metric_that_is_no_number_is_refused(value):
+    rows = [{"frame": 1, "name": "f1", "time": 0.5, "psnr_tissue": value}]
+    metrics = {"pictures": {"arrays_sha256": DIGESTS}, "held_out": {"per_frame": rows}}
+    with pytest.raises(InputError, match=r"found\.json: frame 1: psnr_tissue: .* is not allowed"):
+        methods_of(metrics, "a", "found.json")
+
+
 def test_a_method_with_the_name_of_a_baseline_keeps_its_own_numbers():
     """It is refused beside this baseline; before, the numbers of the baseline took its place."""
     rows = [{"frame": 1, "name": "f1", "time": 0.5, "psnr_tissue": value} for value in (30.0, 20.0)]

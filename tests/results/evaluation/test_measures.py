@@ -1,5 +1,7 @@
 """Depth, flicker and the right view: made-up renders with known errors."""
 
+import tracemalloc
+
 import msgspec
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
+from endotsr.results.evaluation import measures
 from endotsr.results.evaluation.depth import held_out_depth
 from endotsr.results.evaluation.measures import MEASURES, flicker, measure_lines, measured
 from endotsr.results.evaluation.right_view import moved_left, right_view, stereo_baseline
@@ -105,6 +108,24 @@ def test_a_steady_change_of_light_is_no_flicker():
     still = textured(0.0)[0] * LEVEL * np.float32(0.5)
     found = rows_of(flicker(sequence, lambda i, camera: render_of(still + i * LEVEL)))
     assert found["this model"]["all_frames"] < 1e-4
+
+
+def test_flicker_of_a_long_clip_holds_few_frames_at_a_time(monkeypatch):
+    """All static pixels of all frames at once were 4 GB for 156 frames of 640x512."""
+    sequence, static = sequence_of(textured(3.0, n=200)), np.ones((64, 64), bool)
+    monkeypatch.setattr(measures, "static_pixels", lambda sequence: static)
+    render = lambda i, camera: render_of(sequence.images[i] * LEVEL)
+    tracemalloc.start()
+    found = rows_of(flicker(sequence, render))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    values = sequence.images[:, :, static].astype(np.float64)
+    second = (values[:-2] - 2 * values[1:-1] + values[2:]) / np.sqrt(6)
+    expected = np.sqrt(np.square(second).mean(axis=(1, 2)))
+    for row in found.values():
+        assert row["all_frames"] == pytest.approx(np.sqrt(np.square(expected).mean()), rel=1e-5)
+        assert row["held_out"] == pytest.approx(np.sqrt(np.square(expected[[0, 4]]).mean()), rel=1e-5)
+    assert peak < 10 * values[0].nbytes
 
 
 def test_flicker_needs_a_resting_camera_and_resting_tissue():

@@ -9,3 +9,20 @@ def test_reasons_and_remedies_keep_their_capital_letters():
     assert "Read them the other way: endotsr prepare SOURCE --masks FOLDER --excluded-value black." in page
     assert "Tissue is red: red and blue may be exchanged, as OpenCV stores them." in page
     assert "<b>endotsr prepare --scale 0.5, or fewer --frames.</b>" in page
+
+
+def test_one_finding_is_not_said_as_several():
+    page = check_page(Checked("clip", [finding("disk", "clip", "odd")], {}, []))
+    assert "1 refusal, 0 warnings, 0 notes" in page
+
+
+def test_the_cost_has_units():
+    """Bytes were written as 8.801e+08, and minutes without a word."""
+    cost = {"sequence_bytes": 4423680.0, "total_bytes": 880056000.0, "file_bytes": 0.0, "minutes": 5.81,
+            "command_minutes": 126.4, "gaussians": 64000}  # fmt: skip
+    page = check_page(Checked("clip", [], {"frames": 24, "cost": cost}, []))
+    for label, value in (("frames as they are read", "4.4 MB"), ("memory of a training", "0.9 GB"),
+                         ("iterations", "5.8 minutes"), ("whole command, without compilation", "126 minutes"),
+                         ("Gaussians at the end", "64&#8239;000"), ("frames", "24")):  # fmt: skip
+        assert f"<dt>{label}</dt><dd>{value}</dd>" in page
+    assert "file of the frames" not in page, "they are in memory"

@@ -63,6 +63,23 @@ def test_charts_are_drawn_in_both_themes(count):
     Image.open(io.BytesIO(curves.curves_png(log_of(count), evaluation) or b"")).load()
 
 
+def test_the_names_of_many_curves_cover_none_of_them():
+    """A smoothness of 100 is far above the other terms; the legend lay over it."""
+    values = {"l1": 0.05, "ssim": 0.8, "depth": 0.02, "smoothness": 100.0, "matern_penalty": 1e-4, "laplacian": 0.01}
+    rng = np.random.default_rng(0)
+    log = [{"iteration": k, **{key: v * rng.uniform(0.7, 1.2) for key, v in values.items()}} for k in range(1, 121)]
+    (chart,) = (c for c in curves.charts(log) if c.title == "Loss terms")
+    figure = style.new_figure(4.4, 2.75, constrained=False)
+    axes = figure.add_subplot()
+    curves.draw_chart(axes, chart, style.LIGHT, title=False)
+    figure.draw_without_rendering()
+    box = axes.get_legend().get_window_extent(figure.canvas.get_renderer())
+    assert len(axes.lines) == 6 and box.y1 <= axes.bbox.y1
+    for line in axes.lines:
+        ends = line.get_transform().transform(line.get_xydata())
+        assert not box.count_contains(ends), line.get_label()
+
+
 def test_levels_of_the_frames_are_of_the_tissue_as_the_curve_is():
     """The log has the PSNR of the tissue; that of all pixels is higher by the fraction of the mask."""
     mean = {"psnr_full": 33.0, "psnr_tissue": 30.0}

@@ -124,6 +124,16 @@ def test_a_chart_holds_the_ends_and_the_means_of_its_curve(monkeypatch):
     assert "&lt;a&gt;" in svg and "<a>" not in svg
 
 
+def test_the_names_of_three_curves_end_within_the_chart():
+    """`z, arbitrary unit` of a path was cut off; a letter of this size is about 7 pixels wide."""
+    names = [f"{axis}, arbitrary unit" for axis in "xyz"]
+    svg = chart_svg("path", [ChartCurve(name, [0, 1], [0.0, 1.0]) for name in names], 1)
+    starts = [float(x) for x in re.findall(r'<text x="([\d.]+)" y="14"', svg)]
+    ends = [start + 7 * len(name) for start, name in zip(starts, names)]
+    assert starts[0] == line_chart.LEFT and max(ends) <= line_chart.WIDTH
+    assert all(end < start for end, start in zip(ends, starts[1:]))
+
+
 @pytest.mark.parametrize("y", [[], [float("nan")], [0.0], [-1.0]])
 def test_a_curve_without_a_value_that_the_axis_holds_is_no_chart(y):
     assert chart_svg("x", [ChartCurve("x", list(range(len(y))), y)], 3, logarithmic=True) == ""

@@ -139,7 +139,7 @@ def test_tables_hold_the_numbers(page):
     for word in (
         "without A",
         "29.50",
-        "-0.50 dB",
+        "−0.50 dB",
         "Seed",
         "two cores",
         'preset = "paper"',

@@ -102,6 +102,7 @@ def test_the_speed_of_a_film_is_said():
 @pytest.mark.parametrize(
     ("times", "duration", "slow", "said"),
     [([0, 0.5], 0.0, 2.0, "rate is unknown; allowed: --rate"), ([0.5, 0], 2.0, 2.0, "not in order of time"),
+     ([0.5], 2.0, 2.0, "one picture has no speed"),
      ([0, 0.5], 2.0, 100.0, "--slow 100 gives 0.01 pictures per second; allowed: --slow from 0.00833 to 10 with 2")],
 )  # fmt: skip
 def test_a_speed_that_no_film_can_have_is_refused(times, duration, slow, said):

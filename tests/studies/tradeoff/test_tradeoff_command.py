@@ -1,6 +1,7 @@
 """`endotsr tradeoff` from the outside: files, second call, budget, mistakes."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from test_splat_file import write_npz
 
 from endotsr.cli.main import main
 from endotsr.errors import InputError
+from endotsr.studies.tradeoff import study
 from endotsr.studies.tradeoff.results import read_format, read_measurement
 
 pytestmark = pytest.mark.slow
@@ -87,6 +89,14 @@ def test_an_output_folder_that_cannot_be_is_refused_before_the_work(tmp_path, ca
     assert "is not a folder" in capsys.readouterr().err
     assert main(["tradeoff", "--out", str(tmp_path / "file" / "out")]) == 2
     assert "is not a folder" in capsys.readouterr().err
+
+
+def test_a_folder_without_permission_is_refused_before_the_work(tmp_path, capsys, monkeypatch):
+    """The measurement takes minutes."""
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path)
+    monkeypatch.setattr(study, "run_study", lambda *_, **__: pytest.fail("measured"))
+    assert main(["tradeoff", "--splats", str(tmp_path / "a.ply"), "--out", str(tmp_path)]) == 2
+    assert "no permission" in capsys.readouterr().err
 
 
 def test_a_measurement_without_its_keys_is_refused(measured, tmp_path, capsys):

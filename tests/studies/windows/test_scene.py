@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from endotsr.results.export.scene import open_scene
 from endotsr.studies.windows.make import plan_recording
 from endotsr.studies.windows.measure import measure_windows
 from endotsr.studies.windows.plan import Wanted
-from endotsr.studies.windows.scene import WindowFrames, open_any, open_windows
+from endotsr.studies.windows.record import Window, WindowsRecord
+from endotsr.studies.windows.scene import WindowedScene, WindowFrames, open_any, open_windows
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +67,19 @@ def test_in_an_overlap_both_are_blended_linearly_in_time(scene, windows, frame):
         expected = (1 - weight) * getattr(before, name) + weight * getattr(after, name)
         np.testing.assert_allclose(getattr(shown, name), expected, atol=1e-4 if name == "depth" else 1e-6)
     assert np.abs(before.colour - after.colour).max() > 1e-3, "the windows differ, so that a wrong weight is seen"
+
+
+@pytest.mark.parametrize(("cut", "count"), [(58, 100), (31, 102), (32, 107)])
+def test_the_first_frame_after_a_cut_shows_the_window_that_begins_there(cut, count, cold_run):
+    """g / G times G is less than g for many frames, and what is before the cut is another scene."""
+    both = [Window(name="000", first=0, end=cut, start="cold", begins=""),
+            Window(name="001", first=cut, end=count, start="cold", begins="cut")]  # fmt: skip
+    plan = WindowsRecord(source="", frames=count, overlap=8, chain=1, windows=both)
+    scene = WindowedScene(open_windows(cold_run).record, run=cold_run, plan=plan)
+    times = [np.arange(window.count) / window.count for window in both]
+    vars(scene).update(_times=times, window=lambda k: SimpleNamespace(at=lambda time, taken_out: (k, time)))
+    assert scene.at(cut / count) == (1, 0.0)
+    assert scene.at((cut - 1) / count) == (0, (cut - 1) / cut) and scene.at(1.0) == (1, 1.0)
 
 
 def test_the_scene_is_continuous_where_an_overlap_begins_and_ends(scene):
@@ -202,6 +217,8 @@ def test_one_time_is_exported_and_what_holds_one_set_of_gaussians_is_refused(col
     assert (tmp_path / "a.ply").stat().st_size > 10_000
     assert main(["export", str(cold_run), "--out", str(tmp_path / "model.npz")]) == 2
     assert str(cold_run / "windows" / "000") in capsys.readouterr().err
+    assert main(["tradeoff", "--run", str(cold_run), "--out", str(tmp_path / "tradeoff")]) == 2
+    assert f"allowed: a window, such as {cold_run / 'windows' / '000'}" in capsys.readouterr().err
     assert main(["export", str(cold_run / "windows" / "000"), "--out", str(tmp_path / "model.npz")]) == 0
 
 

@@ -8,6 +8,7 @@ import pytest
 from small_recording import write_recording
 
 from endotsr.cli.main import main
+from endotsr.cli.parts.windows import seam_line
 
 SMALL = [
     "--preset", "demo", "--iterations", "6", "--initialisation.first-frame-points", "200", "--density.maximum", "400",
@@ -89,3 +90,15 @@ def test_frames_without_tissue_and_a_cut_are_one_line_each(tmp_path, capsys):
     ):
         assert said.count(line) == 1, said
     assert said.count("30:42") == said.count("cut:") == 1
+
+
+def test_flicker_is_said_of_a_recording_without_seams():
+    """Between cuts there is none, and the flicker inside was not printed."""
+    alone = {"seams": None, "inside": 1.342, "ratio": None}
+    both = {"seams": 3.0, "inside": 1.5, "ratio": 2.0}
+    none = {"seams": None, "inside": None, "ratio": None}
+    line = lambda model, recorded: seam_line(
+        {"seam_frames": 0, "inside_frames": 9, "model": model, "recorded": recorded}
+    ).partition(": ")[2]
+    assert line(alone, none) == "model 1.34 inside; recorded frames not measured"
+    assert line(both, alone) == "model 3.00 at seams, 1.50 inside (ratio 2.00); recorded frames 1.34 inside"

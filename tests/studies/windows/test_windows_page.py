@@ -125,6 +125,15 @@ def test_the_browser_draws_windows_and_their_blend_as_the_reference_does(written
 
 
 @pytest.mark.slow
+def test_a_page_loads_its_windows_under_any_name(written, tmp_path):
+    """A number sign begins the fragment of an address, and a percent sign an escaped character."""
+    browser()
+    file = tmp_path / "case #3, 50%20 & more.html"
+    write_windows_page(file, written[0], "a", 4)
+    assert re.search(r'id="failure" hidden', dom(file, "t=0.9"))
+
+
+@pytest.mark.slow
 def test_a_window_that_is_missing_is_named_and_the_others_are_shown(written):
     browser()
     _, file, _ = written

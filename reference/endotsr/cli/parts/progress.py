@@ -134,9 +134,10 @@ class Progress:
             self._bar.close()
 
     def _state(self, entry: LogEntry, left: str | None) -> str:
-        shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
+        quantities = (("loss", "loss {:.4f}"), ("psnr", "PSNR {:.2f} dB"))
+        shown = [words.format(self._means[name]) for name, words in quantities if name in self._means]
         time_left = "time left unknown" if left is None else f"{left} left"
-        return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left}"
+        return ", ".join([*shown, f"{entry.get('gaussians', 0)} Gaussians", time_left])
 
     def _left(self, standing: Standing) -> str | None:
         seconds = self.time_left.seconds(standing)

@@ -65,7 +65,7 @@ def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = 
         print(_row(row))
     if "held_out" in metrics:
         print(held_out_table(metrics))
-    print(_seam_line(metrics["seams"]))
+    print(seam_line(metrics["seams"]))
     for gap in metrics["left_out"]:
         print(f"left out: frames {gap['first']}:{gap['end']}: {gap['reason']}")
     return metrics
@@ -80,10 +80,12 @@ def _row(row: "WindowRow") -> str:
     return ", ".join([*words, "no held-out frame" if psnr is None else f"PSNR tissue {psnr:.2f} dB"])
 
 
-def _seam_line(seams: "Seams") -> str:
+def seam_line(seams: "Seams") -> str:
+    """Flicker of model and recording in one line, with the places that have frames."""
+
     def shown(values: "Flicker") -> str:
-        if values["ratio"] is None:
-            return "not measured"
-        return f"{values['seams']:.2f} at seams, {values['inside']:.2f} inside (ratio {values['ratio']:.2f})"
+        places = (("at seams", values["seams"]), ("inside", values["inside"]))
+        found = ", ".join(f"{value:.2f} {where}" for where, value in places if value is not None) or "not measured"
+        return found if values["ratio"] is None else f"{found} (ratio {values['ratio']:.2f})"
 
     return f"flicker, grey levels: model {shown(seams['model'])}; recorded frames {shown(seams['recorded'])}"

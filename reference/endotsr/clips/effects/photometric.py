@@ -3,7 +3,8 @@
 The frames are first warped onto the reference frame along their flow. g is the log ratio of the mean colours of a tile
 in two frames, without saturated and dark pixels. The gain of a frame is the median over the tiles. An F test compares
 its variance between frames with the scatter of the tiles. The residual of a tile is local change if smooth courses over
-time explain it (F test with Bonferroni correction over the tiles).
+time explain it (F test with Bonferroni correction over the tiles). With fewer than four tiles that most frames show,
+nothing can be compared: the verdict is then "unknown", and a change is assumed.
 """
 
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from endotsr.clips.effects.frames import (
 )
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.tracks import FlowTracks
-from endotsr.clips.effects.verdict import Curve, EffectVerdict, Map, sentence
+from endotsr.clips.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map, sentence
 from endotsr.method.kernels.arrays import BoolArray, FloatArray, IndexArray
 
 DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside this range are not compared
@@ -49,7 +50,7 @@ def photometric_verdict(clip: ReducedFrames, tracks: FlowTracks, noise: Noise, m
     """The verdict on changes of light."""
     ratios = colour_ratios(clip, tracks, noise)
     if ratios.values.shape[2] < LEAST_TILES:
-        return _nothing("Fewer than four tiles of tissue are visible in all frames: light cannot be compared.")
+        return _unknown("Fewer than four tiles of tissue are visible in most frames; a change of light is assumed.")
     gain = np.median(ratios.values, axis=2)
     level = float(np.median(ratios.level))
     error = _error_of_median(ratios)
@@ -72,7 +73,7 @@ def photometric_verdict(clip: ReducedFrames, tracks: FlowTracks, noise: Noise, m
 
 
 def colour_ratios(clip: ReducedFrames, tracks: FlowTracks, noise: Noise) -> Ratios:
-    """Log ratios of the mean colours of the tiles that every frame sees."""
+    """Log ratios of the mean colours of the tiles that most frames see; gaps are interpolated in time."""
     reference = clip.reference
     start = clip.images[reference]
     rows = []
@@ -141,8 +142,8 @@ def _range(course: FloatArray) -> float:
     return float(high - low)
 
 
-def _nothing(reason: str) -> EffectVerdict:
-    return EffectVerdict("photometric", False, "none", 0.0, 1.0, "times the threshold",
+def _unknown(reason: str) -> EffectVerdict:
+    return EffectVerdict("photometric", True, UNKNOWN, 1.0, 1.0, "times the threshold",
                          "variance of the gain of the frames", ALARM, reason)  # fmt: skip
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from endotsr.clips.effects.inspect import Inspection
 from endotsr.clips.effects.savings import memory_fraction, time_fraction
+from endotsr.clips.effects.verdict import UNKNOWN
 from endotsr.clips.effects.views import harmonic_sizes
 from endotsr.config import Config, config_from_dict
 from endotsr.method.equations.dictionary import AtomReport, frequencies, report_atoms
@@ -163,8 +164,13 @@ def carried(inspection: Inspection, config: Config) -> Dictionary:
 
 
 def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Config) -> tuple[bool, str]:
-    """Whether a rate requires the Fourier translation, or any motion if tracks initialise it (B15)."""
+    """Whether a rate requires the Fourier translation, or any motion if tracks initialise it (B15).
+
+    Motion that is assumed may have a rate.
+    """
     motion = inspection.verdicts["motion"]
+    if motion.kind == UNKNOWN:
+        return True, motion.reason
     if motion.present and config.initialisation.motion != "none":
         return True, f"{motion.reason[:-1]}: the Gaussians start with the motion that flow shows."
     periodic = any(line.cycles <= dictionary.frequency_max for line in inspection.lines)
@@ -184,7 +190,7 @@ def _remarks(inspection: Inspection) -> tuple[str, ...]:
     camera, motion = verdicts["camera motion"], verdicts["motion"]
     if camera.present and camera.false_positive_rate is None:
         said.append("The camera moves, but its poses do not: a training takes its motion for motion of the tissue.")
-    if motion.present:
+    if motion.present and motion.kind != UNKNOWN:
         waves = motion.details["half_waves"]
         said.append(f"{waves} half waves over time hold 99 % of the motion; a time base resolves about one.")
     if verdicts["highlights"].present:

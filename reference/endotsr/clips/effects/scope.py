@@ -13,7 +13,7 @@ from endotsr.clips.poses.movement import DRIFT, LEAST_FLOW, MOVING, STILL, Movem
 from endotsr.clips.poses.views import Views, known_depth, small_views
 from endotsr.clips.sequences.read import NOT_METRIC
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.method.splatting.camera import camera_centre
+from endotsr.method.splatting.camera import camera_centre, degrees_between
 
 LEAST_POSE_CHANGE = 1e-9  # scene units, and elements of the rotation
 KINDS = {"moving": "moving", "still": "none", "unclear": UNKNOWN}
@@ -30,11 +30,12 @@ def camera_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     if sequence.static_camera or spread <= LEAST_POSE_CHANGE:
         return _seen_verdict(sequence)
     path = np.linalg.norm(centres - centres[0], axis=1)
+    turned = max(degrees_between(turn, turns[0]) for turn in turns)
     curve = Curve(f"distance from the first pose, {sequence.unit}", "time", clip.times, {"camera": path})
-    return EffectVerdict("camera motion", True, "moving", spread, LEAST_POSE_CHANGE, sequence.unit,
-                         "largest difference of two poses", 0.0,
-                         f"The camera moves by up to {path.max():.3g} {sequence.unit}.",
-                         {"largest_shift": float(path.max())}, curve)  # fmt: skip
+    return EffectVerdict("camera motion", True, "moving", spread, LEAST_POSE_CHANGE,
+                         f"{sequence.unit}, and elements of the rotation", "largest difference of two poses", 0.0,
+                         f"The camera moves by up to {path.max():.3g} {sequence.unit} and turns by up to {turned:.2f}"
+                         " degrees.", {"largest_shift": float(path.max()), "largest_turn": turned}, curve)  # fmt: skip
 
 
 def _seen_verdict(sequence: Sequence) -> EffectVerdict:

@@ -6,6 +6,7 @@ frame is checked, on a grid of rays and at the central points of each effect.
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -32,35 +33,44 @@ Points = Callable[[SimulatorSettings], FloatArray]
 
 def check_field_of_view(settings: SimulatorSettings) -> None:
     """Raises InputError if an effect leaves the picture or the camera sees beyond the simulated tissue."""
-    for fits, sizes in _requirements(settings):
-        _require(fits, settings, sizes)
+    for needed in _requirements(settings):
+        _require(needed, settings)
 
 
-def _requirements(settings: SimulatorSettings) -> list[tuple[Fits, list[tuple[str, str]]]]:
-    """The conditions, each with the sizes (section, key) that may violate it."""
+class Requirement(NamedTuple):
+    """A condition, the sizes (section, key) that may violate it, and what helps if none of them does alone."""
+
+    fits: Fits
+    sizes: list[tuple[str, str]]
+    remedy: str = "a smaller focal"
+
+
+def _requirements(settings: SimulatorSettings) -> list[Requirement]:
     moving = [(name, "amplitude") for name in ("camera_motion", "pull", "pulsation", "breathing")]
     effects = [
-        (partial(_points_fit, points=points), [(section, key), *moving])
+        Requirement(partial(_points_fit, points=points), [(section, key), *moving])
         for section, (key, points) in ABOUT.items()
         if getattr(settings, section).on
     ]
-    return [*effects, (_wrists_fit, [("instrument", "travel")]), (_tissue_fits, moving)]
+    wrists = Requirement(_wrists_fit, [("instrument", "travel")], "fewer instruments")
+    return [*effects, wrists, Requirement(_tissue_fits, moving, "a larger focal, a smaller relief")]
 
 
 def _all_fit(settings: SimulatorSettings) -> bool:
-    return all(fits(settings) for fits, _ in _requirements(settings))
+    return all(needed.fits(settings) for needed in _requirements(settings))
 
 
-def _require(fits: Fits, settings: SimulatorSettings, sizes: list[tuple[str, str]]) -> None:
+def _require(needed: Requirement, settings: SimulatorSettings) -> None:
     """Raises InputError if the condition fails, naming the first size (section, key) whose removal satisfies it."""
-    if fits(settings):
+    if needed.fits(settings):
         return
-    for section, key in sizes:
+    for section, key in needed.sizes:
         without = _changed(settings, section, key, SMALLEST)
-        if fits(without):
-            raise _refusal(settings, section, key, _all_fit if _all_fit(without) else fits)
-    tried = ", ".join(f"{section}.{key}" for section, key in sizes)
-    raise InputError(f"simulator: the scene leaves the field of view; allowed: a smaller focal, or smaller {tried}")
+        if needed.fits(without):
+            raise _refusal(settings, section, key, _all_fit if _all_fit(without) else needed.fits)
+    tried = dict.fromkeys(f"{section}.{key}" for section, key in needed.sizes if getattr(settings, section).on)
+    smaller = f", or smaller {', '.join(tried)}" if tried else ""
+    raise InputError(f"simulator: the scene leaves the field of view; allowed: {needed.remedy}{smaller}")
 
 
 def _slit_ends(settings: SimulatorSettings) -> FloatArray:

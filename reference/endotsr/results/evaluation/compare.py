@@ -12,10 +12,12 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.results.evaluation.records import EvaluationRecord, FrameMetrics, RunEvaluation
+from endotsr.untrusted.json import number
 
 RESAMPLES = 9999
 CONFIDENCE = 0.95
 SMALLER_IS_BETTER = ("lpips", "lpips_symmetric")
+ABOUT = ("frame", "name", "time")  # keys of a frame that are no metrics
 
 
 class Method(NamedTuple):
@@ -49,7 +51,7 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
     """The method of one metrics.json, optionally with its baselines.
 
     where   the file, for messages
-    Raises: InputError if the dictionary is not from `endotsr evaluate`.
+    Raises: InputError if the dictionary is not from `endotsr evaluate`, or if a metric is no number.
     """
     try:
         hashes = _hashes(metrics)
@@ -61,6 +63,7 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
         for method in methods:
             _frames(method)
             _about(method)
+            _refuse_no_number(method, where)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
     return methods
@@ -117,6 +120,14 @@ def _frames(method: Method) -> list[int]:
 def _about(method: Method) -> str:
     names = [row["name"] for row in method.per_frame]
     return f"{len(names)} frames" + (f" from {names[0]} to {names[-1]}" if names else "")
+
+
+def _refuse_no_number(method: Method, where: object) -> None:
+    """Raises InputError for a metric of a frame that is neither a finite number nor null."""
+    for row in method.per_frame:
+        for key, value in row.items():
+            if key not in ABOUT and value is not None:
+                number(value, f"{where}: frame {row['frame']}: {key}")
 
 
 def _column(method: Method, metric: str) -> FloatArray:

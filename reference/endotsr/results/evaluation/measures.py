@@ -106,8 +106,12 @@ def flicker(sequence: Sequence, render: RenderView) -> Measured:
 
 
 def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int], FloatArray]) -> MeasureRow:
-    values = np.stack([frame(i)[:, static].astype(np.float64) for i in range(sequence.count)])
-    squares = np.square(values[:-2] - 2 * values[1:-1] + values[2:]).mean(axis=(1, 2)) / 6  # of frames 1 .. n - 2
+    values = (frame(i)[:, static].astype(np.float64) for i in range(sequence.count))
+    last, now, found = next(values), next(values), []
+    for after in values:  # three frames at a time: a long clip does not fit in memory
+        found.append(np.square(last - 2 * now + after).mean() / 6)
+        last, now = now, after
+    squares = np.array(found)  # of frames 1 .. n - 2
     held_out = [int(i) - 1 for i in sequence.test_index if 0 < i < sequence.count - 1]
     inside = float(np.sqrt(squares[held_out].mean()) * LEVELS) if held_out else None
     return {"label": label, "all_frames": float(np.sqrt(squares.mean()) * LEVELS), "held_out": inside}

@@ -90,7 +90,7 @@ def chart_png(chart: Chart, theme: str, dots: int = 220) -> bytes:
     """One chart as a PNG file with a transparent background, 4.4 x 2.75 inches."""
     figure = new_figure(4.4, 2.75, constrained=False)
     figure.subplots_adjust(left=0.13, right=0.93, top=0.97, bottom=0.17)
-    _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
+    draw_chart(figure.add_subplot(), chart, THEMES[theme], title=False)
     return encoded(figure, "png", dots, transparent=True)
 
 
@@ -108,16 +108,26 @@ def curves_png(log: LogEntries, evaluation: EvaluationRecord | None = None) -> b
     rows = (len(found) + 1) // 2
     figure = new_figure(10.4, 3.3 * rows)
     for position, chart in enumerate(found):
-        _draw(figure.add_subplot(rows, 2, position + 1), chart, LIGHT, title=True)
+        draw_chart(figure.add_subplot(rows, 2, position + 1), chart, LIGHT, title=True)
     return encoded(figure)
 
 
-def _draw(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
+def draw_chart(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
+    """Draw a chart with names and legend; five or more curves have their names above them."""
     chart.draw(axes, theme)
     name_axes(axes, chart.along, title=chart.title if title else "", theme=theme)
     plain_axes(axes, theme)
-    if len(axes.get_legend_handles_labels()[1]) > 0:
-        legend(axes, theme, ncols=2 if len(axes.lines) > 4 else 1)
+    if len(axes.lines) > 4:  # no place between the curves is sure to be free
+        _leave_room_above(axes, 0.36)
+        legend(axes, theme, ncols=2, loc="upper left")
+    elif len(axes.get_legend_handles_labels()[1]) > 0:
+        legend(axes, theme)
+
+
+def _leave_room_above(axes: Any, fraction: float) -> None:
+    """Raise the upper end of the vertical axis, so that this fraction of the height is above the curves."""
+    (low, high), more = axes.get_ylim(), fraction / (1 - fraction)
+    axes.set_ylim(top=high * (high / low) ** more if axes.get_yscale() == "log" else high + (high - low) * more)
 
 
 def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: bool = True) -> None:

@@ -43,6 +43,7 @@ def chart_svg(
     low, high = min(ticks[0], float(values.min())), max(ticks[-1], float(values.max()))
     across = (WIDTH - LEFT - RIGHT) / max(end, 1.0)
     down = (HEIGHT - TOP - BOTTOM) / max(high - low, 1e-12)
+    apart = (WIDTH - LEFT - RIGHT) / len(shown)  # of the names
     parts = [_grid_line(HEIGHT - BOTTOM - down * (at - low), 10.0**at if logarithmic else at) for at in ticks]
     for number, (name, points) in enumerate(shown):
         colour, where = COLOURS[number % len(COLOURS)], points * [across, -down] + [LEFT, HEIGHT - BOTTOM + down * low]
@@ -51,7 +52,7 @@ def chart_svg(
         parts.append(
             f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2" stroke-linejoin="round"/>'
             f'<circle cx="{end_x:.1f}" cy="{end_y:.1f}" r="3.5" fill="{colour}"/>'
-            f'<text x="{LEFT + 170 * number}" y="14" fill="{colour}">{text(name)}</text>'
+            f'<text x="{LEFT + apart * number:.0f}" y="14" fill="{colour}">{text(name)}</text>'
         )
     parts.append(f'<text x="{LEFT}" y="{HEIGHT - 8}">0</text>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 8}" text-anchor="end">{unit} {end:.0f}</text>')

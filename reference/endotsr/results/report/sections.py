@@ -209,7 +209,7 @@ def components(data: ReportData) -> str:
     for row in found:
         ours, whole = row.get("psnr_tissue"), found[0].get("psnr_tissue")
         gain = None if ours is None or whole is None or row is found[0] else ours - whole
-        change = "" if gain is None else f"{gain:+.2f} dB"
+        change = "" if gain is None else f"{gain:+.2f} dB".replace("-", "&minus;")
         rows.append([parts.text(row["label"]), *(parts.number(row.get(key), n) for key, _, n in SHOWN), change])
     note = (
         "Means over all held-out frames, rendered from the trained model with the named residual set to zero. "

@@ -52,7 +52,8 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
     seconds = (times[-1] - times[0]) * duration
     if seconds <= 0:
         if slow is not None:
-            unknown = "the pictures are not in order of time" if duration else "the recording's frame rate is unknown"
+            order = "one picture has no speed" if len(times) < 2 else "the pictures are not in order of time"
+            unknown = order if duration else "the recording's frame rate is unknown"
             raise InputError(f"render: --slow {slow:g}: {unknown}; allowed: --rate, pictures per second")
         return UNKNOWN_RATE
     own = (len(times) - 1) / seconds

@@ -68,9 +68,15 @@ class Look(NamedTuple):
 
 
 def check_panels(panels: tuple[Panel, ...], views: list[PlannedView]) -> None:
-    """Raises InputError for no panels, and for truth or error in views that match no frame."""
+    """Raises InputError for no panels, for views of several sizes, and for truth or error in views that match no frame.
+
+    views   of a film, whose pictures have one size
+    """
     if not panels:
         raise InputError("render: --panels is empty; allowed: one or more of render, truth, error, depth, opacity")
+    sizes = [f"{width}x{height}" for width, height in dict.fromkeys((v.camera.width, v.camera.height) for v in views)]
+    if len(sizes) > 1:
+        raise InputError(f"render: --film: views of {', '.join(sizes[:3])}; allowed: one size (--size WIDTHxHEIGHT)")
     needed = [name for name in panels if name in NEEDS_TRUTH]
     moved = next((view for view in views if not view.exact), None)
     if needed and moved is not None:

@@ -241,7 +241,7 @@ function shows(time) {  // numbers of the windows at a time: none in a gap, two 
 function fetched(k) {  // a promise of window k
   if (!loaded.has(k)) loaded.set(k, about.windows ? new Promise((done, failed) => {
     const script = document.createElement("script");
-    script.src = spans[k].file;
+    script.src = spans[k].file.split("/").map(encodeURIComponent).join("/");
     script.onerror = () => failed(new Error(spans[k].file + " is missing; it must be next to the page."));
     window.endotsr_window = window.endotsr_window || {};
     window.endotsr_window[k] = (numbers, text) => part(numbers, text).then(done, failed);

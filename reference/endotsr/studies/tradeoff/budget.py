@@ -111,7 +111,11 @@ def _expectation(point: Point) -> list[str]:
 
 
 def settings_words(setting: SettingPart) -> str:
-    """The options of `endotsr train` for a setting."""
+    """The options of `endotsr train` for a setting.
+
+    They keep the clamp of `paper` for Gaussians far outside the picture (B3), which the swept settings do not have and
+    which no option changes.
+    """
     raster = setting["raster"]
     words = [
         f"--raster.alpha-cutoff {raster['alpha_cutoff']:.4g}",
@@ -121,6 +125,8 @@ def settings_words(setting: SettingPart) -> str:
     ]
     if raster["support"] == "everywhere":
         return f"--raster.preset exact --training.precision {setting['precision']}"
+    if raster["support"] == "three_sigma_tiles":
+        words.insert(0, "--raster.preset legacy")
     if setting["scale"] != 1:
         words.append(f"--scale {setting['scale']:g}")
     return " ".join(words)

@@ -7,7 +7,7 @@ from endotsr.results.report.style import encoded
 from endotsr.results.report.tables import html_table
 from endotsr.studies.tradeoff.budget import best_point, parse_budget, settings_words
 from endotsr.studies.tradeoff.figure import main_figure
-from endotsr.studies.tradeoff.results import DatedMeasurement, Measurement
+from endotsr.studies.tradeoff.results import DatedMeasurement, Measurement, Point
 from endotsr.studies.tradeoff.text import COLUMNS, LEVELS, front_rows, levels, made, milliseconds
 
 BUDGETS = ("60 fps", "30 fps", "1/255", "0.1/255")  # answered on the page; `--budget` answers any other
@@ -64,9 +64,14 @@ def _answers(result: Measurement) -> list[tuple[str, str]]:
             continue
         said = f"{point['name']}: largest error {levels(point['error']['max'])}, "
         said += f"{milliseconds(point['forward']['median'])} a frame"
-        words = f"<br><code>{parts.text(settings_words(point['setting']))}</code>"
-        answers.append((parts.text(text), parts.text(said) + words))
+        answers.append((parts.text(text), f"{parts.text(said)}<br><code>{_unbroken(point)}</code>"))
     return answers
+
+
+def _unbroken(point: Point) -> str:
+    """The options of a setting as HTML; a line ends between two of them, not within a name."""
+    first, *rest = settings_words(point["setting"]).split(" --")
+    return " ".join(f'<span class="whole">{parts.text(option)}</span>' for option in (first, *(f"--{o}" for o in rest)))
 
 
 def _escaped(rows: list[list[str]]) -> list[list[str]]:

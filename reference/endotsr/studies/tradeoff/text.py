@@ -6,13 +6,15 @@ LEVELS = 255.0  # levels of an 8-bit picture
 
 
 def levels(error: float) -> str:
-    """An error in 8-bit levels."""
-    return f"{error * LEVELS:.2g}/255"
+    """An error in 8-bit levels: two digits, or whole levels."""
+    found = error * LEVELS
+    return f"{found:.0f}/255" if found >= 99.5 else f"{found:.2g}/255"
 
 
 def milliseconds(seconds: float) -> str:
-    """A time in milliseconds as text."""
-    return f"{seconds * 1e3:.3g} ms"
+    """A time in milliseconds as text, with three digits."""
+    digits = f"{seconds * 1e3:.3g}"
+    return f"{float(digits):.0f} ms" if "e+" in digits else f"{digits} ms"
 
 
 def small(number: float) -> str:
@@ -45,9 +47,9 @@ def _row(point: Point) -> list[str]:
 def made(result: DatedMeasurement) -> str:
     """A sentence with date, machine, version and scene of the measurement."""
     processor, cores = (result["machine"].get(key) for key in ("processor", "cores"))
-    about = result["scene"]
+    about, threads = result["scene"], result["threads"]
     return (
-        f"Measured {result['date'][:10]} on {result['threads']} threads of {processor} ({cores} cores), "
+        f"Measured {result['date'][:10]} on {threads} thread{'s' * (threads != 1)} of {processor} ({cores} cores), "
         f"endotsr {result['versions']['endotsr']}; medians of {result['repeats']} warm runs. Scene: {about['about']}, "
         f"{about['gaussians']} Gaussians at {about['width']}x{about['height']}."
     )

@@ -81,6 +81,14 @@ class WindowedScene(MovingScene):
             chosen.append(found[k][g - self.plan.windows[k].first])
         return chosen
 
+    def frame_at(self, time: float) -> float:
+        """The frame at a time of the recording; exactly g at the time g / G of a frame.
+
+        The product of g / G and G may be less than g by rounding, which is the window before a cut.
+        """
+        g = time * self.plan.frames
+        return round(g) if round(g) / self.plan.frames == time else g
+
     def parts(self, g: float) -> list[WindowPart]:
         """The windows at frame g, not necessarily an integer. Raises InputError if there is none.
 
@@ -124,13 +132,13 @@ class WindowedScene(MovingScene):
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
         """As `MovingScene.render`, blended in an overlap."""
-        parts = [part for part in self.parts(time * self.plan.frames) if part.weight > 0]
+        parts = [part for part in self.parts(self.frame_at(time)) if part.weight > 0]
         renders = [self.window(part.window).render(part.time, camera, taken_out) for part in parts]
         return blended(renders, [part.weight for part in parts])
 
     def at(self, time: float, taken_out: tuple[str, ...] = ()) -> DeformedScene:
         """The deformed Gaussians of the window with the larger weight: two sets would occlude each other."""
-        g = time * self.plan.frames
+        g = self.frame_at(time)
         k = self.owner(g)
         return self.window(k).at(self.local_time(k, g), taken_out)
 
