@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Masks, Picture, PicturePair
+from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import stated_masks
 from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
@@ -178,9 +179,11 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
         return old._replace(cx=old.cx - x, cy=old.cy - y, width=width, height=height)
 
     masks, depth, calibration = clip.masks, clip.depth, clip.calibration
+    size = (camera.width, camera.height) if camera else (width, height)  # without a camera, the clip is refused later
     return replace(
         clip,
         pictures=pictures,
+        crop=(clip.crop or Crop(0, 0, *size, *size)).cropped(window, *size),
         masks=None if masks is None else replace(masks, read=partial(part, masks.read, "masks"), files=[]),
         depth=None if depth is None else replace(depth, read=partial(part, depth.read, "depth"), files=[]),
         intrinsics=None if clip.intrinsics is None else intrinsics(clip.intrinsics),

@@ -22,6 +22,7 @@ from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.choices import Border, DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.sequences.clip import Clip, PicturePair
+from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import (
     chosen_frames,
@@ -180,7 +181,7 @@ def _write_frames(
         on_frame(k + 1, len(chosen))
     assert straight is not None
     where = str(clip.where)
-    of_cameras = intrinsics_findings(straight.intrinsics, where)
+    of_cameras = intrinsics_findings(straight.intrinsics, where, clip.crop)
     of_cameras += baseline_findings(straight.baseline, clip.arbitrary, where)
     notes += notes_of(frame_findings(facts, where) + of_cameras)
     notes += seen.notes(clip, settings.border)
@@ -272,7 +273,7 @@ def _file_of(
     return SequenceFile(
         format=FORMAT,
         frames=len(chosen),
-        camera=camera_entry(straight.intrinsics, straight.baseline),
+        camera=camera_entry(straight.intrinsics, straight.baseline, clip.crop),
         source=f"{clip.where.absolute().name} ({clip.layout})",
         unit=unit,
         frame_rate=rate,
@@ -299,12 +300,14 @@ def _source_names(clip: Clip, chosen: list[int]) -> list[str] | None:
     return None if names == [f"{k:06d}" for k in range(len(chosen))] else names
 
 
-def camera_entry(intrinsics: Intrinsics, baseline: float | None) -> CameraEntry:
+def camera_entry(intrinsics: Intrinsics, baseline: float | None, crop: Crop | None = None) -> CameraEntry:
     """The section [camera] of intrinsics without distortion."""
+    window = [round(float(value), 6) for value in crop or ()]
     fx, fy, cx, cy = (float(value) for value in (intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy))
     return CameraEntry(
-        width=intrinsics.width, height=intrinsics.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
-    )
+        width=intrinsics.width, height=intrinsics.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0),
+        crop=window[:4], crop_of=window[4:],
+    )  # fmt: skip
 
 
 def pose_row(pose: CameraPose) -> list[float]:
