@@ -35,13 +35,22 @@ class Crop(NamedTuple):
             round(self.of_width), round(self.of_height),
         )  # fmt: skip
 
-    def cropped(self, window: tuple[int, ...], width: int, height: int) -> "Crop":
-        """A window x, y, width, height of pictures of width x height pixels that show this window."""
-        across, down = self.width / width, self.height / height
-        x, y, wide, high = window
-        return Crop(
-            self.x + x * across, self.y + y * down, wide * across, high * down, self.of_width, self.of_height
-        )  # fmt: skip
+
+def crop_within(window: tuple[int, ...], camera: Intrinsics | None, crop: Crop | None) -> Crop | None:
+    """The window x, y, width, height of pictures that already show a crop of others; None without a camera.
+
+    Raises:  InputError for an empty window.
+    """
+    if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
+        raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
+    if camera is None:
+        return None
+    whole = crop or Crop(0, 0, camera.width, camera.height, camera.width, camera.height)
+    across, down = whole.width / camera.width, whole.height / camera.height
+    x, y, width, height = window
+    return whole._replace(
+        x=whole.x + x * across, y=whole.y + y * down, width=width * across, height=height * down
+    )  # fmt: skip
 
 
 def stated_crop(crop: list[float], crop_of: list[float], where: object) -> Crop | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Masks, Picture, PicturePair
-from endotsr.clips.sequences.crop import Crop
+from endotsr.clips.sequences.crop import crop_within
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import stated_masks
 from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
@@ -149,10 +149,9 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     Raises:  InputError for an empty window. A window beyond the pictures, and a picture or depth of another size than
              the camera, are refused when they are read.
     """
-    if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
-        raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
-    x, y, width, height = window
     camera = clip.calibration.left if clip.calibration else clip.intrinsics
+    crop = crop_within(window, camera, clip.crop)
+    x, y, width, height = window
 
     def cut(plane: NDArray, what: str, i: int) -> NDArray:
         size, part = plane.shape[1::-1], plane[y : y + height, x : x + width]
@@ -179,11 +178,10 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
         return old._replace(cx=old.cx - x, cy=old.cy - y, width=width, height=height)
 
     masks, depth, calibration = clip.masks, clip.depth, clip.calibration
-    size = (camera.width, camera.height) if camera else (width, height)  # without a camera, the clip is refused later
     return replace(
         clip,
         pictures=pictures,
-        crop=(clip.crop or Crop(0, 0, *size, *size)).cropped(window, *size),
+        crop=crop,
         masks=None if masks is None else replace(masks, read=partial(part, masks.read, "masks"), files=[]),
         depth=None if depth is None else replace(depth, read=partial(part, depth.read, "depth"), files=[]),
         intrinsics=None if clip.intrinsics is None else intrinsics(clip.intrinsics),
