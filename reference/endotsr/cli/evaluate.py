@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from endotsr.cli.parts.comparison import EvaluateOptions, compare_methods, shown_sequence
+from endotsr.cli.parts.evaluating import evaluating
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.errors import InputError
 from endotsr.training.runs.files import refuse_read_only, write_json
@@ -116,12 +117,14 @@ def evaluate_run(
     view: bool = True,
     measures: tuple[str, ...] = (),
     source: str | None = None,
+    wait: bool = False,
 ) -> "RunEvaluation":
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
 
     view       also write the viewer page linked from the report
     measures   names of `evaluation.measures.MEASURES`
     source     current location of the sequence; default: the recorded one
+    wait       wait while another process evaluates the run, in place of refusing
     """
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.measures import check_measures, measure_lines
@@ -136,10 +139,11 @@ def evaluate_run(
     check_measures(measures, "--measures")
     refuse_read_only(folder.path)
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
-    model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
-    scene = MovingScene(folder.sequence_record(), model, folder)
-    write_run_page(folder.path, scene, sequence if view else None)
-    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
+    with evaluating(folder, wait=wait):
+        model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
+        scene = MovingScene(folder.sequence_record(), model, folder)
+        write_run_page(folder.path, scene, sequence if view else None)
+        write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):
         print(line)

@@ -55,7 +55,7 @@ from endotsr.clips.sequences.straighten import Straightener, straightener
 from endotsr.clips.sequences.trajectory import filled
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.untrusted.writing import new_folder
+from endotsr.untrusted.writing import leftover_notes, new_folder
 
 LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers
 OnFrame = Callable[[int, int], None]
@@ -99,6 +99,7 @@ def prepare(
     refuse_no_lengths(clip, chosen)
     if not chosen:
         raise InputError(f"{clip.where}: no frame is left")
+    notes += leftover_notes(Path(out))
     with new_folder(Path(out), FILE_NAME if replace else "", WRITTEN) as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
