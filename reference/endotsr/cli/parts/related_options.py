@@ -194,6 +194,7 @@ RELATIONS: dict[str, tuple[Relation, ...]] = {
     "export": EXPORT,
     "evaluate": EVALUATE,
     "tradeoff": TRADEOFF,
+    "golden run": (Needs(("name",), ("certificate",), "it is the name of the port in the certificate"),),
 }
 # Options that only permit something: without an occasion they change nothing.
 PERMISSIONS = {
