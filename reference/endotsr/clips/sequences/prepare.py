@@ -165,6 +165,7 @@ def _write_frames(
             height, width = pair.left.shape[:2]
             straight = straightener(clip, width, height, settings.scale)
             notes += straight.notes
+            notes += _unchanged(settings.scale, width, height, straight)
         new = _checked(clip, i, pair, straight)
         facts.append(frame_facts(clip.names[i], new.left))
         _write_pictures(folder, k, new, settings.pictures)
@@ -193,6 +194,13 @@ def _write_frames(
     masks = mask_entry(clip, folder, len(chosen), seen, settings.border, notes)
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(clip, straight, turned, chosen, masks, depth_scale, settings, notes)
+
+
+def _unchanged(scale: float, width: int, height: int, straight: Straightener) -> list[str]:
+    """A note on a scale that rounds to the size of the pictures."""
+    if scale == 1 or (straight.intrinsics.width, straight.intrinsics.height) != (width, height):
+        return []
+    return [f"--scale {scale:g} changes nothing: pictures of {width}x{height} pixels keep their size"]
 
 
 def _checked(clip: Clip, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
@@ -267,7 +275,7 @@ def _file_of(
     if (clip.depth or clip.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
     method = clip.depth.method if clip.depth else f"points, {settings.points}"
-    clipped = list(CLIPPED) if clip.depth and (settings.scale < 1 or clip.depth.clipped) else []
+    clipped = list(CLIPPED) if clip.depth and (straight.resized or clip.depth.clipped) else []
     assumed = clip.depth.assumed if clip.depth else ""
     entry = DepthEntry(unit=unit, scale=depth_scale or 1.0, clipped=clipped, method=method, assumed=assumed)
     times, rate = written_times(clip, chosen, settings.rate, notes)
