@@ -8,7 +8,9 @@ from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import CameraEntry, read_sequence_file
+from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
 CORNER = ("--crop", "0", "0", "16", "16")  # of 32x24 with the axis at (15, 13), which the window moves off its centre
@@ -29,9 +31,6 @@ def test_a_crop_is_recorded_and_leads_to_no_warning(tmp_path, capsys):
 
 
 def test_a_training_is_not_warned_of_a_crop(tmp_path):
-    from endotsr.clips.sequences.read import read_sequence
-    from endotsr.config import SequenceConfig
-
     written(tmp_path / "clip")
     prepared(tmp_path / "clip", tmp_path / "part", *CORNER)
     notes = read_sequence(tmp_path / "part", SequenceConfig()).notes
@@ -79,6 +78,15 @@ def test_a_scale_that_changes_no_size_clips_no_depth(tmp_path, capsys, scale, si
     assert (found.camera.width, found.camera.height) == size and found.depth.clipped == clipped
     same = f"--scale {scale} changes nothing: pictures of {WIDTH}x{HEIGHT} pixels keep their size"
     assert (same in capsys.readouterr().out) == (clipped == [])
+
+
+def test_a_scale_of_a_training_that_changes_no_size_is_told(tmp_path):
+    written(tmp_path / "clip")
+    whole, same = (read_sequence(tmp_path / "clip", SequenceConfig(scale=scale)) for scale in (1.0, 0.99))
+    assert any("scale 0.99 changes nothing" in note for note in same.notes)
+    assert not any("scaled to" in note for note in same.notes)
+    for name in ("images", "masks", "depth"):
+        assert (getattr(whole, name) == getattr(same, name)).all()
 
 
 @pytest.mark.parametrize(

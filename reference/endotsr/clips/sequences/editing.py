@@ -19,6 +19,7 @@ from endotsr.clips.sequences.sources import stated_masks
 from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.names import counted
 
 ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
@@ -220,7 +221,7 @@ def paired_by_time(clip: Clip, late: int) -> Clip:
                 turn = next(waiting, None)
 
     way = "late" if late > 0 else "early"
-    note = f"right view taken as {_frames(abs(late))} {way}: frame i is paired with right picture i {late:+d}"
+    note = f"right view taken as {counted(abs(late), 'frame')} {way}: frame i is paired with right picture i {late:+d}"
     return replace(clip, pictures=pictures, right=[], notes=[*clip.notes, note])
 
 
@@ -228,12 +229,8 @@ def with_partner(clip: Clip, frames: list[int], late: int, notes: list[str]) -> 
     """The frames whose right picture, that of frame i + late, is in the clip. The others are noted."""
     kept = [i for i in frames if 0 <= i + late < clip.count]
     if len(kept) < len(frames):
-        notes.append(f"{_frames(len(frames) - len(kept))} without a right picture of their moment omitted")
+        notes.append(f"{counted(len(frames) - len(kept), 'frame')} without a right picture of their moment omitted")
     return kept
-
-
-def _frames(count: int) -> str:
-    return f"{count} frame{'s' * (count != 1)}"
 
 
 def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Clip:
