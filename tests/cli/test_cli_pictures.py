@@ -68,7 +68,7 @@ def test_evaluate_refuses_what_it_cannot_measure(finished_run, flow_pictures, tm
         assert_refused(capsys, words, "--sequence.*", "the settings of a run are fixed")
     words = ["evaluate", run, "--pictures", pictures]
     assert_refused(capsys, [*words, "--sequence.scale", "0.5"], "--sequence.*", "the settings of a run are fixed")
-    assert_refused(capsys, [*words, "--no-view"], "--no-view has no effect with --pictures")
+    assert_refused(capsys, [*words, "--no-view"], "--no-view with --pictures: no view.html is written")
     assert_refused(capsys, [*words, "--csv", str(tmp_path / "no" / "m.csv")], "m.csv: cannot be written")
     assert_refused(capsys, [*words[:-1], str(tmp_path)], f"{tmp_path}: contains no picture")
 
@@ -95,7 +95,7 @@ def test_a_single_run_is_compared_with_its_baselines(finished_run, capsys):
 
 def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp_path, capsys):
     run, pictures = str(finished_run), str(flow_pictures)
-    assert_refused(capsys, ["evaluate", "--compare"], "METHOD is missing")
+    assert_refused(capsys, ["evaluate", "--compare"], "--compare has no effect without methods")
     assert_refused(capsys, ["evaluate", "--compare", pictures], "--sequence is missing")
     assert_refused(capsys, ["evaluate", run, run], "two methods are called 'run'")
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "none.json")], "none.json: cannot be read")
@@ -103,13 +103,19 @@ def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp
     (fresh / "metrics.json").unlink()
     assert_refused(capsys, ["evaluate", run, str(fresh)], f"not evaluated yet; `endotsr evaluate '{fresh}'` writes")
     assert_refused(capsys, ["evaluate", "--compare", run, "--seed", "-1"], "--seed -1 is not allowed")
-    assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label with several methods")
-    assert_refused(capsys, ["evaluate", run, pictures, "--no-view"], "--no-view has no effect in a comparison")
+    assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label has no effect with several methods")
+    assert_refused(capsys, ["evaluate", run, pictures, "--no-view"], "--no-view has no effect with several methods")
+    assert_refused(capsys, ["evaluate", "--compare", run, "--no-view"], "--no-view with --compare: no view.html")
+    assert_refused(capsys, ["evaluate", "--compare", run, "--measures", "depth"], "--measures with --compare")
     for words in (["--lpips", "w.npz"], ["--sequence", run], ["--sequence.scale", "0.5"]):
         said = "has no effect: no METHOD is a folder of pictures"
         assert_refused(capsys, ["evaluate", "--compare", run, *words], words[0].split(".")[0], said)
     assert_refused(capsys, ["evaluate", run, "--label", "x"], "--label has no effect without --pictures")
-    assert_refused(capsys, ["evaluate", run, "--seed", "1"], "--seed has no effect without a comparison")
-    assert_refused(capsys, ["evaluate", run, "--no-baselines"], "--no-baselines has no effect without a comparison")
+    assert_refused(
+        capsys, ["evaluate", run, "--seed", "1"], "--seed has no effect without several methods or --compare"
+    )
+    assert_refused(
+        capsys, ["evaluate", run, "--no-baselines"], "--no-baselines has no effect without several methods or"
+    )
     (tmp_path / "m.json").write_text("{}")
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "m.json")], "m.json", "that `endotsr evaluate` wrote")

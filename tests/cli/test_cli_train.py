@@ -41,7 +41,16 @@ def resume(out):
 def test_run_folder_explains_itself(finished_run):
     names = {p.name for p in finished_run.iterdir()}
     expected = {"config.toml", "run.json", "sequence.json", "log.jsonl", "checkpoint.npz", "checkpoint.previous.npz"}
-    expected |= {"metrics.json", "renders", "curves.png", "report.html", "view.html", "test", "run.lock"}
+    expected |= {
+        "metrics.json",
+        "renders",
+        "curves.png",
+        "report.html",
+        "view.html",
+        "test",
+        "run.lock",
+        "evaluate.lock",
+    }
     assert names == expected | {"training.html"}
     record = RunFolder(finished_run).record()
     assert record["status"] == "finished" and record["iterations_done"] == LAST

@@ -7,6 +7,8 @@ must name the option.
 
 import contextlib
 import hashlib
+import importlib
+import inspect
 import io
 import itertools
 import shutil
@@ -24,11 +26,12 @@ from raw_sources import colmap
 from endotsr.cli.depth import DepthOptions
 from endotsr.cli.export import ExportOptions
 from endotsr.cli.main import main
+from endotsr.cli.parts.comparison import EvaluateOptions
 from endotsr.cli.parts.fields import fields_of
 from endotsr.cli.parts.options import base_settings
-from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.related_options import PERMISSIONS, RELATIONS
-from endotsr.cli.parts.relations import Needs
+from endotsr.cli.parts.parser import given_names, parse
+from endotsr.cli.parts.related_options import EVALUATE, PERMISSIONS, RELATIONS
+from endotsr.cli.parts.relations import Needs, check_relations
 from endotsr.cli.prepare import PrepareOptions
 from endotsr.cli.render import RenderOptions
 from endotsr.cli.train import TrainOptions
@@ -207,6 +210,36 @@ def test_no_pair_of_options_of_export_is_silent(finished_run, tmp_path):
         assert silent(["export", str(finished_run), "--out", str(tmp_path / name)], options, tmp_path / name) == [], (
             name
         )
+
+
+def test_terms_of_several_values_and_of_a_section():
+    """`evaluate` alone has them."""
+
+    def refused(*words: str, run: str = "of one training") -> str:
+        line = [*words]
+        try:
+            given = given_names(EvaluateOptions, line)
+            check_relations("evaluate", EVALUATE, parse(EvaluateOptions, line, "evaluate"), given, {"run": run})
+        except InputError as error:
+            return str(error)
+        return ""
+
+    assert "--no-view has no effect with several methods: no view.html" in refused("a", "b", "--no-view")
+    assert "--no-view has no effect with the run of windows" in refused("a", "--no-view", run="of windows")
+    assert "--measures has no effect with the run of windows" in refused("a", "--measures", "depth", run="of windows")
+    assert "--no-view with --pictures" in refused("a", "--pictures", "b", "--no-view")
+    assert "--sequence.* has no effect with methods" in refused("a", "--sequence.scale", "0.5")
+    assert "--compare has no effect without methods" in refused("--compare")
+    for allowed in (["a", "--no-view"], ["a", "b", "--seed", "1"], ["a", "b", "--sequence.scale", "0.5"]):
+        assert refused(*allowed) == ""
+    assert refused("--pictures", "b", "--sequence", "c", "--sequence.scale", "0.5", "--label", "mine") == ""
+
+
+@pytest.mark.parametrize("command", ["evaluate", "masks", "tradeoff"])
+def test_the_refusals_of_options_without_effect_stand_in_the_table(command):
+    text = Path(inspect.getfile(importlib.import_module(f"endotsr.cli.{command}"))).read_text(encoding="utf-8")
+    assert "has no effect" not in text and "needs --" not in text and f"{command}: --no-" not in text
+    assert command in RELATIONS
 
 
 # Options of `train` without a relation, and why they count in every combination that is accepted.

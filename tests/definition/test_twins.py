@@ -5,8 +5,13 @@ import pytest
 
 from endotsr.definition.calibration import calibrate as plain_calibrate
 from endotsr.definition.covariance import covariance_forward as plain_covariance
+from endotsr.definition.render import render_forward as plain_render
+from endotsr.definition.render import render_reverse as plain_reverse
 from endotsr.method.equations.calibration import calibrate
+from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.covariance import covariance_forward
+from endotsr.method.splatting.render import Scene, render_forward, render_reverse
+from endotsr.method.splatting.settings import PRESETS
 from endotsr.port.judge.store import golden_folder, read_golden
 from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.registry import all_stages
@@ -59,6 +64,24 @@ def test_a_view_whose_photometric_gradient_is_infinite_is_dropped_by_both():
     views = [("broken", np.inf, 1.0), ("right", 1.0, 2.0)]
     for function in (plain_calibrate, calibrate):
         assert function(views, 0.25).lambda_lap == 0.125 and function(views, 0.25).ratios.tolist() == [2.0]
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("preset, path", [("exact", "definition"), ("legacy", "definition"), ("paper", "blocks")])
+def test_an_opacity_that_is_no_number_is_seen_in_the_same_pixels(preset, path, dtype):
+    """Where its support reaches; the ellipse of `paper` has none. Before, the definition drew the Gaussian opaque."""
+    camera = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 40, 12)  # more than one tile of `legacy`
+    shape = (np.tile(np.eye(4)[:, :1], 4), np.full((3, 4), np.log(0.05)))
+    position = np.array([[0, 0.3, -0.5, 0.1], [0, 0.1, 0.2, 0.0], [4.0, 5.0, 6.0, 7.0]])
+    logits, colour = np.array([0.5, np.nan, 1.0, np.nan]), np.random.default_rng(1).normal(0, 0.3, (1, 3, 4))
+    scene = Scene(*(array.astype(dtype) for array in (position, *shape, logits, colour)))
+    given = [np.ones(size, dtype) for size in ((3, 12, 40), (12, 40), (12, 40))]
+    out, saved = render_forward(scene, camera, PRESETS[preset], degree=0, compositor=path)
+    plain, plain_saved = plain_render(scene, camera, PRESETS[preset], degree=0)
+    assert np.isnan(out.opacity).any() == (preset != "paper")
+    pairs = [*zip(out, plain), *zip(render_reverse(*given, saved)[:5], plain_reverse(*given, plain_saved)[:5])]
+    for found, expected in pairs:
+        np.testing.assert_allclose(found, expected, rtol=1e-9 if dtype == np.float64 else 1e-3, atol=1e-4)
 
 
 def test_a_log_scale_that_is_no_number_is_not_clipped_by_either():

@@ -1,12 +1,14 @@
 """Names from a file become the name of one file or nothing; text for a terminal holds no control character."""
 
 import pickle
+import re
+from pathlib import Path
 
 import pytest
 
 from endotsr.errors import InputError
 from endotsr.untrusted import names
-from endotsr.untrusted.names import LONGEST_NAME, file_name, plain_line, relative_path
+from endotsr.untrusted.names import LONGEST_NAME, counted, file_name, plain_line, relative_path
 
 GOOD = ["000000", "frame 1", "a-b_c.left", "Übersicht", "図1", "-rf", "x" * LONGEST_NAME, "console", "com"]
 GOOD += [] if names.os.name == "nt" else ["12:30:05"]  # Windows allows no colon
@@ -74,3 +76,12 @@ def test_no_message_of_unusable_input_can_move_the_cursor():
     error = InputError("a\x1b[2J.png: cannot be read\nsecond\u202eline")
     assert str(error) == "a\\u001b[2J.png: cannot be read\nsecond\\u202eline"
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+def test_a_count_has_its_plural_from_one_place():
+    """Before, nine modules had their own, and some said `1 frames`."""
+    assert [counted(n, "frame") for n in (0, 1, 2)] == ["0 frames", "1 frame", "2 frames"]
+    own = re.compile(r"""\{['"]s['"] (\*|if) """)
+    package = Path(names.__file__).parents[1]
+    found = [path.name for path in package.rglob("*.py") if own.search(path.read_text(encoding="utf-8"))]
+    assert found == ["names.py"]

@@ -84,13 +84,15 @@ def run(words: list[str]) -> int:
             write_json(options.json, records[0])
 
     if options.collect:
-        from endotsr.studies.sweeps.sweep import Inputs, planned
+        from endotsr.studies.sweeps.sweep import Inputs, lacking, planned
 
         refuse_folder(options.out)
         options.out.mkdir(parents=True, exist_ok=True)
         plan = planned(spec, options.out, Inputs(keep=False), retry=False)
         on_rows(list(plan.rows.values()))
         print(ablation_markdown(records[0]))
+        for line in lacking(plan):
+            print(line)
         return 0
     rows = run_spec(spec, options.out, place, options.retry, on_rows)
     print(ablation_markdown(records[0]))

@@ -12,6 +12,7 @@ from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.clips.sequences.choices import Align, Pairing
 from endotsr.clips.sequences.stereo_depth import StereoSettings
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 STEREO = StereoSettings()
 LARGEST_RATIO = 100.0  # farthest to nearest tissue
@@ -70,7 +71,7 @@ def run(words: list[str]) -> int:
     coverage, unit, step = report.coverage, report.file.depth.unit, report.file.depth.scale
     lowest = min(range(len(coverage)), key=lambda i: coverage[i])
     print(
-        f"depth of {len(coverage)} frames: {sum(coverage) / len(coverage):.1%} of the pixels on average,"
+        f"depth of {counted(len(coverage), 'frame')}: {sum(coverage) / len(coverage):.1%} of the pixels on average,"
         f" {coverage[lowest]:.1%} in frame {lowest}; median {report.median:.4g} {unit}, steps of {step:g}"
     )
     if report.note:

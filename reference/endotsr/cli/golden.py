@@ -171,17 +171,14 @@ def _verify(words: list[str]) -> int:
 
 
 def _report(report, golden, outdir: Path, options: _Reported) -> int:
-    from endotsr.port.judge.report import as_html, as_json, as_table
+    from endotsr.port.judge.report import as_table, write_report
 
     if report.first_wrong and options.search > 0:
         from endotsr.port.search.find import explain
 
         explain(golden, report, outdir, options.search)
     print(as_table(report, everything=options.all))
-    if options.json:
-        options.json.write_bytes(as_json(report))
-    if options.html:
-        options.html.write_text(as_html(report, golden, outdir), encoding="utf-8", newline="\n")
+    write_report(report, golden, outdir, options.json, options.html)
     return 0 if (report.accepted if options.only else report.passed) else 1
 
 

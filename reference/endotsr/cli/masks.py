@@ -9,6 +9,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 
 @dataclass
@@ -80,7 +81,7 @@ def run(words: list[str]) -> int:
     print(f"{options.sequence}: {proposal.reason}; {fraction:.1%} of the pixels are excluded")
     if proposal.without_tissue:
         named = shortened([str(i) for i in proposal.without_tissue])
-        print(f"warning: hardly any tissue is left in {len(proposal.without_tissue)} frames: {named}")
+        print(f"warning: hardly any tissue is left in {counted(len(proposal.without_tissue), 'frame')}: {named}")
     print(*said, sep="\n", end="\n" if said else "")
     print(f"these masks are proposals: inspect {place / OVERLAY} before training")
     if options.out is not None:

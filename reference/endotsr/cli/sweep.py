@@ -79,9 +79,11 @@ def ended(rows: "Rows", out: Path) -> int:
 
 
 def _list(spec: "Spec", out: Path, retry: bool) -> int:
-    from endotsr.studies.sweeps.sweep import Inputs, planned
+    from endotsr.studies.sweeps.sweep import Inputs, lacking, planned
 
     plan = planned(spec, out, Inputs(keep=False), retry)
     for job in plan.jobs:
         print(f"{plan.rows[job.name]['status']:<9} {job.config.training.iterations:>7} iterations  {job.name}")
+    for line in lacking(plan):
+        print(line)
     return 0

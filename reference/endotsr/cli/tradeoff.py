@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.parts.related_options import TRADEOFF
+from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import FOLDER, is_windowed
@@ -48,14 +50,12 @@ class TradeoffOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(TradeoffOptions, words, "tradeoff")
-    _refuse(options)
+    file = options.out / RESULT
+    _refuse(options, given_names(TradeoffOptions, words), file.exists())
     from endotsr.studies.tradeoff.budget import frame_advice, parse_budget
     from endotsr.studies.tradeoff.results import read_measurement
 
     budget = None if options.budget is None else parse_budget(options.budget)
-    file = options.out / RESULT
-    if file.exists():
-        _refuse_measured(options, given_names(TradeoffOptions, words))
     result = read_measurement(file) if file.exists() else _measure(options)
     if budget is not None:
         advice = frame_advice(result, budget)
@@ -64,28 +64,17 @@ def run(words: list[str]) -> int:
     return 0
 
 
-def _refuse(options: TradeoffOptions) -> None:
-    if options.run is not None and options.splats is not None:
-        raise InputError("tradeoff: --run with --splats is not allowed; allowed: one of them")
+def _refuse(options: TradeoffOptions, given: frozenset[str], measured: bool) -> None:
+    """Raises InputError for options without effect, a wrong scale, and a measurement that would be replaced."""
     if options.run is not None and is_windowed(options.run):
         one = options.run / FOLDER / "000"
         raise InputError(f"{options.run}: is a run of windows, each with its scene; allowed: a window, such as {one}")
-    if options.json is not None and options.budget is None:
-        raise InputError(f"tradeoff: --json needs --budget; the measurement itself is DIR/{RESULT}")
     if not 0 < options.scale <= 8:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
-
-
-def _refuse_measured(options: TradeoffOptions, given: frozenset[str]) -> None:
-    """Raises InputError for options of a new measurement in a folder that contains one."""
-    if options.budget is None:
+    folder = "with a measurement" if measured and options.budget is not None else "without a measurement"
+    check_relations("tradeoff", TRADEOFF, options, given, {"folder": folder})
+    if measured and options.budget is None:
         raise InputError(f"{options.out}: already contains a measurement; choose another --out, or use --budget")
-    for name in ("run", "splats", "scale", "threads"):
-        if name in given:
-            raise InputError(
-                f"{options.out}: already contains a measurement, from which --budget chooses: --{name} has no effect;"
-                f" choose another --out, or omit --{name}"
-            )
 
 
 def _measure(options: TradeoffOptions) -> "DatedMeasurement":

@@ -96,7 +96,7 @@ def run(words: list[str]) -> int:
     if options.evaluate:
         from endotsr.cli.evaluate import evaluate_run
 
-        found = evaluate_run(folder, sequence, lpips=options.lpips, source=options.sequence or None)
+        found = evaluate_run(folder, sequence, options.lpips, source=options.sequence or None, wait=True)
         shown.remember_evaluation()
         write_result(options.json, **found)
     return 0
@@ -120,7 +120,7 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
         plan_windows(options.sequence, options.out, config, options.windows or "", options.overlap, options.chain)
     code = train_windows(options.out, place)
     if options.evaluate and code == 0:
-        write_result(options.json, **evaluate_windows(options.out, options.lpips, options.sequence or None))
+        write_result(options.json, **evaluate_windows(options.out, options.lpips, options.sequence or None, wait=True))
     return code
 
 

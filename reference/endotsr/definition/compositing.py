@@ -78,8 +78,8 @@ def layers_of(projected, opacity_logit, settings, width, height):
         dx, dy = x - u[i], y - v[i]
         q = (c[i] * dx * dx - 2 * b[i] * dx * dy + a[i] * dy * dy) / projected.determinant[i]
         value = opacity[i] * np.exp(-q / 2)
-        alpha = np.where(value.real <= settings.alpha_max, value, settings.alpha_max)  # ruling "alpha clamp"
-        wanted = live & box & (alpha.real >= settings.alpha_cutoff)
+        alpha = np.where(value.real > settings.alpha_max, settings.alpha_max, value)  # ruling "alpha clamp"
+        wanted = live & box & ~(alpha.real < settings.alpha_cutoff)  # NaN is seen
         live = live & ~(wanted & ((t * (1 - alpha)).real < settings.transmittance_stop))
         layers.append(Layer(i, dx, dy, value, alpha, t, wanted & live))
         t = np.where(wanted & live, t * (1 - alpha), t)
@@ -110,7 +110,7 @@ def composite_reverse(d_colour, d_depth, d_opacity, saved):
     rest = (background[:, None, None] * d_colour).sum(axis=0)  # <g, R>: colour, depth and opacity behind the layer
     for i, dx, dy, value, alpha, front, taken in reversed(layers):
         own = np.einsum("c,chw->hw", colour[:, i], d_colour) + projected.depth[i] * d_depth + d_opacity
-        passes = taken & (value <= settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
+        passes = taken & ~(value > settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
         power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (9.3), (9.6)
         (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
         px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (9.7)

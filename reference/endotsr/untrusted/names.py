@@ -14,6 +14,11 @@ DECIMAL_COMMA = re.compile(r"(?:^|[\s;])-?\d+,\d+(?=$|[\s;])", re.MULTILINE)  # 
 REFUSED_ON_WINDOWS = '<>:"|?*'
 
 
+def counted(count: int, noun: str) -> str:
+    """A count with its noun, for a message: `1 frame`, `2 frames`."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def file_name(name: object, where: str) -> str:
     """`name` if it is a safe name for a file in a folder that the caller chose. Every name from a file passes here.
 

@@ -4,6 +4,7 @@ In: a path, and a function or block that writes. Out: the file or folder, in pla
 """
 
 import contextlib
+import glob
 import os
 import secrets
 import shutil
@@ -101,6 +102,17 @@ def _refuse_others(path: Path, written: tuple[str, ...]) -> None:
             f"{path}: is not replaced: it also holds {named}{more}, which would be lost; move it elsewhere, or choose"
             " another --out"
         )
+
+
+def leftover_notes(path: Path) -> list[str]:
+    """A note on folders and files that a killed process left beside `path` in place of writing it."""
+    found = sorted(plain_line(file.name) for file in path.parent.glob(f".partial-*-{glob.escape(path.name)}"))
+    if not found:
+        return []
+    return [
+        f"{', '.join(found)} in {path.absolute().parent}: left by a command that was stopped while it wrote"
+        f" {path.name}; it is not used, and can be deleted if no command writes there now"
+    ]
 
 
 def refuse_existing(path: Path) -> None:

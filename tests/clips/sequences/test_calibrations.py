@@ -58,6 +58,44 @@ def test_pictures_of_half_the_size_scale_a_calibration_that_says_its_size(tmp_pa
         calibrated(tmp_path / "a.yaml", 64, 64)
 
 
+@pytest.mark.parametrize(
+    ("of", "pictures"),
+    [
+        ((1920, 1080), (854, 480)),  # to even numbers
+        ((1920, 1080), (853, 480)),
+        ((1920, 1080), (640, 360)),  # exactly
+        ((1280, 1024), (426, 341)),
+        ((854, 480), (1920, 1080)),
+    ],
+)
+def test_a_size_that_differs_by_rounding_scales_a_calibration_and_is_told(of, pictures, tmp_path):
+    matrix = np.array([[1000.0, 0, of[0] / 2 - 0.5], [0, 1010.0, of[1] / 2 - 0.5], [0, 0, 1]])
+    (tmp_path / "a.yaml").write_text(ros(matrix, image_width=of[0], image_height=of[1]))
+    found = calibrated(tmp_path / "a.yaml", *pictures)
+    across, down = pictures[0] / of[0], pictures[1] / of[1]
+    expected = (1000 * across, 1010 * down, pictures[0] / 2, pictures[1] / 2, *pictures)
+    np.testing.assert_allclose(found.intrinsics[:6], expected)
+    sizes = "of {}x{} pixels, scaled to the {}x{} of the pictures".format(*of, *pictures)
+    assert [sizes in note for note in found.notes] == [True], found.notes
+    assert ("differ by rounding" in found.notes[0]) is (of[0] * pictures[1] != of[1] * pictures[0])
+
+
+@pytest.mark.parametrize(
+    ("of", "pictures"),
+    [((1920, 1080), (848, 480)), ((1920, 1080), (720, 480)), ((1280, 1024), (1280, 1020)), ((854, 480), (1920, 1088))],
+)
+def test_a_size_that_differs_by_more_than_rounding_is_refused(of, pictures, tmp_path):
+    (tmp_path / "a.yaml").write_text(ros(K, image_width=of[0], image_height=of[1]))
+    with pytest.raises(InputError, match="the calibration is of {}x{} pixels".format(*of)):
+        calibrated(tmp_path / "a.yaml", *pictures)
+
+
+def test_the_scaling_of_a_pair_is_told_once_and_none_where_the_sizes_are_equal(tmp_path):
+    (tmp_path / "a.yaml").write_text(kalibr(), encoding="utf-8")
+    assert calibrated(tmp_path / "a.yaml", *SIZE).notes == ()
+    assert len(calibrated(tmp_path / "a.yaml", 64, 48).notes) == 1
+
+
 def test_a_pair_of_opencv(tmp_path):
     bent = np.array([BENT])
     stereo_yaml(tmp_path / "a.yaml", M1=K, D1=bent, M2=K, D2=bent, R=TURN, T=SHIFT.reshape(3, 1))

@@ -9,11 +9,15 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
 from endotsr.cli.golden import run
+from endotsr.cli.main import main
 from endotsr.errors import InputError
-from endotsr.port.judge.badge import badge, width
-from endotsr.port.judge.certificate import read_certificate
+from endotsr.port.judge.__main__ import main as judge_main
+from endotsr.port.judge.badge import badge, width, write_badge
+from endotsr.port.judge.certificate import read_certificate, write_certificate
 from endotsr.port.judge.format import schema_text, to_json
+from endotsr.port.judge.report import write_report
 from endotsr.port.judge.schemas import SCHEMAS
+from endotsr.port.judge.verdict import conclude
 
 ASKED = ("--precision", "float64", "--level", "2")
 WRONG_GRADIENT = ("d[:, None] * phi[:, None]", "d[:, None] + phi[:, None]")
@@ -54,6 +58,38 @@ def test_the_badge_is_xml_with_the_claim_as_its_title(written):
         **{**{n: getattr(found, n) for n in found.__struct_fields__}, "vectors": "<b>.1.0"}
     )
     ET.fromstring(badge(hostile))
+
+
+@pytest.mark.parametrize("program", [main, judge_main])
+def test_a_name_without_a_certificate_is_refused(program, tmp_path, capsys):
+    """The badge does not show it. Before, it was ignored."""
+    words = ["run", "--port", command(), "--name", "mine", "--badge", str(tmp_path / "b.svg")]
+    assert program([*(["golden"] if program is main else []), *words]) == 2
+    assert "--name has no effect without --certificate: it is the name of the port in" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_of_the_judge_are_written_in_one_step(written, golden, tmp_path, monkeypatch):
+    """A link of the same name is replaced, not followed, and a page that cannot be made leaves the old one."""
+    found, report = read_certificate(written / "c.json"), conclude(golden, [], "float64", 2, [])
+    writers = {
+        "c.json": lambda path: write_certificate(path, found),
+        "b.svg": lambda path: write_badge(path, found),
+        "r.json": lambda path: write_report(report, golden, tmp_path, path, None),
+        "r.html": lambda path: write_report(report, golden, tmp_path, None, path),
+    }
+    (tmp_path / "mine").write_text("mine")
+    for name, write in writers.items():
+        (tmp_path / name).symlink_to("mine")
+        write(tmp_path / name)
+        assert not (tmp_path / name).is_symlink() and (tmp_path / name).stat().st_size > 100
+    assert (tmp_path / "mine").read_text() == "mine"
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    monkeypatch.setattr("endotsr.untrusted.writing.rename", lambda *ends: (_ for _ in ()).throw(OSError("full")))
+    for name, write in writers.items():
+        with pytest.raises(OSError, match="full"):
+            write(tmp_path / name)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 @pytest.mark.parametrize("text", ["endotsr golden", "4.5, level 2, float32, in part", "4.5, method, level 3, float64"])

@@ -76,7 +76,16 @@ def test_a_forward_renderer_claims_its_images(golden, port):
     (port / "not_ported.txt").write_text("\n".join([*rest, "reverse"]))
     report = judge(golden, port, "float32", level=3)
     assert (said(report) == {"renderer-forward": 3, "renderer": 1} and not report.accepted) or report.level == 1
-    assert report.claim.endswith(", reverse passes") and not report.notes
+    assert report.claim.endswith(", reverse passes") and len(report.notes) == 1
+    assert (
+        "level 2 asks for gradients" in report.notes[0] and "ends at 1; --profile renderer-forward" in report.notes[0]
+    )
+    assert report.notes[0] in as_table(report)
+    assert judge(golden, port, "float32", level=1).notes == []
+    (port / "not_ported.txt").write_text("\n".join([*rest, "reverse", "harmonics"]))  # and so without this profile
+    (note,) = judge(golden, port, "float32", level=3).notes
+    assert "level 2 asks for gradients" in note and "--profile" not in note
+    (port / "not_ported.txt").write_text("\n".join([*rest, "reverse"]))
     assert not judge(golden, port, "float32", profile="renderer").passed
 
 

@@ -4,6 +4,7 @@ import csv
 import errno
 import json
 import os
+import shutil
 from types import SimpleNamespace
 
 import pytest
@@ -115,19 +116,43 @@ def test_what_is_finished_is_not_run_again(whole):
     assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows]
 
 
-def test_measurements_that_finished_runs_lack_are_named(whole):
-    """New `measures` do not apply to finished runs."""
-    spec, out, _, _ = whole
+def test_measurements_that_finished_runs_lack_are_named(whole, capsys):
+    """New `measures` do not apply to finished runs; the command that adds them is printed."""
+    spec, out, rows, _ = whole
     other, told = spec.parent / "measured.toml", Told()
     other.write_text('measures = ["depth"]\n' + spec.read_text())
     sweep(other, out, make=lambda job: pytest.fail(f"made {job.name} again"), told=told)
-    assert told.lines == ["depth: 3 finished runs are without it; a finished run is not measured again"]
+    assert told.lines[0] == "depth: 3 of the finished runs are without it; a finished run is not measured again"
+    assert f"endotsr evaluate {out}/runs/{rows[0]['name']} --measures depth; then the same command" in told.lines[1]
+    assert len(told.lines) == 2
+    assert main(["sweep", str(other), "--out", str(out), "--dry-run"]) == 0
+    assert told.lines[1] in capsys.readouterr().out
+
+
+def test_a_measurement_is_added_to_a_finished_run_as_the_sweep_says(whole, tmp_path):
+    spec, out, rows, _ = whole
+    shutil.copytree(out, tmp_path / "out")
+    other, told = tmp_path / "measured.toml", Told()
+    other.write_text('measures = ["depth"]\n' + spec.read_text())
+    for row in rows:
+        assert main(["evaluate", str(tmp_path / "out/runs" / row["name"]), "--measures", "depth"]) == 0
+    again = sweep(other, tmp_path / "out", make=lambda job: pytest.fail(f"made {job.name} again"), told=told)
+    assert told.lines == [] and all("depth" in row["measures"] for row in again)
+
+
+def test_runs_without_checkpoints_cannot_be_measured_again(whole, tmp_path):
+    spec, out, _, _ = whole
+    shutil.copytree(out, tmp_path / "out")
+    for file in (tmp_path / "out").glob("runs/*/checkpoint*.npz"):
+        file.unlink()
+    other, told = tmp_path / "measured.toml", Told()
+    other.write_text('measures = ["depth"]\n' + spec.read_text())
+    sweep(other, tmp_path / "out", make=lambda job: pytest.fail(f"made {job.name} again"), told=told)
+    assert "their checkpoints are not kept: delete the folders of these runs" in told.lines[1]
 
 
 def test_a_run_that_was_killed_before_its_last_record_is_finished_without_training(whole, tmp_path):
     """The last checkpoint is there, run.json still says running, and metrics.json is that of an earlier checkpoint."""
-    import shutil
-
     spec, out, rows, _ = whole
     shutil.copytree(out, tmp_path / "out")
     run = open_run(tmp_path / "out" / "runs" / rows[1]["name"])

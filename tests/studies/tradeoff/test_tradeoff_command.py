@@ -57,10 +57,16 @@ def test_budget_reads_the_measurement(measured, capsys):
         (["--budget", "soon"], 'allowed: a time per frame ("10 ms"'),
         (["--budget", "1 us"], "the fastest is"),
         (["--budget", "5 min"], 'allowed: a time per frame ("10 ms"'),
-        (["--run", "a", "--splats", "b"], "--run with --splats is not allowed"),
+        (["--run", "a", "--splats", "b"], "--run with --splats: both state the scene"),
         (["--scale", "0"], "allowed: a number > 0"),
-        (["--run", "other", "--budget", "1/255"], "already contains a measurement, from which --budget chooses: --run"),
-        (["--scale", "0.5", "--budget", "1/255"], "--scale has no effect; choose another --out, or omit --scale"),
+        (
+            ["--run", "other", "--budget", "1/255"],
+            "--run has no effect with the folder with a measurement: --budget chooses from it",
+        ),
+        (
+            ["--scale", "0.5", "--budget", "1/255"],
+            "--scale has no effect with the folder with a measurement: --budget chooses from it; another --out makes",
+        ),
         (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
     ],
 )

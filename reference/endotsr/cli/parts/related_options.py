@@ -163,6 +163,27 @@ EXPORT = (
     Needs(("opacity",), ("content=points", "format=animated points"), "it selects points"),
     Needs(("voxel",), ("content=mesh",), "it is the resolution of a mesh"),
 )
+# run: of windows, if METHOD is one; otherwise "of one training"
+COMPARED = ("methods>1", "compare")
+EVALUATE = (
+    Needs(("compare",), ("methods>0",), "they are run folders, JSON files or folders of pictures to compare"),
+    Excludes(("pictures", "label", "measures"), COMPARED, "evaluate one method alone first"),
+    Excludes(("no-view",), (*COMPARED, "pictures", "run=of windows"), "no view.html is written"),
+    Needs(("seed", "no-baselines"), COMPARED, "it describes a comparison"),
+    Needs(("label",), ("pictures",), "a comparison takes NAME=PATH"),
+    Excludes(("measures",), ("pictures", "run=of windows"), "measures render views of a run of one training"),
+    Excludes(("sequence.*",), ("methods>0",), ONE_RUN, unless=COMPARED),
+)
+# folder: with a measurement, if --budget chooses from it
+TRADEOFF = (
+    Excludes(("run",), ("splats",), "both state the scene"),
+    Needs(("json",), ("budget",), "it is the answer to a budget; the measurement itself is tradeoff.json in DIR"),
+    Excludes(
+        ("run", "splats", "scale", "threads"),
+        ("folder=with a measurement",),
+        "--budget chooses from it; another --out makes a new one",
+    ),
+)
 
 RELATIONS: dict[str, tuple[Relation, ...]] = {
     "prepare": PREPARE,
@@ -171,6 +192,9 @@ RELATIONS: dict[str, tuple[Relation, ...]] = {
     "train": (*TRAIN, *(relation._replace(unless=("resume", "calibrate-only")) for relation in SETTINGS)),
     "render": RENDER,
     "export": EXPORT,
+    "evaluate": EVALUATE,
+    "tradeoff": TRADEOFF,
+    "golden run": (Needs(("name",), ("certificate",), "it is the name of the port in the certificate"),),
 }
 # Options that only permit something: without an occasion they change nothing.
 PERMISSIONS = {
@@ -178,4 +202,5 @@ PERMISSIONS = {
     "depth": ("replace", "trust-depth"),
     "masks": ("replace",),
 }
-FACTS = {"prepare": "layout", "export": "format"}  # of a command: follows from its options, and the command checks it
+# Of a command: follows from its options, and the command checks it.
+FACTS = {"prepare": "layout", "export": "format", "evaluate": "run", "tradeoff": "folder"}

@@ -6,7 +6,8 @@ every option that another one makes pointless.
 
 A term names an option as it is written, without the dashes: `rate`, `kind=relative`, `no-evaluate`. `rate` holds if the
 option is given; in a list of what another option needs, it holds if its value is other than 0 and off. `kind=relative`
-holds for this value, whether given or the default.
+holds for this value, whether given or the default; `methods>1` for more than one value; `sequence.*` for any setting of
+this section on the command line.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,7 +16,8 @@ from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
 
-FACTS = ("layout", "format")  # names of facts: of the source of `prepare`, and of --out of `export`
+# Names of facts: of the source of `prepare`, of --out of `export` and `tradeoff`, and of METHOD of `evaluate`.
+FACTS = ("layout", "format", "folder", "run")
 NO_FACTS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -73,7 +75,14 @@ def check_relations(
             else:
                 other = next((term for term in relation.second if term != first and _is_given(term, line)), None)
                 if other is not None:
-                    raise InputError(f"{command}: {shown(first)} with {shown(other)}: {relation.why}; use one of them")
+                    raise InputError(f"{command}: {excluded(first, other, relation)}")
+
+
+def excluded(first: str, other: str, relation: Excludes) -> str:
+    """The message for two terms that exclude one another; a fact and a number of values cannot be omitted."""
+    if ">" in other or other.partition("=")[0] in FACTS:
+        return f"{shown(first)} has no effect with {shown(other)}: {relation.why}; omit {shown(first)}"
+    return f"{shown(first)} with {shown(other)}: {relation.why}; use one of them"
 
 
 def missing(first: str, relation: Needs) -> str:
@@ -84,6 +93,9 @@ def missing(first: str, relation: Needs) -> str:
 
 def shown(term: str) -> str:
     """A term as it is written on the command line: `--kind relative`; a fact as `the layout tum`."""
+    name, more, least = term.partition(">")
+    if more:
+        return f"several {name}" if int(least) else name
     name, equals, value = term.partition("=")
     return f"the {name} {value}" if equals and name in FACTS else f"--{name} {value}" if equals else f"--{name}"
 
@@ -102,6 +114,11 @@ def _value(name: str, line: _Line) -> Any:
 
 def _is_given(term: str, line: _Line) -> bool:
     """Whether a term is on the command line. A value counts also as a default, and a switch only if it is on."""
+    name, more, least = term.partition(">")
+    if more:
+        return len(_value(name, line)) > int(least)
+    if term.endswith(".*"):
+        return any(given.startswith(term[:-1]) for given in line.given)
     name, equals, value = term.partition("=")
     if equals:
         found = _value(name, line)
@@ -114,4 +131,4 @@ def _is_given(term: str, line: _Line) -> bool:
 
 def _holds(term: str, line: _Line) -> bool:
     """Whether a term has this value, or any value that switches something on."""
-    return _is_given(term, line) if "=" in term else bool(_value(term, line))
+    return _is_given(term, line) if "=" in term or ">" in term else bool(_value(term, line))

@@ -2,6 +2,7 @@
 
 from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
 from endotsr.results.report.tables import duration
+from endotsr.untrusted.names import counted
 
 
 def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
@@ -28,8 +29,7 @@ def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Sta
 def in_words(seconds: float) -> str:
     """A duration as "40 seconds", "3 minutes" or "1.5 hours"."""
     if seconds < 55:
-        return f"{max(1, round(seconds))} seconds"
+        return counted(max(1, round(seconds)), "second")
     if seconds < 90 * 60:
-        minutes = round(seconds / 60)
-        return f"{minutes} minute{'s' * (minutes != 1)}"
+        return counted(round(seconds / 60), "minute")
     return f"{seconds / 3600:.1f} hours"

@@ -7,8 +7,10 @@ from endotsr.cli.parts.progress import StepBar
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.results.report.tables import duration
-from endotsr.training.runs.files import refuse_inside, refuse_read_only, write_json
+from endotsr.training.runs.files import refuse_inside, refuse_read_only, warn, write_json
+from endotsr.training.runs.folder import RunFolder
 from endotsr.training.runs.sources import SIMULATED
+from endotsr.untrusted.writing import leftover_notes
 
 if TYPE_CHECKING:
     from endotsr.studies.sweeps.place import Place
@@ -50,8 +52,13 @@ def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: 
     plan_recording(Path(source), config, wanted, out)
 
 
-def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> "WindowedEvaluation":
-    """Evaluate a run of windows, write metrics.json to its folder, and print the tables; returns the metrics."""
+def evaluate_windows(
+    run: Path, lpips: Path | None = None, source: str | None = None, *, wait: bool = False
+) -> "WindowedEvaluation":
+    """Evaluate a run of windows, write metrics.json to its folder, and print the tables; returns the metrics.
+
+    wait   as in `RunFolder.evaluating`
+    """
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.report.run_text import held_out_table
     from endotsr.studies.windows.measure import measure_windows
@@ -59,8 +66,11 @@ def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = 
 
     scene = open_windows(run)
     refuse_read_only(run)
-    metrics = measure_windows(scene, WindowFrames(scene, source), load_lpips_weights(lpips))
-    write_json(run / "metrics.json", metrics)
+    with RunFolder(run).evaluating(wait=wait):
+        for note in leftover_notes(run / "metrics.json"):
+            warn(note)
+        metrics = measure_windows(scene, WindowFrames(scene, source), load_lpips_weights(lpips))
+        write_json(run / "metrics.json", metrics)
     for row in metrics["windows"]:
         print(_row(row))
     if "held_out" in metrics:

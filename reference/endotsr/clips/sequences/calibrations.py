@@ -42,6 +42,7 @@ def read_calibration(path: Path) -> StoredCalibration:
 
 
 SAME_SHAPE = 0.02  # relative difference of proportions
+ROUNDED = 1  # pixels by which rounding to an even number changes a side at most
 
 
 class StatedCamera(NamedTuple):
@@ -54,7 +55,7 @@ class StatedCamera(NamedTuple):
 
 
 def calibrated(path: Path, width: int, height: int) -> StatedCamera:
-    """The camera or the pair of a file, for pictures of this size. Proportional sizes are scaled.
+    """The camera or the pair of a file, for pictures of this size. Proportional sizes are scaled, which is noted.
 
     Raises:  InputError naming the file, the key and what is allowed.
     """
@@ -64,16 +65,18 @@ def calibrated(path: Path, width: int, height: int) -> StatedCamera:
         where = f"{path}: {side}" if found.right else str(path)
         distortion = stored.distortion if any(stored.distortion) else ()
         whole = intrinsics_of_matrix(stored.matrix, *(stored.size or (width, height)), distortion, where=where)
+        notes.update(dict.fromkeys(_scaling(whole, width, height, path)))
         return fitted_intrinsics(whole, width, height, where)
 
+    notes = dict.fromkeys(found.notes)  # without repetitions: two cameras of one size are scaled alike
     left = intrinsics(found.left, "left")
     if found.right is None:
-        return StatedCamera(left, baseline=found.baseline, notes=found.notes)
+        return StatedCamera(left, baseline=found.baseline, notes=tuple(notes))
     rotation = checked_rotation(found.rotation, f"{path}: rotation between the cameras")
     if not np.isfinite(found.translation).all() or not found.translation.any():
         raise InputError(f"{path}: both cameras are in one place; allowed: a translation between them")
     pair = StereoCalibration(left, intrinsics(found.right, "right"), rotation, found.translation)
-    return StatedCamera(calibration=pair, notes=found.notes)
+    return StatedCamera(calibration=pair, notes=tuple(notes))
 
 
 def _squeezed(whole: float, found: float) -> str:
@@ -84,9 +87,29 @@ def _squeezed(whole: float, found: float) -> str:
     return ""
 
 
+def _one_shape(size: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Whether the smaller size is the larger one times a factor, each side rounded to a whole or an even number.
+
+    A factor f with |f W - w| <= 1 and |f H - h| <= 1 exists where |w H - h W| <= W + H.
+    """
+    (w, h), (width, height) = sorted((size, other), key=lambda sides: sides[0] * sides[1])
+    return abs(w * height - h * width) <= ROUNDED * (width + height)
+
+
+def _scaling(stored: Intrinsics, width: int, height: int, path: Path) -> list[str]:
+    """A note on a calibration of another size than the pictures; none for their size and for another shape."""
+    if (stored.width, stored.height) == (width, height):
+        return []
+    exact = stored.width * height == stored.height * width
+    return [
+        f"{path.name}: calibration of {stored.width}x{stored.height} pixels, scaled to the {width}x{height} of the"
+        f" pictures{'' if exact else '; the proportions differ by rounding'}"
+    ]
+
+
 def fitted_intrinsics(intrinsics: Intrinsics, width: int, height: int, where: object) -> Intrinsics:
-    """The intrinsics for pictures of this size. Raises InputError for another aspect ratio."""
-    if abs(intrinsics.width * height - intrinsics.height * width) > max(intrinsics.width, width) // 100:
+    """The intrinsics for pictures of this size. Raises InputError if the aspect ratio differs by more than rounding."""
+    if not _one_shape((intrinsics.width, intrinsics.height), (width, height)):
         raise InputError(
             f"{where}: the calibration is of {intrinsics.width}x{intrinsics.height} pixels, the pictures have"
             f" {width}x{height}{_squeezed(intrinsics.width / intrinsics.height, width / height)}"

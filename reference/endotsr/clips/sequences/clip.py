@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.kinds import Finding
+from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -87,6 +88,7 @@ class Clip:
     unit: str = "mm"
     intrinsics: Intrinsics | None = None
     calibration: StereoCalibration | None = None
+    crop: Crop | None = None  # the window of the source pictures that the clip shows; None: all of them
     baseline: float | None = None  # of a rectified pair, in `unit`
     poses: list[CameraPose | None] | None = None  # None: the camera rests at `rest`
     rest: CameraPose = REST

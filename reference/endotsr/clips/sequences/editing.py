@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Masks, Picture, PicturePair
+from endotsr.clips.sequences.crop import crop_within
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import stated_masks
 from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.names import counted
 
 ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
@@ -148,10 +150,9 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     Raises:  InputError for an empty window. A window beyond the pictures, and a picture or depth of another size than
              the camera, are refused when they are read.
     """
-    if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
-        raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
-    x, y, width, height = window
     camera = clip.calibration.left if clip.calibration else clip.intrinsics
+    crop = crop_within(window, camera, clip.crop)
+    x, y, width, height = window
 
     def cut(plane: NDArray, what: str, i: int) -> NDArray:
         size, part = plane.shape[1::-1], plane[y : y + height, x : x + width]
@@ -181,6 +182,7 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     return replace(
         clip,
         pictures=pictures,
+        crop=crop,
         masks=None if masks is None else replace(masks, read=partial(part, masks.read, "masks"), files=[]),
         depth=None if depth is None else replace(depth, read=partial(part, depth.read, "depth"), files=[]),
         intrinsics=None if clip.intrinsics is None else intrinsics(clip.intrinsics),
@@ -219,7 +221,7 @@ def paired_by_time(clip: Clip, late: int) -> Clip:
                 turn = next(waiting, None)
 
     way = "late" if late > 0 else "early"
-    note = f"right view taken as {_frames(abs(late))} {way}: frame i is paired with right picture i {late:+d}"
+    note = f"right view taken as {counted(abs(late), 'frame')} {way}: frame i is paired with right picture i {late:+d}"
     return replace(clip, pictures=pictures, right=[], notes=[*clip.notes, note])
 
 
@@ -227,12 +229,8 @@ def with_partner(clip: Clip, frames: list[int], late: int, notes: list[str]) -> 
     """The frames whose right picture, that of frame i + late, is in the clip. The others are noted."""
     kept = [i for i in frames if 0 <= i + late < clip.count]
     if len(kept) < len(frames):
-        notes.append(f"{_frames(len(frames) - len(kept))} without a right picture of their moment omitted")
+        notes.append(f"{counted(len(frames) - len(kept), 'frame')} without a right picture of their moment omitted")
     return kept
-
-
-def _frames(count: int) -> str:
-    return f"{count} frame{'s' * (count != 1)}"
 
 
 def united(clip: Clip, folders: tuple[Path, ...], options: SourceOptions) -> Clip:

@@ -32,6 +32,7 @@ from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.untrusted.files import in_threads
+from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import new_folder, replace_text, replacing_folder
 
 OVERLAY = "proposed_masks.png"
@@ -97,7 +98,7 @@ def from_keys(source: Path, margin: int, said: list[str]) -> Propose:
         else:
             said.append(f"no further key is expected to raise the mean agreement by {LEAST_GAIN}")
         said.extend(polarity_warnings(found.keys, pictures))
-        frames = f"{len(found.keys)} key frame{'s' if len(found.keys) != 1 else ''}"
+        frames = counted(len(found.keys), "key frame")
         never = found.never
         excluded = carried.excluded if never is None else [plane | never for plane in carried.excluded]
         refuse_no_tissue(excluded, clip.names, source, margin)

@@ -24,6 +24,7 @@ from endotsr.clips.sequences.sequence_file import FILE_NAME, sequence_text
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose
 from endotsr.untrusted.json import read_json, typed
+from endotsr.untrusted.names import counted
 from endotsr.untrusted.sections import Section
 from endotsr.untrusted.writing import replace_text
 
@@ -195,7 +196,7 @@ def lines_of(report: PoseReport, folder: Path) -> list[str]:
     lines += gap_lines(found.interpolated, found.held)
     apart = min(APART, len(e.poses) - 1)
     own = f"beside the rigid motion, tissue moves by {e.own:.2g} {unit}"
-    own += f" (median, over {apart} frame{'s' * (apart != 1)})"
+    own += f" (median, over {counted(apart, 'frame')})"
     if not np.isfinite(e.own):
         own = "how tissue moves beside the rigid motion cannot be told: no two frames apart match"
     lines.append(

@@ -22,6 +22,7 @@ from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.choices import Border, DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.sequences.clip import Clip, PicturePair
+from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.depth_files import CLIPPED, step_of_depth, write_levels
 from endotsr.clips.sequences.editing import (
     chosen_frames,
@@ -54,7 +55,7 @@ from endotsr.clips.sequences.straighten import Straightener, straightener
 from endotsr.clips.sequences.trajectory import filled
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.untrusted.writing import new_folder
+from endotsr.untrusted.writing import leftover_notes, new_folder
 
 LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers
 OnFrame = Callable[[int, int], None]
@@ -98,6 +99,7 @@ def prepare(
     refuse_no_lengths(clip, chosen)
     if not chosen:
         raise InputError(f"{clip.where}: no frame is left")
+    notes += leftover_notes(Path(out))
     with new_folder(Path(out), FILE_NAME if replace else "", WRITTEN) as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
@@ -163,6 +165,7 @@ def _write_frames(
             height, width = pair.left.shape[:2]
             straight = straightener(clip, width, height, settings.scale)
             notes += straight.notes
+            notes += _unchanged(settings.scale, width, height, straight)
         new = _checked(clip, i, pair, straight)
         facts.append(frame_facts(clip.names[i], new.left))
         _write_pictures(folder, k, new, settings.pictures)
@@ -180,7 +183,7 @@ def _write_frames(
         on_frame(k + 1, len(chosen))
     assert straight is not None
     where = str(clip.where)
-    of_cameras = intrinsics_findings(straight.intrinsics, where)
+    of_cameras = intrinsics_findings(straight.intrinsics, where, clip.crop)
     of_cameras += baseline_findings(straight.baseline, clip.arbitrary, where)
     notes += notes_of(frame_findings(facts, where) + of_cameras)
     notes += seen.notes(clip, settings.border)
@@ -191,6 +194,13 @@ def _write_frames(
     masks = mask_entry(clip, folder, len(chosen), seen, settings.border, notes)
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(clip, straight, turned, chosen, masks, depth_scale, settings, notes)
+
+
+def _unchanged(scale: float, width: int, height: int, straight: Straightener) -> list[str]:
+    """A note on a scale that rounds to the size of the pictures."""
+    if scale == 1 or (straight.intrinsics.width, straight.intrinsics.height) != (width, height):
+        return []
+    return [f"--scale {scale:g} changes nothing: pictures of {width}x{height} pixels keep their size"]
 
 
 def _checked(clip: Clip, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
@@ -265,14 +275,14 @@ def _file_of(
     if (clip.depth or clip.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
     method = clip.depth.method if clip.depth else f"points, {settings.points}"
-    clipped = list(CLIPPED) if clip.depth and (settings.scale < 1 or clip.depth.clipped) else []
+    clipped = list(CLIPPED) if clip.depth and (straight.resized or clip.depth.clipped) else []
     assumed = clip.depth.assumed if clip.depth else ""
     entry = DepthEntry(unit=unit, scale=depth_scale or 1.0, clipped=clipped, method=method, assumed=assumed)
     times, rate = written_times(clip, chosen, settings.rate, notes)
     return SequenceFile(
         format=FORMAT,
         frames=len(chosen),
-        camera=camera_entry(straight.intrinsics, straight.baseline),
+        camera=camera_entry(straight.intrinsics, straight.baseline, clip.crop),
         source=f"{clip.where.absolute().name} ({clip.layout})",
         unit=unit,
         frame_rate=rate,
@@ -299,12 +309,14 @@ def _source_names(clip: Clip, chosen: list[int]) -> list[str] | None:
     return None if names == [f"{k:06d}" for k in range(len(chosen))] else names
 
 
-def camera_entry(intrinsics: Intrinsics, baseline: float | None) -> CameraEntry:
+def camera_entry(intrinsics: Intrinsics, baseline: float | None, crop: Crop | None = None) -> CameraEntry:
     """The section [camera] of intrinsics without distortion."""
+    window = [round(float(value), 6) for value in crop or ()]
     fx, fy, cx, cy = (float(value) for value in (intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy))
     return CameraEntry(
-        width=intrinsics.width, height=intrinsics.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
-    )
+        width=intrinsics.width, height=intrinsics.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0),
+        crop=window[:4], crop_of=window[4:],
+    )  # fmt: skip
 
 
 def pose_row(pose: CameraPose) -> list[float]:

@@ -265,6 +265,9 @@ def _scaled(sequence: Sequence, clip: Clip, config: SequenceConfig) -> Sequence:
             f"{where}: scale {scale:g} makes {width}x{height} pixels of {sequence.width}x{sequence.height};"
             f" allowed: at least {LEAST_SIDE} on each side"
         )
+    if (width, height) == (sequence.width, sequence.height):
+        sequence.notes.append(f"scale {scale:g} changes nothing: pictures of {width}x{height} pixels keep their size")
+        return sequence
     sequence = smaller(sequence, width, height, config.memory, where)
     sequence.notes.append(f"scaled to {width}x{height}; tissue fraction {sequence.masks.mean():.4f}")
     if clip.masks:

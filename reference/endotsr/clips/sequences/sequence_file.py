@@ -12,6 +12,8 @@
     width = 640 ... height, fx, fy, cx, cy
     distortion = []                    # k1 k2 p1 p2 [k3 [k4 k5 k6]], OpenCV's order; training needs none
     baseline = 4.2                     # of a rectified pair; 0 = no stereo
+    crop = []                          # x y width height of the window of the source that the pictures show; []: all
+    crop_of = []                       # width height of the source pictures, in whose pixels this window is
 
     [masks]                            # absent: every pixel is tissue
     folder = "masks"
@@ -47,6 +49,7 @@ import numpy as np
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, scene_factor
 from endotsr.clips.sequences.choices import Axes, Direction, Unit
 from endotsr.clips.sequences.clip import Assumed
+from endotsr.clips.sequences.crop import stated_crop
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.names import file_name
@@ -76,6 +79,8 @@ class CameraEntry(Section, frozen=True, kw_only=True):
     cy: float
     distortion: list[float] = msgspec.field(default_factory=list)
     baseline: NonNegative = 0.0
+    crop: list[float] = msgspec.field(default_factory=list)
+    crop_of: list[float] = msgspec.field(default_factory=list)
 
     def intrinsics(self, where: object) -> Intrinsics:
         """The intrinsics, checked. Raises InputError."""
@@ -176,6 +181,7 @@ def read_sequence_file(folder: Path) -> SequenceFile:
                 f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder next to the file"
             )
     found.camera.intrinsics(path)
+    stated_crop(found.camera.crop, found.camera.crop_of, path)
     _check_times(found, path)
     _check_source_names(found, path)
     return found
@@ -214,7 +220,7 @@ def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> Non
             raise InputError(f"{path}: {key}.{field.name} is missing")
     try:
         msgspec.convert(data.get("matrices", []), list[list[float]], strict=True)
-        for name in ("distortion", "clipped"):
+        for name in ("distortion", "clipped", "crop", "crop_of"):
             msgspec.convert(data.get(name, []), list[float], strict=True)
     except msgspec.ValidationError as error:
         raise InputError(f"{path}: {key}: a list of numbers is expected: {error}") from None

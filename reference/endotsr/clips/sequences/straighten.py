@@ -33,6 +33,7 @@ class Straightener:
     baseline: float | None
     notes: list[str]
     clipped: bool = False  # the depth of the clip is already clipped
+    resized: bool = False  # the new pictures have another size
 
     def pictures(self, pair: PicturePair) -> PicturePair:
         """Both pictures in the new camera."""
@@ -94,12 +95,15 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     clipped = clip.depth is not None and bool(clip.depth.clipped)
     if not any(intrinsics.distortion):
         plain = intrinsics._replace(distortion=())
-        return Straightener(plain.scaled(*new_size), None, None, np.eye(3), clip.baseline, [], clipped)
+        return Straightener(
+            plain.scaled(*new_size), None, None, np.eye(3), clip.baseline, [], clipped, new_size != (width, height)
+        )
     maps = undistortion_maps(opencv_matrix(intrinsics), np.array(intrinsics.distortion), width, height)
     new = intrinsics_of_matrix(maps.matrix, width, height, where=clip.where)
     notes = [f"undistorted: distortion {', '.join(f'{k:g}' for k in intrinsics.distortion)}"]
     notes += lens_warnings(maps.matrix, np.array(intrinsics.distortion), width, height)
-    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, notes, clipped)
+    resized = new_size != (width, height)
+    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, notes, clipped, resized)
 
 
 def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:

@@ -198,7 +198,7 @@ def _composite_reverse(
                         break
                     kept[n, 0], kept[n, 1], kept[n, 2], kept[n, 3] = alpha, t, e, dy
                     # the alpha that multiplies dL/dalpha: zero if clamped, unless the deviation passes the clamp
-                    kept[n, 4] = value if value <= alpha_max or pass_clamped else zero
+                    kept[n, 4] = zero if value > alpha_max and not pass_clamped else value
                     hit[n] = p
                     n += 1
                     t = behind

@@ -12,11 +12,11 @@ from pathlib import Path
 from endotsr.errors import InputError
 from endotsr.port.judge.badge import write_proof
 from endotsr.port.judge.call import called
-from endotsr.port.judge.certificate import port_of, read_certificate
+from endotsr.port.judge.certificate import NAMED, port_of, read_certificate
 from endotsr.port.judge.command import refuse_folders
 from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.profiles import PROFILES
-from endotsr.port.judge.report import as_html, as_json, as_table
+from endotsr.port.judge.report import as_table, write_report
 from endotsr.port.judge.runs import called_often
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
 from endotsr.port.judge.verdict import Report, judge
@@ -88,6 +88,8 @@ def main(words: list[str]) -> int:
     options = _parser().parse_args(words)
     try:
         _refuse_unwritable(options)
+        if options.command == "run" and options.name and options.certificate is None:
+            raise InputError(f"--name has no effect without --certificate: {NAMED}; add it, or omit --name")
         golden = read_golden(golden_folder(options.golden))
         with tempfile.TemporaryDirectory() as scratch:
             if options.command == "verify":
@@ -96,10 +98,7 @@ def main(words: list[str]) -> int:
             if report.first_wrong:
                 report.notes.append(NO_SEARCH)
             print(as_table(report, everything=options.all))
-            if options.json:
-                options.json.write_bytes(as_json(report))
-            if options.html:
-                options.html.write_text(as_html(report, golden, outputs), encoding="utf-8", newline="\n")
+            write_report(report, golden, outputs, options.json, options.html)
             if options.command == "run" and (options.certificate or options.badge):
                 port = port_of(options.port, options.name)
                 if reason := write_proof(golden, report, port, options.certificate, options.badge):

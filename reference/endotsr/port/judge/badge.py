@@ -7,6 +7,7 @@ from endotsr.port.judge.certificate import Certificate, Port, certified, obstacl
 from endotsr.port.judge.profiles import PROFILES
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report
+from endotsr.untrusted.writing import replace_text
 
 LEFT = "endotsr golden"
 NARROW, WIDE = " ,.()fijlrt", "mw"  # letters; widths at 11 px, px:
@@ -53,7 +54,7 @@ def badge(certificate: Certificate) -> str:
 
 def write_badge(path: Path, certificate: Certificate) -> None:
     """As SVG."""
-    path.write_text(badge(certificate), encoding="utf-8", newline="\n")
+    replace_text(path, badge(certificate))
 
 
 def write_proof(golden: Golden, report: Report, port: Port, certificate: Path | None, picture: Path | None) -> str:

@@ -21,10 +21,12 @@ from endotsr.port.judge.format import MOST_RUNS, Level, Precision, _Strict, read
 from endotsr.port.judge.profiles import PROFILES, WITHOUT, ProfileClaim, claim_text
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import Report
+from endotsr.untrusted.writing import replace_text
 
 LONGEST = 500  # characters of a text
 MOST_OPERATIONS = 100
 SECONDS = 5.0  # for git
+NAMED = "it is the name of the port in the certificate"
 
 
 class Port(_Strict, frozen=True, kw_only=True):
@@ -202,7 +204,7 @@ def _shortened(text: str) -> str:
 
 def write_certificate(path: Path, certificate: Certificate) -> None:
     """As JSON."""
-    path.write_text(to_json(certificate), encoding="utf-8", newline="\n")
+    replace_text(path, to_json(certificate))
 
 
 def read_certificate(path: Path) -> Certificate:

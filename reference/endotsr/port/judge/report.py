@@ -18,6 +18,7 @@ from endotsr.port.judge.profiles import lines_of
 from endotsr.port.judge.recognise import Suspect
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
+from endotsr.untrusted.writing import replace_file, replace_text
 
 MOST_LINES = 60  # refused outputs in the table
 MOST_MISSING = 12  # names of missing outputs of a case
@@ -171,6 +172,14 @@ def _line(output: OutputReport) -> str:
     return (
         f"{output.reason}; at {list(output.index)} {output.got:.17g}, expected {output.expected:.17g}: off by {off:.2e}"
     )
+
+
+def write_report(report: Report, golden: Golden, outputs: Path, data: Path | None, page: Path | None) -> None:
+    """Write the report as JSON to `data` and as a page to `page`, each in one step; None = not this one."""
+    if data:
+        replace_file(data, lambda temporary: temporary.write_bytes(as_json(report)))
+    if page:
+        replace_text(page, as_html(report, golden, outputs))
 
 
 def as_html(report: Report, golden: Golden, outputs: Path) -> str:

@@ -17,6 +17,7 @@ from endotsr.port.judge.format import BITS, LEVELS, Case, Output, Precision
 from endotsr.port.judge.needles import Off, only_needles
 from endotsr.port.judge.npy import Refused, read_plain, read_text
 from endotsr.port.judge.profiles import (
+    PROFILES,
     REVERSE,
     WITHOUT,
     Graded,
@@ -45,6 +46,7 @@ from endotsr.port.judge.trajectory import FirstWrong, first_wrong_iteration
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations omitted by the port, one per line
 INSIDE = "inside"  # in that file: the port cannot write arrays inside its operations
 NO_REVERSE = "reverse"  # in that file: the port has no reverse pass
+FORWARD_ALONE = 1  # the last level without gradients that is followed by one with them
 LARGEST_RELATED = 20_000  # largest number of entries of an output that is searched for relations
 MISSING = "missing"  # the array reader's reason for a missing file
 MOST_FILES = 1000  # files of a case's folder that are searched for a misnamed output
@@ -168,6 +170,8 @@ def judge(
     if level >= BITS and (again or not only):  # a part has no claim, and so needs no second run
         reports.append(_not_repeated() if again is None else _repeated(golden, outputs, again, without))
     report = conclude(golden, reports, precision, level, notes, without, profile)
+    if forward and not only and level > FORWARD_ALONE:
+        report.notes.append(_forward_note(without))
     if only:
         report.claim, report.profiles = f"no claim: only {only} was judged", []
     elif forward and report.level >= 0:
@@ -176,6 +180,14 @@ def judge(
         )
         report.claim += f"{', ' if WITHOUT in report.claim else WITHOUT}reverse passes"
     return report
+
+
+def _forward_note(without: tuple[str, ...]) -> str:
+    """Why a port without reverse passes has level 1 at most, and the profile that judges the rest of it."""
+    named = [n for n, one in PROFILES.items() if one.forward and not set(one.operations) & set(without)]
+    more = [f"--profile {name} judges its part up to level {last_level(name)}" for name in named]
+    alone = f"level {FORWARD_ALONE + 1} asks for gradients, so that a claim of every operation ends at {FORWARD_ALONE}"
+    return "; ".join([f"{NOT_PORTED}: without reverse passes, {alone}", *more])
 
 
 def asked_of(golden: Golden, only: str, profile: str, level: int) -> tuple[Golden, int]:

@@ -16,6 +16,7 @@ from endotsr.port.search.cases import Answered
 from endotsr.port.search.changes import SECONDS, search
 from endotsr.port.search.trial import Hit, Trial
 from endotsr.port.stages.definition import definition_stages
+from endotsr.untrusted.names import counted
 
 START_UP = 60.0  # seconds of a process outside its search
 SLOWEST = 10.0  # elapsed seconds per second of computing on a busy machine
@@ -102,8 +103,7 @@ def sentences(trial: Trial) -> list[str]:
     said = _equally(trial)
     if not said:
         return []
-    number = len(trial.cases)
-    whole = f"  ({trial.hits[0].extent} of its {number} case{'s' * (number > 1)})"
+    whole = f"  ({trial.hits[0].extent} of its {counted(len(trial.cases), 'case')})"
     return [f"your outputs are those of the definition with {said[0]}", *said[1:], whole]
 
 

@@ -9,14 +9,14 @@ from endotsr.port.search.conventions import Convention
 _VISIBLE = "projection.projection_forward"
 _NEAR = "point[2].real > settings.near"
 _LAYERS = "compositing.layers_of"
-_WANTED = "live & box & (alpha.real >= settings.alpha_cutoff)"
+_WANTED = "live & box & ~(alpha.real < settings.alpha_cutoff)"
 _ALL = ("compositing.reach_ellipse", "return (squared >= 0) &", "return np.ones_like(squared, bool) |")
 _MIDDLE = "(a[i] + c[i]) / 2"
 _RADIUS = f"np.ceil(3 * np.sqrt({_MIDDLE} + np.sqrt(max(0.1, ({_MIDDLE}) ** 2 - projected.determinant[i]))))"
 _POLYNOMIALS = "harmonics.POLYNOMIALS"
 _REVERSE = "compositing.composite_reverse"
 _POWER = "value * front * (own - rest)"
-_PASSES = "taken & (value <= settings.alpha_max)"
+_PASSES = "taken & ~(value > settings.alpha_max)"
 
 
 def _wanted(said: str, condition: str) -> Convention:
@@ -153,6 +153,6 @@ OF_THE_SCREEN: tuple[Convention, ...] = (
          "rest = 0 * d_depth"),
     )),
     Convention("gradients of Gaussians behind the stop of the light too, in the reverse pass", (
-        (_REVERSE, _PASSES, "value <= settings.alpha_max"),
+        (_REVERSE, _PASSES, "~(value > settings.alpha_max)"),
     )),
 )  # fmt: skip

@@ -94,7 +94,7 @@ def decisions(records: NDArray, raster: RasterSettings, width: int, height: int)
         eta = x - record[U] - record[SLOPE] * dy
         value = record[OPACITY] * np.exp(-0.5 * (record[INVERSE_C] * dy * dy + record[PRECISION] * eta * eta))
         alpha = np.minimum(value, raster.alpha_max)
-        wanted = live & (alpha >= raster.alpha_cutoff)
+        wanted = live & ~(alpha < raster.alpha_cutoff)
         behind = np.where(wanted, transmittance * (1 - alpha), transmittance)
         live &= ~(wanted & (behind < raster.transmittance_stop))
         taken = wanted & live

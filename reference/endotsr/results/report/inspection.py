@@ -12,6 +12,7 @@ from endotsr.clips.effects.plan import Plan
 from endotsr.clips.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.results.report import curves, figures, parts, tables
 from endotsr.results.report.style import Theme
+from endotsr.untrusted.names import counted
 
 SMALL = ("none", "good", "degree 0")
 
@@ -52,7 +53,7 @@ def _saving(time: float, memory: float) -> str:
 def _rate(inspection: Inspection, cycles: float, harmonics: int) -> str:
     per_minute = inspection.per_minute(cycles)
     minute = f", {per_minute:.0f} per minute" if per_minute is not None else ""
-    return f"{cycles:.3g} cycles per sequence{minute}, {harmonics} harmonic{'s' if harmonics != 1 else ''}"
+    return f"{cycles:.3g} cycles per sequence{minute}, {counted(harmonics, 'harmonic')}"
 
 
 def _value(value: Any) -> str:

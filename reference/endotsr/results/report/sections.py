@@ -14,6 +14,7 @@ from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, 
 from endotsr.results.report.misfits import misfits_html
 from endotsr.results.report.run_text import SHOWN, facts, interpolation_sentence, pose_sentence, trajectory_sentence
 from endotsr.results.report.tables import duration, html_table
+from endotsr.untrusted.names import counted
 
 OPENED_FRAMES = 3  # the worst frames are unfolded
 
@@ -38,7 +39,7 @@ def headline(data: ReportData) -> str:
         boxes.append(parts.card(duration(run["seconds"] or 0.0), "", "training time"))
     elif seconds.size:
         boxes.append(parts.card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
-    frames = f"{count} held-out frame{'s' if count != 1 else ''}" if count else "report"
+    frames = counted(count, "held-out frame") if count else "report"
     frames += f", {outside} of them extrapolated and not in these means" if outside else ""
     return (
         f'<header><p class="eyebrow">Endo-TSR · {frames}</p><h1>{parts.text(data.title)}</h1>{_verdict(data)}'

@@ -179,8 +179,9 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     if not job.measured or measured_at_the_end(job):
         return
     weights = load_lpips_weights(job.lpips)
-    _, metrics, held_out = measure_folder(folder, sequence, job.source, weights=weights, measures=job.measures)
-    write_evaluation(folder, sequence, metrics, held_out)
+    with folder.evaluating(wait=True):
+        _, metrics, held_out = measure_folder(folder, sequence, job.source, weights=weights, measures=job.measures)
+        write_evaluation(folder, sequence, metrics, held_out)
     folder.previous.unlink(missing_ok=True)
     if not job.keep_checkpoints:
         folder.checkpoint.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ or on a cluster. Out: the rows of the table in the order of the spec.
 """
 
 import contextlib
+import shlex
 from collections import Counter
 from collections.abc import Callable, Generator
 from pathlib import Path
@@ -22,6 +23,7 @@ from endotsr.studies.sweeps.place import Size
 from endotsr.studies.sweeps.results import RunRow, failures, finished_row, open_row, write_results
 from endotsr.studies.sweeps.spec import Spec
 from endotsr.training.runs.files import refuse_folder
+from endotsr.training.runs.folder import RunFolder
 from endotsr.training.runs.log import last_iteration
 
 LOCK = "sweep.lock"
@@ -133,8 +135,8 @@ def run_sweep(
         on_rows(list(rows.values()))
         for name, reason in plan.failed.items():
             reporter.say(f"failed before: {name}: {reason}")
-        for name, count in _without(plan).items():
-            reporter.say(f"{name}: {count} finished runs are without it; a finished run is not measured again")
+        for line in lacking(plan):
+            reporter.say(line)
         jobs = {job.name: job for job in plan.left}
         advice = lambda: f"{_count(rows)} runs are finished; the same command continues"
         try:
@@ -150,15 +152,34 @@ def run_sweep(
         return list(rows.values())
 
 
-def _without(plan: SweepPlan) -> Counter[str]:
-    """Measurement -> number of finished runs without it, as after a change of `measures` or `lpips`."""
-    found = Counter[str]()
-    for job in plan.jobs:
-        row = plan.rows[job.name]
-        if row["status"] == FINISHED:
-            found.update(name for name in job.measures if name not in row.get("measures", {}))
-            found.update(["lpips"] if job.lpips is not None and row.get("lpips") is None else [])
-    return found
+def lacking(plan: SweepPlan) -> list[str]:
+    """Measurements that finished runs are without, as after a change of `measures` or `lpips`, and how to add them."""
+    without = [(job, names) for job in plan.jobs if (names := _without(job, plan.rows[job.name]))]
+    if not without:
+        return []
+    counts = Counter(name for _, names in without for name in names)
+    lines = [
+        f"{name}: {count} of the finished runs are without it; a finished run is not measured again"
+        for name, count in counts.items()
+    ]
+    kept = next((job for job, _ in without if RunFolder(Path(job.folder)).has_checkpoint), None)
+    if kept is None:
+        return [*lines, "their checkpoints are not kept: delete the folders of these runs, or choose another --out"]
+    return [*lines, f"to add them, for each of these runs: {_measuring(kept)}; then the same command updates the table"]
+
+
+def _without(job: Job, row: RunRow) -> list[str]:
+    """The measurements of a job that its finished run is without."""
+    if row["status"] != FINISHED:
+        return []
+    found = [name for name in job.measures if name not in row.get("measures", {})]
+    return found + ["lpips"] * (job.lpips is not None and row.get("lpips") is None)
+
+
+def _measuring(job: Job) -> str:
+    """The command that measures a finished run again, with everything that its job names."""
+    words = ["endotsr", "evaluate", job.folder, *(["--measures", *job.measures] if job.measures else [])]
+    return shlex.join([*words, *(["--lpips", job.lpips] if job.lpips is not None else [])])
 
 
 def as_they_end(

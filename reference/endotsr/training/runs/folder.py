@@ -8,6 +8,7 @@
     diverged.npz     the state before an iteration that was not finite
     training.html    progress page; redirects to report.html once it exists
     run.lock         empty; locked by the process that trains the run
+    evaluate.lock    empty; locked by the process that evaluates the run
     metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
 
 Folders and files are created and replaced atomically. Resuming truncates the log at the checkpoint. This module handles
@@ -18,6 +19,7 @@ import contextlib
 import os
 import shlex
 import shutil
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,9 +30,13 @@ import msgspec
 from endotsr.clips.sequences.record import SequenceRecord, read_sequence_record
 from endotsr.config import Config, config_to_toml, load_config, with_fixed_length
 from endotsr.errors import InputError
-from endotsr.training.runs.files import os_error_line, read_json, refuse_folder, refuse_link, write_json
+from endotsr.training.runs.files import os_error_line, read_json, refuse_folder, refuse_link, warn, write_json
 from endotsr.training.runs.records import RunRecord, checked_run_record
-from endotsr.untrusted.writing import replacing_folder
+from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.writing import leftover_notes, replacing_folder
+
+EVALUATE_LOCK = "evaluate.lock"
+POLL = 0.5  # seconds between two attempts to take a lock
 
 
 class RunBusy(InputError):
@@ -95,12 +101,28 @@ class RunFolder:
                 raise RunBusy(f"{self.path}: another process trains this run; wait until it ends, or stop it")
             yield
 
-    def remove_leftovers(self) -> None:
-        """Remove the temporary files of a killed process."""
-        for pattern in (".*.part", ".partial-*"):
-            for file in self.path.glob(pattern):
-                folder = file.is_dir() and not file.is_symlink()
-                shutil.rmtree(file) if folder else file.unlink(missing_ok=True)
+    @contextlib.contextmanager
+    def evaluating(self, *, wait: bool = False) -> Iterator[None]:
+        """Hold the lock of the evaluation for the block, as `locked`: two would write the same files in turn.
+
+        wait    wait until the other process ends, in place of RunBusy
+        """
+        refuse_link(self.path / EVALUATE_LOCK)
+        with (self.path / EVALUATE_LOCK).open("ab") as file:
+            while not lock_taken(file):
+                if not wait:
+                    raise RunBusy(f"{self.path}: another process evaluates this run; wait until it ends, or stop it")
+                time.sleep(POLL)
+            yield
+
+    def remove_leftovers(self) -> list[str]:
+        """Remove the temporary files of killed processes. The caller holds both locks. Returns a sentence on them."""
+        found = [file for pattern in (".*.part", ".partial-*", "test/.partial-*") for file in self.path.glob(pattern)]
+        for file in found:
+            folder = file.is_dir() and not file.is_symlink()
+            shutil.rmtree(file) if folder else file.unlink(missing_ok=True)
+        names = ", ".join(sorted(plain_line(str(file.relative_to(self.path))) for file in found))
+        return [f"{self.path}: removed what a stopped command left: {names}"] if found else []
 
     def update(self, entries: RunRecord) -> None:
         """Add or replace entries of run.json."""
@@ -144,6 +166,8 @@ def create_run(path: Path, config: Config, record: RunRecord, sequence_record: S
     """
     path = Path(path)
     refuse_existing(path)
+    for note in leftover_notes(path):
+        warn(note)
     try:
         path.absolute().parent.mkdir(parents=True, exist_ok=True)
         with replacing_folder(path, replace=False) as folder:

@@ -87,7 +87,8 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
 
     config = folder.config()
     with folder.locked():
-        folder.remove_leftovers()
+        for line in _without_leftovers(folder):
+            observer.say(line)
         saved = folder.has_checkpoint
         state = load_training(folder, config, continues=True) if saved else new_training(sequence, config)
         planned = config.training.iterations
@@ -98,6 +99,13 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
             train_run(folder, state, sequence, config, observer)
         elif folder.record().get("status") != "finished":  # stopped between the last checkpoint and this record
             folder.update({"status": "finished", "finished": now(), "iterations_done": state.iteration})
+
+
+def _without_leftovers(folder: RunFolder) -> list[str]:
+    """A sentence on the leftovers that are removed; none while another process evaluates the run and writes there."""
+    with contextlib.suppress(InputError), folder.evaluating():
+        return folder.remove_leftovers()
+    return []
 
 
 def extend_run(folder: RunFolder, iterations: int) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.world import FAR_FROM_ORIGIN
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
@@ -19,10 +20,10 @@ SHORTEST_BASELINE, LONGEST_BASELINE = 0.1, 1000.0  # mm; between the views of an
 SMALLER, LARGER, ALIKE = 0.75, 1.35, 0.05  # sizes whose centre is told from this one; difference of its two parts
 
 
-def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Finding]:
-    """Findings on the cameras of a sequence; `depth` is its median depth, 0 if unknown."""
+def camera_findings(cameras: list[Camera], depth: float, where: str, crop: Crop | None = None) -> list[Finding]:
+    """Findings on the cameras of a sequence; `depth` is its median depth, 0 if unknown; `crop` as in a `Clip`."""
     centres = np.array([camera_centre(camera) for camera in cameras])
-    found = intrinsics_findings(cameras[0], where) + _step_findings(cameras, centres, where)
+    found = intrinsics_findings(cameras[0], where, crop) + _step_findings(cameras, centres, where)
     way, distance = float(np.ptp(centres, axis=0).max()), float(np.abs(centres).max())
     if depth and 0 < way < STILL * depth:
         found.append(finding("pose-unit", where, f"the camera moves {way:.3g} in all, the depth is {depth:.4g}"))
@@ -49,9 +50,10 @@ def _step_findings(cameras: list[Camera], centres: FloatArray, where: str) -> li
     return found
 
 
-def intrinsics_findings(camera: Camera | Intrinsics, where: str) -> list[Finding]:
-    """Field of view, principal point, shape of the pixels."""
+def intrinsics_findings(camera: Camera | Intrinsics, where: str, crop: Crop | None = None) -> list[Finding]:
+    """Field of view, principal point, shape of the pixels; of a cropped clip, those of the pictures before the crop."""
     found = []
+    camera = crop.before(camera) if crop else camera
     angle = float(np.degrees(2 * np.arctan(camera.width / (2 * camera.fx))))
     if not NARROWEST < angle < WIDEST:
         found.append(finding("field-of-view", where, f"the horizontal field of view is {angle:.1f} degrees"))
@@ -62,6 +64,7 @@ def intrinsics_findings(camera: Camera | Intrinsics, where: str) -> list[Finding
     if apart > OFF_CENTRE or exchanged or scaled:
         size = f"{camera.width}x{camera.height}"
         what = f"the principal point is at ({camera.cx:g}, {camera.cy:g}) of {size}"
+        what += ", the pictures before the crop" if crop else ""
         what += ", and near the centre with cx and cy exchanged" if exchanged else ""
         what += f", the centre of pictures of {factor:.3g} times this size" if scaled and factor > 0 else ""
         found.append(finding("principal-point", where, what))

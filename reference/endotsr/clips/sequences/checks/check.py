@@ -188,7 +188,7 @@ def _check_cameras(clip: Clip, run: _Pass, size: Size) -> dict[str, str]:
     cameras = run.tried(lambda: clip.cameras(range(clip.count)), "cameras", where)
     if not cameras:
         return {}
-    run.findings += camera_findings(cameras, usual_depth(run.depth), str(where))
+    run.findings += camera_findings(cameras, usual_depth(run.depth), str(where), clip.crop)
     poses = agreement_of(clip, cameras)
     run.findings += agreement_findings(poses, str(where))
     return {} if poses is None else {"poses": poses.sentence}

@@ -44,7 +44,7 @@ def guarded(
     priors = str(clip.depth.files[0].parent)
     found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)
     found += scale_finding(loaded_steps(sequence), priors)
-    found += camera_findings(sequence.cameras, usual_depth(depth), folder)
+    found += camera_findings(sequence.cameras, usual_depth(depth), folder, clip.crop)
     if (
         clip.layout != COMMON and not sequence.static_camera and not clip.pose_faults
     ):  # `prepare` has held the poses of the others

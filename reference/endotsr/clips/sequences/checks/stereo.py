@@ -20,6 +20,7 @@ from endotsr.clips.sequences.splits import even_frames
 from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.names import counted
 
 SAMPLED, WIDEST, STRONGEST = 8, 640, 1500  # frames whose features are matched, columns, and features of a picture
 MOVES = 10 * SAME  # grey levels by which the left view changes where it is said to move
@@ -147,7 +148,7 @@ def late_finding(rows: list[RowMatches], where: str) -> list[Finding]:
         return []
     whole, side = max(1, round(abs(frames))), "late" if frames > 0 else "early"
     what = (
-        f"the right view is about {whole} frame{'s' * (whole > 1)} {side}: points that move up or"
+        f"the right view is about {counted(whole, 'frame')} {side}: points that move up or"
         f" down lie where the left view {'showed' if frames > 0 else 'will show'} them (estimate"
         f" {abs(frames):.1f}, from {len(moving)} frames)"
     )

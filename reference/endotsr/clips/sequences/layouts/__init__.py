@@ -111,6 +111,7 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
     refuse_unused(layout, path, options)
     clip = without_faults(layout.describe(path, options))
     _refuse_unknown_unit(clip, options)
+    clip = _of_one_unit(clip, options)
     if clip.pose_faults and len(clip.pose_faults) == clip.count:
         raise InputError(next(iter(clip.pose_faults.values())))
     said = [*clip.notes, *clip.pose_faults.values()]
@@ -123,14 +124,41 @@ def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:
 
 def _refuse_unknown_unit(clip: Clip, options: SourceOptions) -> None:
     """Raises InputError for an arbitrary unit beside lengths that the layout has in a known one."""
-    stated = {"trajectory": options.trajectory_unit, "depth": options.depth_unit}
-    wrong = next((name for name, unit in stated.items() if unit == ARBITRARY), None)
+    wrong = _stated_arbitrary(options)
     if wrong and not clip.arbitrary:
         allowed = ", ".join(MILLIMETRES)
         raise InputError(
             f"{clip.where}: --{wrong}-unit arbitrary: the layout {clip.layout} has lengths in a known unit; allowed:"
             f" {allowed}"
         )
+
+
+def _stated_arbitrary(options: SourceOptions) -> str | None:
+    """Which lengths are stated to have an arbitrary unit: `trajectory`, `depth` or none."""
+    stated = {"trajectory": options.trajectory_unit, "depth": options.depth_unit}
+    return next((name for name, unit in stated.items() if unit == ARBITRARY), None)
+
+
+def _of_one_unit(clip: Clip, options: SourceOptions) -> Clip:
+    """The clip; without the baseline that a file has beside the pictures of one camera, where the unit is arbitrary.
+
+    A clip has one unit for poses, depth and baseline. A baseline is in millimetres, and so is the depth of its pair.
+
+    Raises:  InputError for an arbitrary unit beside the baseline of a pair.
+    """
+    name = _stated_arbitrary(options)
+    if name is None or clip.layout == "common" or not (clip.baseline or clip.calibration):
+        return clip
+    if options.baseline is None and clip.calibration is None and next(clip.pictures([0])).right is None:
+        note = f"baseline of {clip.baseline:g} mm left out: the unit is arbitrary, and there are no right pictures"
+        return replace(clip, baseline=None, notes=[*clip.notes, note])
+    what, remedy = "depth", "; endotsr depth makes depth of the pair"
+    if name == "trajectory":
+        what, remedy = "positions", f" and --{name}; after endotsr depth, endotsr poses scales a path to its depth"
+    raise InputError(
+        f"{clip.where}: --{name}-unit arbitrary beside a baseline in millimetres: the {what} would have another scale"
+        f" than the pair; allowed: the unit of the {what}, or without --{name}-unit{remedy}"
+    )
 
 
 def _stated_folders(options: SourceOptions) -> dict[Path, tuple[str, ...]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from endotsr.clips.sequences.checks.kinds import finding
 from endotsr.clips.sequences.clip import Clip, Depth, Masks
+from endotsr.clips.sequences.crop import stated_crop
 from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout, without_faults
 from endotsr.clips.sequences.sequence_file import (
@@ -62,6 +63,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         depth=_depth(folder, found),
         unit="arbitrary" if found.arbitrary else "mm",
         intrinsics=intrinsics,
+        crop=stated_crop(found.camera.crop, found.camera.crop_of, where),
         baseline=found.baseline or None,
         poses=poses,
         pose_origin=found.poses.origin if found.poses else "given",

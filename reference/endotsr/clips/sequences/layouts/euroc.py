@@ -123,6 +123,7 @@ def _cameras(body: Path, options: SourceOptions, size: tuple[int, int], pair: bo
         return stated_camera(options, *size, body)
     left = calibrated(files[0], *size)
     notes += [f"cam0/{SENSOR}: {HALF_A_PIXEL}", *left.notes]
+    left = left._replace(notes=())
     if not pair:
         return left
     if not files[1].is_file():

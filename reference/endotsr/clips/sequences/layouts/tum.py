@@ -11,7 +11,7 @@ import numpy as np
 
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.calibrations import calibrated
+from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
 from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Depth
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
@@ -115,15 +115,15 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     if pairs := [file.name for file in visible_files(path, "associat*.txt")]:
         notes.append(f"{shortened(pairs)}: not read; pictures, depth and poses are paired by their times")
     width, height = size_of(files)
-    intrinsics = stated_camera(options, width, height, path).intrinsics
+    camera = stated_camera(options, width, height, path)
     notes += picture_notes(files)
     given = [path / name for name in TRAJECTORIES if (path / name).is_file()]
     settings = next((file for file in visible_files(path, "*.yaml") if SETTINGS in read_text(file)), None)
-    if intrinsics is None and settings is not None:
-        intrinsics = calibrated(settings, width, height).intrinsics
+    if camera.intrinsics is None and settings is not None:
+        camera = calibrated(settings, width, height)
         notes.append(f"intrinsics of {settings.name}: {HALF_A_PIXEL}")
-    if intrinsics is None and (width, height) == (640, 480):
-        intrinsics = Intrinsics(*DEFAULT, width, height)
+    if camera.intrinsics is None and (width, height) == (640, 480):
+        camera = StatedCamera(Intrinsics(*DEFAULT, width, height))
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")
     poses: list[CameraPose | None] | None = None
     where = options.trajectory or next(iter(given), None)
@@ -142,13 +142,13 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         masks=stated_masks(options, files, width, height),
         depth=stated_depth(options, files) or _listed_depth(path, times, 1000.0 / steps_of_depth),
         unit="mm",
-        intrinsics=intrinsics,
+        intrinsics=camera.intrinsics,
         poses=poses,
         rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
         times=times if steps.size and (steps > 0).all() else None,
         read_here=tuple(file.name.lower() for file in [*given, *([settings] if settings else [])]),
         inside=together(folders_of(files), folders_of(planes, DEPTH_ENDINGS)),
-        notes=notes,
+        notes=[*notes, *camera.notes],
     )
 
 
