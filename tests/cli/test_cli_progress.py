@@ -229,7 +229,7 @@ def test_the_training_of_the_base_model_is_part_of_the_forecast():
 
 @pytest.mark.parametrize(
     "given, shown",
-    [(0.2, "1 seconds"), (54, "54 seconds"), (61, "1 minute"), (200, "3 minutes"), (5400, "1.5 hours")],
+    [(0.2, "1 second"), (54, "54 seconds"), (61, "1 minute"), (200, "3 minutes"), (5400, "1.5 hours")],
 )
 def test_minutes_in_words(given, shown):
     assert in_words(given) == shown
