@@ -24,6 +24,7 @@ from endotsr.clips.sequences.checks.depth import (
     light_finding,
     usual_depth,
 )
+from endotsr.clips.sequences.checks.depth_pair import depth_pair_findings
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps, scale_finding
 from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
 from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
@@ -137,7 +138,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
         run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
-    run.findings += pair_findings(clip)
+    run.findings += pair_findings(clip) + depth_pair_findings(clip)
     run.findings += baseline_findings(clip.baseline if clip.right else None, clip.arbitrary, str(clip.stated_in))
     if run.samples:
         _check_masks(clip, run, config)

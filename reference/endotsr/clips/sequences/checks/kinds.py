@@ -139,6 +139,9 @@ KINDS: dict[str, Kind] = {
     "depth-against-light": Kind("warning", "the light is on the scope, which makes near tissue brighter: the file may"
                                 " hold disparity or an inverse depth, or be mirrored or upside down",
                                 "read a disparity as such: endotsr depth --given FOLDER --kind disparity"),
+    "depth-against-pair": Kind("warning", "one of them is wrong: the depth, the baseline or the focal length",
+                               "state the unit of the depth: prepare --depth-unit and --depth-scale; export depth along"
+                               " the optical axis, without an offset; or endotsr depth CLIP --replace"),
     "flipped-depth": Kind("warning", "the depth does not match the tissue in the picture",
                           "store its first row at the top and its first column at the left, like the picture"),
     # cameras
