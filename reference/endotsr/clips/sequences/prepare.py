@@ -162,7 +162,7 @@ def _write_frames(
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
     facts: list[FrameFacts] = []
-    seen = WrittenFrames()
+    seen = WrittenFrames(len(chosen))
     (folder / IMAGES).mkdir()
     for k, (i, pair) in enumerate(zip(chosen, clip.pictures(chosen))):
         if straight is None:

@@ -41,6 +41,7 @@ from endotsr.clips.sequences.checks.frames import (
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.checks.stereo import pair_findings
+from endotsr.clips.sequences.checks.still_parts import StillParts
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.field_of_view import FieldOfView
@@ -85,6 +86,7 @@ class _Pass:
         self.frames: list[FrameFacts] = []
         self.masks = MaskSteps()
         self.view = FieldOfView()
+        self.still = StillParts(count)
         self.depth: list[DepthFacts] = []
         self.steps = DepthSteps(count)
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
@@ -131,6 +133,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     if run.frames:
         run.findings += frame_findings(run.frames, str(clip.images[0].parent))
         run.findings += border_findings(run.view, str(clip.images[0].parent))
+        run.findings += run.still.findings(str(clip.images[0].parent))
     if clip.masks and clip.masks.files:
         run.findings += run.masks.findings(str(clip.masks.files[0].parent))
     if run.depth and clip.depth:
@@ -211,6 +214,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         tissue = _mask(clip, run, masks[i], i, size, levels)
         run.masks.add(i, tissue)
         run.view.add(picture, tissue)
+        run.still.add(i, picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         run.steps.add(i, picture, found, tissue)
         if i in sampled:

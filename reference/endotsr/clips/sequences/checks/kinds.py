@@ -69,6 +69,11 @@ KINDS: dict[str, Kind] = {
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
     "alternating-views": Kind("warning", "two alternating cameras or kinds of light are not one scene",
                               "prepare each separately: --frames ::2, and --frames 1::2"),
+    "straight-border": Kind("warning", "two pictures in one, or bars that are not black, are not one view of one scene",
+                            "cut the picture out: endotsr prepare --crop; or exclude the rest: --unite-masks"),
+    "burnt-in": Kind("warning", "training fits it as tissue that travels with the camera",
+                     "exclude it: endotsr prepare --unite-masks FILE with a mask of it; a row of text at the edge can be"
+                     " cut off with --crop"),
     "frozen-right-view": Kind("warning", "depth from such a pair joins two moments",
                               "record or export the right view again, or leave these frames out: endotsr prepare"
                               " --drop"),

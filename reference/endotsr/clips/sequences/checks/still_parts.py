@@ -18,12 +18,13 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 WORKING, SAMPLED, FEWEST = 640, 32, 6  # columns of the pictures that are looked at; frames of a clip, and of a finding
 MARGIN = 2  # pixels of tissue around an edge
-SHARP, STILL = 50.0, 0.9  # grey levels per pixel in the mean of all frames; part of an edge that the mean keeps
-# Sharp still edges, pixels per column of the picture: at most 0.04 on four recorded clips and twelve simulated ones;
-# 0.13 and more with a line of opaque text on any of them that shows it, 0.05 on one that changes its exposure.
-MANY = 0.1
-FAINT, MOVING = 12.0, 0.5  # grey levels of other edges, and the part of them above which the whole scene stands still
-BORDER = 4.0  # times the steps beside it: at most 2.6 in tissue on these clips, 5.2 and more between two pictures
+SHARP, STILL = 70.0, 0.9  # grey levels from pixel to pixel in the mean of all frames; part of an edge that it keeps
+# Sharp still edges, pixels per column of the picture: at most 0.03 on four recorded clips and twelve simulated ones, and
+# 0.10 to 1.9 with a line of opaque text on any of them whose tissue it covers. Small grey text and transparent text have
+# less than the limit on most of them.
+MANY, NARROWEST = 0.07, 240  # and columns: smaller pictures have sharp edges of their own
+FAINT, MOVING = 6.0, 0.75  # grey levels of other edges, and the part of them above which the whole scene stands still
+BORDER = 4.5  # times the steps beside it: at most 3.1 in tissue on these clips, 6.0 or more between two pictures
 BESIDE, NEXT = 12, 3  # columns on either side that are compared, without the nearest
 LONG, FLAT = 0.3, 0.5  # part of a column that is tissue; grey levels of a picture without steps
 
@@ -80,7 +81,9 @@ def _burnt_in_findings(edges: _Edges, where: str) -> list[Finding]:
     still = kept > STILL * every
     sharp = edges.seen & still & (kept > SHARP)
     others = edges.seen & (every > FAINT) & ~_grown(sharp)
-    if sharp.sum() <= MANY * sharp.shape[1] or not others.any() or still[others].mean() > MOVING:
+    if sharp.shape[1] < NARROWEST or sharp.sum() <= MANY * sharp.shape[1]:
+        return []
+    if not others.any() or still[others].mean() > MOVING:
         return []
     rows, columns = np.nonzero(sharp)
     (top, bottom), (left, right) = (
@@ -110,7 +113,8 @@ def _border(slope: FloatArray, seen: BoolArray, axis: int) -> tuple[float, int]:
     """The largest step of a column (axis 0) or row (axis 1), relative to those beside it, and its place."""
     counts = seen.sum(axis=axis)
     long = counts > LONG * seen.shape[axis]
-    profile = np.where(long, np.where(seen, slope, 0).sum(axis=axis) / np.maximum(counts, 1), np.nan)
+    profile = np.full(counts.size, np.nan)
+    profile[long] = np.nanmedian(np.where(seen, slope, np.nan).compress(long, axis=1 - axis), axis=axis)
     best = (0.0, 0)
     for place in np.flatnonzero(long):
         beside = np.concatenate([profile[max(0, place - BESIDE) : max(0, place - NEXT)],
@@ -143,10 +147,10 @@ def _reduced(tissue: BoolArray, grey: FloatArray) -> BoolArray:
 
 
 def _slopes(grey: FloatArray) -> FloatArray:
-    """(2, h, w) central differences across and down, grey levels per pixel; 0 at the edge."""
+    """(2, h, w) steps to the next column and to the next row, grey levels; 0 at the end."""
     found = np.zeros((2, *grey.shape), np.float32)
-    found[0, :, 1:-1] = (grey[:, 2:] - grey[:, :-2]) / 2
-    found[1, 1:-1] = (grey[2:] - grey[:-2]) / 2
+    found[0, :, :-1] = np.diff(grey, axis=1)
+    found[1, :-1] = np.diff(grey, axis=0)
     return found
 
 

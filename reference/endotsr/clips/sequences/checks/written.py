@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
+from endotsr.clips.sequences.checks.still_parts import StillParts
 from endotsr.clips.sequences.choices import Border
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.field_of_view import FieldOfView
@@ -15,14 +16,17 @@ NEAR = 10.0  # mm; endoscopes work nearer, and depth in centimetres looks like i
 
 
 class WrittenFrames:
-    """Sums over the frames of a clip, one after another."""
+    """Sums over the frames of a clip of `count` frames, one after another."""
 
-    def __init__(self) -> None:
+    def __init__(self, count: int) -> None:
         self.masks, self.view, self.medians = MaskEvidence(), FieldOfView(), []
+        self.still, self.frames = StillParts(count), 0
 
     def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
         """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
         self.view.add(picture, tissue)
+        self.still.add(self.frames, picture, tissue)
+        self.frames += 1
         if tissue is not None:
             self.masks.add(picture, tissue, depth)
         if depth is not None and depth.any():
@@ -38,7 +42,7 @@ class WrittenFrames:
             excluded = clip.masks.excluded_value
             notes += notes_of(self.masks.findings(where, excluded)) or [self.masks.note(excluded)]
             notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
-        return notes + self._depth_notes(clip)
+        return notes + notes_of(self.still.findings(where)) + self._depth_notes(clip)
 
     def _depth_notes(self, clip: Clip) -> list[str]:
         if clip.depth is None or clip.depth.stated is None or clip.arbitrary or not self.medians:
