@@ -51,7 +51,9 @@ def test_without_a_baseline_the_scale_says_nothing_and_the_shape_does():
 
 def test_a_flat_board_few_pixels_and_unrelated_depth_say_nothing():
     right = scene()
-    board = right._replace(depth=np.full(5000, 50.0), of_pair=50 * np.exp(np.random.default_rng(1).normal(0, 0.01, 5000)))
+    board = right._replace(
+        depth=np.full(5000, 50.0), of_pair=50 * np.exp(np.random.default_rng(1).normal(0, 0.01, 5000))
+    )
     assert said(board) == ""
     assert pair_fit([Compared(*(values[:500] for values in right))]) is None
     unlike = right._replace(depth=np.random.default_rng(2).uniform(5, 400, 5000))

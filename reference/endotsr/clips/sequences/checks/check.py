@@ -40,6 +40,7 @@ from endotsr.clips.sequences.checks.frames import (
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
+from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.stereo import pair_findings
 from endotsr.clips.sequences.checks.still_parts import StillParts
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
@@ -302,6 +303,10 @@ def _check_masks(clip: Clip, run: _Pass, config: Config) -> None:
     assert clip.masks is not None
     where, allow = str(clip.masks.files[0].parent), config.sequence.allow_tissue_fraction
     excluded, stated_in = clip.masks.excluded_value, clip.masks.stated_in
+    evidence = MaskEvidence(step=1)
+    for _, small, tissue, sparse in run.samples:
+        evidence.add(small, tissue, sparse)
+    run.findings += evidence.flip_findings(where)
     if run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where) is None:
         return
     if (

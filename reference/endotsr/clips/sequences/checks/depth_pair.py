@@ -29,7 +29,7 @@ OFFSET = 0.1  # of the median depth: at most 0.05 on these clips, 0.16 or more w
 SCALE = 1.15  # of the depth to that of the pair, or the reverse: 0.99 to 1.01 on these clips
 FLAT = 0.08  # of the median depth: the spread without which a scale and an offset look alike
 FACTORS = ((5.0, "5000 steps a metre read as millimetres: --depth-scale 0.2"), (10.0, "tenths of a millimetre"),
-           (0.1, "centimetres"), (1000.0, "micrometres"), (1e-3, "metres"), (4.0, "quarters of a millimetre"))  # fmt: skip
+           (0.1, "centimetres"), (1000.0, "micrometres"), (1e-3, "metres"))  # fmt: skip
 
 
 class Compared(NamedTuple):
@@ -123,7 +123,8 @@ def fit_findings(fit: PairFit, has_baseline: bool, unit: str, where: str) -> lis
         what = f"the depth is {more} {times}that of the stereo pairs: an offset, or two unlike principal points"
     elif has_baseline and not 1 / SCALE < fit.ratio < SCALE:
         likely = next((said for factor, said in FACTORS if abs(np.log(fit.ratio / factor)) < np.log(SCALE) / 2), "")
-        what = f"the depth is {fit.ratio:.3g} times that of the stereo pairs" + (f"; it looks like {likely}" * bool(likely))
+        guess = f"; it looks like {likely}" if likely else ""
+        what = f"the depth is {fit.ratio:.3g} times that of the stereo pairs{guess}"
     else:
         return []
     return [finding("depth-against-pair", where, what)]

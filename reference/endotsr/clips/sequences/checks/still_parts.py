@@ -19,9 +19,9 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 WORKING, SAMPLED, FEWEST = 640, 32, 6  # columns of the pictures that are looked at; frames of a clip, and of a finding
 MARGIN = 2  # pixels of tissue around an edge
 SHARP, STILL = 70.0, 0.9  # grey levels from pixel to pixel in the mean of all frames; part of an edge that it keeps
-# Sharp still edges, pixels per column of the picture: at most 0.03 on four recorded clips and twelve simulated ones, and
-# 0.10 to 1.9 with a line of opaque text on any of them whose tissue it covers. Small grey text and transparent text have
-# less than the limit on most of them.
+# Sharp still edges, pixels per column of the picture: at most 0.03 on four recorded clips and twelve simulated ones of
+# 320 columns or more, and 0.10 to 1.9 with a line of opaque text on tissue of any of them. Small grey text and
+# transparent text have less than the limit on most of them.
 MANY, NARROWEST = 0.07, 240  # and columns: smaller pictures have sharp edges of their own
 FAINT, MOVING = 6.0, 0.75  # grey levels of other edges, and the part of them above which the whole scene stands still
 BORDER = 4.5  # times the steps beside it: at most 3.1 in tissue on these clips, 6.0 or more between two pictures
