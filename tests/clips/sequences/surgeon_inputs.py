@@ -83,8 +83,8 @@ def bars(shown: np.ndarray) -> np.ndarray:
 
 SURGEON_ROWS = [
     Row("pictures, text of a console", of_tissue(lambda shown, i: with_text(shown)), "told", "burnt-in"),
-    Row("pictures, two recordings side by side", of_tissue(lambda shown, i: np.hstack([shown, 255 - tissue(FRAMES - 1 - i)]),
-        ), "told", "a straight border crosses the pictures at column"),
+    Row("pictures, two recordings side by side", of_tissue(lambda shown, i: np.hstack([shown,
+        255 - tissue(FRAMES - 1 - i)])), "told", "a straight border crosses the pictures at column"),
     Row("pictures, the grey desktop of a console beside them", of_tissue(lambda shown, i: bars(shown)), "told",
         "a straight border crosses the pictures at column"),
     Row("pictures, two of them exchanged", folder_of(exchanged(slow())), "told", "exchanged-frames"),

@@ -56,6 +56,15 @@ def test_excluded_text_a_still_scene_and_few_frames_say_nothing():
     assert said(pictures[:3]) == []
 
 
+def test_masks_of_the_caller_stay_as_they_are():
+    masks = np.ones((FRAMES, HEIGHT, WIDTH), bool)
+    for i in range(FRAMES):
+        masks[i, : 2 * i] = False
+    before = masks.copy()
+    said([tissue(i) for i in range(FRAMES)], masks)
+    assert (masks == before).all()
+
+
 def test_a_second_picture_and_grey_bars_are_named_with_their_border():
     beside = [np.hstack([tissue(i), 255 - tissue(FRAMES - 1 - i)]) for i in range(FRAMES)]
     ((code, what),) = said(beside)

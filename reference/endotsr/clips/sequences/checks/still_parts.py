@@ -51,7 +51,7 @@ class StillParts:
         else:
             self._sum += grey
             self._slopes += slopes
-            self._tissue &= mask
+            self._tissue = self._tissue & mask  # the first one may be the mask of the caller
         self._view.add(picture)
         self._frames += 1
 
