@@ -1,6 +1,6 @@
 """Depth against the stereo pairs of the same clip: its scale, an offset, and distances along the ray.
 
-In: a clip with right views and depth. Out: findings. A pair shows z = f b / d in every pixel with a disparity d. Depth
+In: a clip with right views and depth. Out: findings. A pixel of a pair with the disparity d has z = f b / d. Depth
 times a number, depth plus a length, and distances along the ray instead of along the optical axis differ from it in
 three ways, which one frame tells apart.
 """
