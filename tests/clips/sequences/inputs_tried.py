@@ -75,6 +75,7 @@ from squeezed_inputs import SQUEEZED_ROWS
 from strange_inputs import STRANGE_ROWS
 from stranger_inputs import STRANGER_ROWS
 from stream_inputs import STREAM_ROWS
+from surgeon_inputs import SURGEON_ROWS
 from test_propose_masks import scene, through_a_scope
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
@@ -432,6 +433,7 @@ ROWS = [
     *STRANGER_ROWS,
     *STRANGE_ROWS,
     *EXPORTED_ROWS,
+    *SURGEON_ROWS,
 ]  # fmt: skip
 
 

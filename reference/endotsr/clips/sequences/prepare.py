@@ -17,6 +17,7 @@ from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import baseline_findings, intrinsics_findings
+from endotsr.clips.sequences.checks.depth_pair import depth_pair_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.written import WrittenFrames
@@ -103,8 +104,13 @@ def prepare(
     with new_folder(Path(out), FILE_NAME if replace else "", WRITTEN) as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
-        notes += _checked_poses(folder, found)
+        notes += _checked_depth(folder, found) + _checked_poses(folder, found)
     return found, notes
+
+
+def _checked_depth(folder: Path, found: SequenceFile) -> list[str]:
+    """Notes on depth that the stereo pairs contradict."""
+    return [] if found.depth is None else notes_of(depth_pair_findings(describe_prepared(folder)))
 
 
 def _checked_poses(folder: Path, found: SequenceFile) -> list[str]:
@@ -158,7 +164,7 @@ def _write_frames(
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
     facts: list[FrameFacts] = []
-    seen = WrittenFrames()
+    seen = WrittenFrames(len(chosen))
     (folder / IMAGES).mkdir()
     for k, (i, pair) in enumerate(zip(chosen, clip.pictures(chosen))):
         if straight is None:

@@ -24,6 +24,7 @@ from endotsr.clips.sequences.checks.depth import (
     light_finding,
     usual_depth,
 )
+from endotsr.clips.sequences.checks.depth_pair import depth_pair_findings
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps, scale_finding
 from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
 from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
@@ -39,7 +40,9 @@ from endotsr.clips.sequences.checks.frames import (
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
+from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.stereo import pair_findings
+from endotsr.clips.sequences.checks.still_parts import StillParts
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.field_of_view import FieldOfView
@@ -84,6 +87,7 @@ class _Pass:
         self.frames: list[FrameFacts] = []
         self.masks = MaskSteps()
         self.view = FieldOfView()
+        self.still = StillParts(count)
         self.depth: list[DepthFacts] = []
         self.steps = DepthSteps(count)
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
@@ -130,6 +134,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     if run.frames:
         run.findings += frame_findings(run.frames, str(clip.images[0].parent))
         run.findings += border_findings(run.view, str(clip.images[0].parent))
+        run.findings += run.still.findings(str(clip.images[0].parent))
     if clip.masks and clip.masks.files:
         run.findings += run.masks.findings(str(clip.masks.files[0].parent))
     if run.depth and clip.depth:
@@ -137,7 +142,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
         run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
-    run.findings += pair_findings(clip)
+    run.findings += pair_findings(clip) + depth_pair_findings(clip)
     run.findings += baseline_findings(clip.baseline if clip.right else None, clip.arbitrary, str(clip.stated_in))
     if run.samples:
         _check_masks(clip, run, config)
@@ -210,6 +215,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         tissue = _mask(clip, run, masks[i], i, size, levels)
         run.masks.add(i, tissue)
         run.view.add(picture, tissue)
+        run.still.add(i, picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         run.steps.add(i, picture, found, tissue)
         if i in sampled:
@@ -297,6 +303,10 @@ def _check_masks(clip: Clip, run: _Pass, config: Config) -> None:
     assert clip.masks is not None
     where, allow = str(clip.masks.files[0].parent), config.sequence.allow_tissue_fraction
     excluded, stated_in = clip.masks.excluded_value, clip.masks.stated_in
+    evidence = MaskEvidence(step=1)
+    for _, small, tissue, sparse in run.samples:
+        evidence.add(small, tissue, sparse)
+    run.findings += evidence.flip_findings(where)
     if run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where) is None:
         return
     if (

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.checks.depth_rims import blended_rim
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.depth_files import CLIPPED
 from endotsr.clips.sequences.depth_outliers import outlying_frames, said
@@ -23,6 +24,7 @@ LEAST_FRAMES, REPEATED = 4, 0.5  # frames; different planes of depth for each of
 FULL_SCALE = (255.0, 65535.0)
 MARK, MARKED = 8.0, 0.005  # a mark of missing depth: times the median, fraction of the pixels
 APART, ENDS = 1.5, (0.5, 99.5)  # the same in all frames: times these percentiles of the other depths
+BLENDED = 0.3  # of the pixels beside holes; at most 0.01 on measured clips, 1 where holes were interpolated
 AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
 LIT, FEWEST = (20, 250), 300  # grey levels that are neither black nor overexposed; pixels of a correlation
 
@@ -42,6 +44,7 @@ class DepthFacts(NamedTuple):
     limit: float = 0.0  # far limit: the upper percentile to which a reader clips
     digest: bytes = b""  # of the depth, equal for equal planes
     at_lowest: float = 0.0  # as at_highest
+    blended: float = 0.0  # see `depth_rims.blended_rim`
     others: tuple[float, float] = (0.0, 0.0)  # between which all depths but the lowest and highest lie, outliers aside
 
 
@@ -63,6 +66,7 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
         float(np.percentile(values, CLIPPED[1])) if values.size else 0.0,
         blake2b(depth.tobytes(), digest_size=16).digest(),
         float((values == values.min()).mean()) if values.size else 0.0,
+        blended_rim(depth),
         _between(values),
     )
 
@@ -100,10 +104,20 @@ def depth_findings(
     if outlying := outlying_frames(far_limits(facts)):
         found.append(finding("depth-outliers", where, f"the depth reaches much farther in frame {said(outlying)}"))
     found += [] if assumed else _repeated(with_depth, where)
+    found += rim_finding([fact.blended for fact in with_depth], where)
     coverage = float(np.mean([fact.tissue_coverage for fact in facts]))
     if coverage < LITTLE:
         found.append(finding("little-depth", where, f"{coverage:.1%} of the tissue has depth"))
     return found
+
+
+def rim_finding(blended: list[float], where: str) -> list[Finding]:
+    """A warning on depth that was interpolated across holes; `blended` of the frames, NaN where unknown."""
+    known = [value for value in blended if np.isfinite(value)]
+    if not known or np.median(known) < BLENDED:
+        return []
+    what = f"{np.median(known):.0%} of the pixels beside a pixel without depth are far nearer than those around them"
+    return [finding("blended-depth", where, what)]
 
 
 def _repeated(facts: list[DepthFacts], where: str) -> list[Finding]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
+from endotsr.clips.sequences.checks.exchanged import exchanged_findings
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.clips.sequences.files import frame_numbers, shortened
@@ -72,14 +73,16 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     found = [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, float(means[i]), where, i)]
     readable = (means >= BLACK) & (means <= WHITE)
     steps = steps_between([fact.small for fact in facts])
-    found += copy_findings(steps, [fact.name for fact in facts], readable, where)
+    names = [fact.name for fact in facts]
+    found += copy_findings(steps, names, readable, where)
+    found += exchanged_findings([fact.small for fact in facts], steps, names, readable, where)
     for i in range(1, len(facts)):
         if readable[i - 1] and readable[i] and not 1 / JUMP < means[i] / means[i - 1] < JUMP:
             what = f"brightness changes by {means[i] / means[i - 1]:.2f} times"
             found.append(finding("exposure-jump", where, what, i))
     found += _of_clip(facts, means, where)
     grey = [fact.small.mean(axis=2) for fact in facts]
-    found += cut_findings(grey, [fact.name for fact in facts], readable, where) + halves_finding(grey, where)
+    found += cut_findings(grey, names, readable, where) + halves_finding(grey, where)
     found += alternating_finding(grey, where) + _blue_finding(facts, where)
     woven = [fact.comb for fact in facts if fact.comb > WOVEN]  # of film as video, two of five pictures
     if woven and len(woven) >= PART * len(facts):

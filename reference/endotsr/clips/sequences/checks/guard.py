@@ -17,6 +17,7 @@ from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_findi
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
 from endotsr.clips.sequences.checks.masks import mask_findings
+from endotsr.clips.sequences.checks.still_parts import loaded_still_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
@@ -39,6 +40,7 @@ def guarded(
     found = gap_findings(images) + time_findings(None if clip.times is None else clip.times[list(frames)], folder)
     found += frame_findings([picture for picture, _ in facts], str(images[0].parent))
     found += loaded_border_findings(sequence.images, sequence.masks, str(images[0].parent))
+    found += loaded_still_findings(sequence.images, sequence.masks, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
     priors = str(clip.depth.files[0].parent)

@@ -61,6 +61,9 @@ KINDS: dict[str, Kind] = {
     "repeated-frames": Kind("warning", "the motion stops and jumps, and training leaves out every frame that a held-out"
                             " frame repeats",
                             "prepare the clip again with the --frames that are named"),
+    "exchanged-frames": Kind("warning", "the motion goes back and forth there, and a held-out frame stands between"
+                             " frames of other times",
+                             "give the pictures the numbers of their times, with masks and depth of the same frames"),
     "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
                           "fit exposures (model.exposure = true), or cut the clip with --frames"),
     "another-scene": Kind("warning", "training fits one scene, and the parts before and after a cut are unrelated",
@@ -69,6 +72,11 @@ KINDS: dict[str, Kind] = {
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
     "alternating-views": Kind("warning", "two alternating cameras or kinds of light are not one scene",
                               "prepare each separately: --frames ::2, and --frames 1::2"),
+    "straight-border": Kind("warning", "two pictures in one, or bars that are not black, are not one view of one scene",
+                            "cut the picture out: endotsr prepare --crop; or exclude the rest: --unite-masks"),
+    "burnt-in": Kind("warning", "training fits it as tissue that travels with the camera",
+                     "exclude it: endotsr prepare --unite-masks FILE with a mask of it; or cut a row of text off with"
+                     " --crop"),
     "frozen-right-view": Kind("warning", "depth from such a pair joins two moments",
                               "record or export the right view again, or leave these frames out: endotsr prepare"
                               " --drop"),
@@ -99,6 +107,10 @@ KINDS: dict[str, Kind] = {
                                  " undefined",
                                  "inspect its mask; leave the frame out if the mask is right"),
     "single-mask": Kind("refusal", REFUSED, "correct this mask"),
+    "exchanged-masks": Kind("warning", "the masks hide tissue and show the instrument there",
+                            "give each mask the number of its picture"),
+    "flipped-masks": Kind("warning", "the masks hide tissue and show the instrument",
+                          "store their first row at the top and their first column at the left, like the picture"),
     "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
                         " held-out frame there is measured on pixels that training hardly sees",
                         f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
@@ -124,6 +136,10 @@ KINDS: dict[str, Kind] = {
                        "store millimetres, or a smaller step with its scale"),
     "marked-depth": Kind("warning", "the value seems to mark pixels without depth but is read as a distance",
                          "store 0 where there is no depth"),
+    "blended-depth": Kind("warning", "depth was resized with interpolation, which makes depths of 0 and of tissue into"
+                          " depths in front of it",
+                          "resize depth without interpolation, or give endotsr depth --given the files in their own"
+                          " size"),
     "still-depth": Kind("note", "the shape of the tissue comes from one moment",
                         "none needed if the scene rests; else supply one file of depth for each frame"),
     "depth-own-scale": Kind("warning", "every frame pulls the tissue to another distance: the depth of each frame may"
@@ -139,6 +155,9 @@ KINDS: dict[str, Kind] = {
     "depth-against-light": Kind("warning", "the light is on the scope, which makes near tissue brighter: the file may"
                                 " hold disparity or an inverse depth, or be mirrored or upside down",
                                 "read a disparity as such: endotsr depth --given FOLDER --kind disparity"),
+    "depth-against-pair": Kind("warning", "one of them is wrong: the depth, the baseline or the focal length",
+                               "state the unit of the depth: prepare --depth-unit and --depth-scale; export depth along"
+                               " the optical axis, without an offset; or endotsr depth CLIP --replace"),
     "flipped-depth": Kind("warning", "the depth does not match the tissue in the picture",
                           "store its first row at the top and its first column at the left, like the picture"),
     # cameras

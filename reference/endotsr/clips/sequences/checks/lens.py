@@ -32,13 +32,32 @@ def folded_fraction(matrix: FloatArray, distortion: FloatArray, width: int, heig
     return float((radius > r[turned[0]]).mean()) if turned.size else 0.0
 
 
-def lens_warnings(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> list[str]:
-    """A warning on a lens model that turns back inside the straightened picture."""
-    folded = folded_fraction(matrix, distortion, width, height)
-    if folded == 0:
+TANGENTIAL = 0.03  # of a decentred lens; that of public calibrations is below 0.01, a third radial one often above 0.05
+
+
+def _tangential_warnings(distortion: FloatArray) -> list[str]:
+    """A warning on tangential coefficients that are as large as radial ones."""
+    found = np.ravel(distortion)
+    if found.size < 4 or np.abs(found[2:4]).max() <= TANGENTIAL:
         return []
+    said = ", ".join(f"{k:g}" for k in found)
+    order = ""
+    if found.size == 5 and np.abs(found[3:5]).max() <= TANGENTIAL < abs(found[2]):
+        order = f"; {found[0]:g} {found[1]:g} {found[3]:g} {found[4]:g} {found[2]:g} if they are k1 k2 k3 p1 p2"
+    return [
+        f"warning: the distortion {said} has tangential coefficients of {np.abs(found[2:4]).max():g}, as no centred"
+        f" lens has; allowed: coefficients in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]{order}"
+    ]
+
+
+def lens_warnings(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> list[str]:
+    """Warnings on large tangential coefficients, and on a lens model that turns back inside the picture."""
+    folded, found = folded_fraction(matrix, distortion, width, height), _tangential_warnings(distortion)
+    if folded == 0:
+        return found
     said = ", ".join(f"{k:g}" for k in np.ravel(distortion))
     return [
+        *found,
         f"warning: the distortion {said} turns back inside the picture: {folded:.1%} of it show parts of the source"
-        " twice; allowed: coefficients of this lens in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]"
+        " twice; allowed: coefficients of this lens in the order k1 k2 p1 p2 [k3 [k4 k5 k6]]",
     ]

@@ -6,6 +6,7 @@ find; where the matching fails in a frame, its mask differs from those before an
 
 import numpy as np
 
+from endotsr.clips.sequences.checks.exchanged import MaskOrder
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.method.kernels.arrays import BoolArray
 
@@ -23,10 +24,12 @@ class MaskSteps:
 
     def __init__(self) -> None:
         self.fractions: dict[int, float] = {}  # by frame
+        self._order = MaskOrder()
         self._last: tuple[BoolArray | None, BoolArray | None] = (None, None)
 
     def add(self, frame: int, mask: BoolArray | None) -> None:
         """The mask of a frame, (H, W), True = tissue; stored until the second next one."""
+        self._order.add(mask)
         before, middle = self._last
         if before is not None and middle is not None and mask is not None:
             if before.shape == middle.shape == mask.shape and all(0 < m.mean() < 1 for m in (before, middle, mask)):
@@ -34,11 +37,12 @@ class MaskSteps:
         self._last = (middle, mask)
 
     def findings(self, where: str) -> list[Finding]:
-        """A warning for every frame whose mask differs from both neighbours unusually much."""
+        """A warning for every frame whose mask differs from both neighbours unusually much, or is exchanged."""
         usual = float(np.median(list(self.fractions.values()) or [0.0]))
         unlike = {i: fraction for i, fraction in self.fractions.items() if fraction > max(UNLIKE, USUAL * usual)}
         what = "its mask differs from both neighbours in {:.1%} of the pixels"
-        return [finding("unlike-mask", where, what.format(fraction), i) for i, fraction in unlike.items()]
+        found = [finding("unlike-mask", where, what.format(fraction), i) for i, fraction in unlike.items()]
+        return found + self._order.findings(where)
 
 
 def mask_findings(masks: BoolArray, where: str) -> list[Finding]:

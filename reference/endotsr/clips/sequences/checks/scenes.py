@@ -12,6 +12,7 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 ALIKE = 0.6  # correlation of picture halves that indicates two views; published clips of one view have at most 0.3
 OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # correlation of neighbouring frames: at a cut, and usually elsewhere
 ALTERNATING = 0.2  # correlation of pictures two apart minus that of neighbours; motion makes it negative
+DARK, LEAST_LIT = 20.0, 0.2  # grey levels of a black bar; part of a half that is compared
 FARTHEST = 6  # the largest shift between two views is 1 / FARTHEST of the width of a half
 
 
@@ -54,12 +55,20 @@ def halves_finding(grey: list[FloatArray], where: str) -> list[Finding]:
     grey   (h, w) of every frame, reduced
     """
     large = [picture for picture in grey if min(picture.shape) >= 2 * FARTHEST]
+    lit = _lit(large)  # black bars beside a picture make its halves alike
     for layout, halves in (("side by side", _beside), ("stacked", _stacked)):
-        alike = float(np.median([_shifted_correlation(*halves(picture)) for picture in large] or [0.0]))
+        alike = float(np.median([_shifted_correlation(*halves(picture), *halves(lit)) for picture in large] or [0.0]))
         if alike > ALIKE:
             what = f"the halves of the pictures, {layout}, resemble each other (correlation {alike:.2f})"
             return [finding("two-views", where, what)]
     return []
+
+
+def _lit(pictures: list[FloatArray]) -> FloatArray:
+    """(h, w) 1 where some picture is not dark; 1 everywhere for pictures of several sizes."""
+    if len({picture.shape for picture in pictures}) != 1:
+        return np.ones(pictures[0].shape if pictures else (1, 1))
+    return (np.max(pictures, axis=0) > DARK).astype(np.float64)
 
 
 def _beside(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -72,14 +81,19 @@ def _stacked(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
     return picture[:height], picture[-height:]
 
 
-def _shifted_correlation(one: FloatArray, other: FloatArray) -> float:
-    """The largest correlation of two pictures over horizontal shifts of up to a sixth of the width."""
+def _shifted_correlation(one: FloatArray, other: FloatArray, lit: FloatArray, other_lit: FloatArray) -> float:
+    """The largest correlation of two pictures over shifts of up to a sixth of the width, where both are lit."""
+    if one.shape != lit.shape:
+        lit, other_lit = np.ones(one.shape), np.ones(other.shape)
     width = one.shape[1]
     most = width // FARTHEST
-    return max(
-        _correlation(one[:, max(0, k) : width + min(0, k)], other[:, max(0, -k) : width + min(0, -k)])
-        for k in range(-most, most + 1)
-    )
+    best = 0.0
+    for k in range(-most, most + 1):
+        here, there = slice(max(0, k), width + min(0, k)), slice(max(0, -k), width + min(0, -k))
+        both = (lit[:, here] > 0) & (other_lit[:, there] > 0)
+        if both.mean() >= LEAST_LIT:
+            best = max(best, _correlation(one[:, here][both], other[:, there][both]))
+    return best
 
 
 def _correlation(one: FloatArray, other: FloatArray) -> float:

@@ -1,0 +1,166 @@
+"""What stands still in pictures that move: burnt-in text, logos, and the straight border of a second picture.
+
+In: pictures and tissue of a clip, one frame at a time. Out: findings. An edge that moves is blurred in the mean of all
+frames, and an edge that stands still is not. A border between two pictures is an edge in a whole column or row.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.clips.opencv import area_resize
+from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.field_of_view import FieldOfView
+from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.splits import even_frames
+from endotsr.method.kernels.arrays import BoolArray, FloatArray
+
+WORKING, SAMPLED, FEWEST = 640, 32, 6  # columns of the pictures that are looked at; frames of a clip, and of a finding
+MARGIN = 2  # pixels of tissue around an edge
+SHARP, STILL = 70.0, 0.9  # grey levels from pixel to pixel in the mean of all frames; part of an edge that it keeps
+# Sharp still edges, pixels per column of the picture: at most 0.03 on four recorded clips and twelve simulated ones of
+# 320 columns or more, and 0.10 to 1.9 with a line of opaque text on tissue of any of them. Small grey text and
+# transparent text have less than the limit on most of them.
+MANY, NARROWEST = 0.07, 240  # and columns: smaller pictures have sharp edges of their own
+FAINT, MOVING = 6.0, 0.75  # grey levels of other edges, and the part of them above which the whole scene stands still
+BORDER = 4.5  # times the steps beside it: at most 3.1 in tissue on these clips, 6.0 or more between two pictures
+BESIDE, NEXT = 12, 3  # columns on either side that are compared, without the nearest
+LONG, FLAT = 0.3, 0.5  # part of a column that is tissue; grey levels of a picture without steps
+
+
+class StillParts:
+    """Sums over the frames of a clip of `count` frames."""
+
+    def __init__(self, count: int) -> None:
+        self._sampled = set(even_frames(count, SAMPLED))
+        self._sum: FloatArray | None = None  # (h, w) grey levels
+        self._slopes: FloatArray | None = None  # (2, h, w) absolute slopes across and down
+        self._tissue: BoolArray | None = None  # (h, w) in every frame
+        self._view, self._frames = FieldOfView(), 0
+        self._size = (0, 0)  # of a picture
+
+    def add(self, i: int, picture: NDArray[np.uint8], tissue: BoolArray | None) -> None:
+        """Frame i: picture (H, W, 3), tissue (H, W) or None without masks. Pictures of another size are left out."""
+        if i not in self._sampled or (self._frames and picture.shape[:2] != self._size):
+            return
+        grey = _working(picture)
+        slopes, mask = np.abs(_slopes(grey)), np.ones(grey.shape, bool) if tissue is None else _reduced(tissue, grey)
+        if self._sum is None or self._slopes is None or self._tissue is None:
+            self._size, self._sum, self._slopes, self._tissue = picture.shape[:2], grey, slopes, mask
+        else:
+            self._sum += grey
+            self._slopes += slopes
+            self._tissue = self._tissue & mask  # the first one may be the mask of the caller
+        self._view.add(picture)
+        self._frames += 1
+
+    def findings(self, where: str) -> list[Finding]:
+        """Findings on burnt-in parts and on borders of a second picture."""
+        if self._sum is None or self._slopes is None or self._tissue is None or self._frames < FEWEST:
+            return []
+        outside = self._view.outside()
+        height, width = self._sum.shape
+        seen = self._tissue if outside is None else self._tissue & ~nearest_pixels(outside, width, height, "mask")
+        mean = _Edges(self._sum / self._frames, self._slopes / self._frames, _inner(seen), self._size[1] / width)
+        return _border_findings(mean, where) or _burnt_in_findings(mean, where)
+
+
+class _Edges(NamedTuple):
+    """Means over the frames at the working size."""
+
+    grey: FloatArray  # (h, w)
+    slopes: FloatArray  # (2, h, w) mean absolute slopes
+    seen: BoolArray  # (h, w) tissue inside the field of view, without its margin
+    factor: float  # pixels of a picture per pixel
+
+
+def _burnt_in_findings(edges: _Edges, where: str) -> list[Finding]:
+    """Sharp edges that stand still in a scene that moves."""
+    kept, every = np.hypot(*_slopes(edges.grey)), np.hypot(*edges.slopes)
+    still = kept > STILL * every
+    sharp = edges.seen & still & (kept > SHARP)
+    others = edges.seen & (every > FAINT) & ~_grown(sharp)
+    if sharp.shape[1] < NARROWEST or sharp.sum() <= MANY * sharp.shape[1]:
+        return []
+    if not others.any() or still[others].mean() > MOVING:
+        return []
+    rows, columns = np.nonzero(sharp)
+    (top, bottom), (left, right) = (
+        np.rint(np.percentile(place, (2, 98)) * edges.factor).astype(int) for place in (rows, columns)
+    )
+    what = (
+        f"sharp edges stand still where the rest moves, most of them in columns {left} to {right} and rows {top} to"
+        f" {bottom}: text, a logo, or an instrument at rest"
+    )
+    return [finding("burnt-in", where, what)]
+
+
+def _border_findings(edges: _Edges, where: str) -> list[Finding]:
+    """A straight border over the whole height or width, as between two pictures."""
+    for k, line in enumerate(("column", "row")):
+        steps, place = _border(edges.slopes[k], edges.seen, k)
+        if steps > BORDER:
+            what = (
+                f"a straight border crosses the pictures at {line} {round(place * edges.factor)}: the step there is"
+                f" {steps:.1f} times those beside it"
+            )
+            return [finding("straight-border", where, what)]
+    return []
+
+
+def _border(slope: FloatArray, seen: BoolArray, axis: int) -> tuple[float, int]:
+    """The largest step of a column (axis 0) or row (axis 1), relative to those beside it, and its place."""
+    counts = seen.sum(axis=axis)
+    long = counts > LONG * seen.shape[axis]
+    profile = np.full(counts.size, np.nan)
+    profile[long] = np.nanmedian(np.where(seen, slope, np.nan).compress(long, axis=1 - axis), axis=axis)
+    best = (0.0, 0)
+    for place in np.flatnonzero(long):
+        beside = np.concatenate([profile[max(0, place - BESIDE) : max(0, place - NEXT)],
+                                 profile[place + NEXT + 1 : place + BESIDE + 1]])  # fmt: skip
+        beside = beside[np.isfinite(beside)]
+        if beside.size >= BESIDE - NEXT:
+            best = max(best, (float(profile[place] / max(np.median(beside), FLAT)), int(place)))
+    return best
+
+
+def loaded_still_findings(images: NDArray[np.uint8], masks: BoolArray, where: str) -> list[Finding]:
+    """The findings on images (n, 3, H, W) and masks (n, H, W), True = tissue."""
+    parts = StillParts(len(images))
+    for i in even_frames(len(images), SAMPLED):
+        parts.add(i, np.ascontiguousarray(images[i].transpose(1, 2, 0)), masks[i])
+    return parts.findings(where)
+
+
+def _working(picture: NDArray[np.uint8]) -> FloatArray:
+    """The grey picture, its longer side reduced to `WORKING`."""
+    height, width = picture.shape[:2]
+    factor = min(1.0, WORKING / max(height, width))
+    small = area_resize(picture, max(1, round(width * factor)), max(1, round(height * factor)))
+    return small.mean(axis=2, dtype=np.float32)
+
+
+def _reduced(tissue: BoolArray, grey: FloatArray) -> BoolArray:
+    height, width = grey.shape
+    return np.asarray(nearest_pixels(tissue, width, height, "mask"), bool)
+
+
+def _slopes(grey: FloatArray) -> FloatArray:
+    """(2, h, w) steps to the next column and to the next row, grey levels; 0 at the end."""
+    found = np.zeros((2, *grey.shape), np.float32)
+    found[0, :, :-1] = np.diff(grey, axis=1)
+    found[1, :-1] = np.diff(grey, axis=0)
+    return found
+
+
+def _inner(seen: BoolArray) -> BoolArray:
+    from scipy.ndimage import binary_erosion
+
+    return np.asarray(binary_erosion(seen, iterations=MARGIN, border_value=1), bool)
+
+
+def _grown(part: BoolArray) -> BoolArray:
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(part, iterations=4 * MARGIN), bool)

@@ -1,0 +1,102 @@
+"""Rows of `inputs_tried.py` about clips of capture cards and consoles, and files in each other's place."""
+
+from pathlib import Path
+
+import numpy as np
+from input_kinds import OPENCV, Row, calibrated, folder_of, prepare, video
+from made_videos import HEIGHT, WIDTH, files, picture, pictures
+from scipy.ndimage import zoom
+from test_stated_depth import true_depth
+from test_still_parts import FRAMES, tissue, with_text
+
+from endotsr.cli.main import main
+from endotsr.clips.opencv import read_png, write_png
+
+WIDE = ("--camera", "250", "250", "128", "96")
+OTHER_ORDER = "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [-0.1, 0.01, {}]\n"
+
+
+def of_tissue(change, *words: str):
+    """Pictures of moving tissue, changed."""
+
+    def make(folder: Path) -> list[str]:
+        files(folder, "clip", [change(tissue(i), i) for i in range(FRAMES)])
+        return prepare("clip", *words, camera=WIDE)(folder)
+
+    return make
+
+
+def exchanged(frames: list) -> list:
+    """Frames 6 and 7 in each other's place."""
+    return [*frames[:6], frames[7], frames[6], *frames[8:]]
+
+
+def slow(count: int = 16) -> list[np.ndarray]:
+    return [picture(0.5 * i) for i in range(count)]
+
+
+def mirrored_masks(flip) -> list[str]:
+    """A grey instrument at the left, and masks of it."""
+
+    def make(folder: Path) -> list[str]:
+        shown, masks = pictures(), []
+        for frame in shown:
+            frame[20:80, :40] = 110
+            mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+            mask[20:80, :40] = 255
+            masks.append(flip(mask))
+        files(folder, "m", masks)
+        return [*folder_of(shown)(folder), "--masks", str(folder / "m")]
+
+    return make
+
+
+def soft_depth(folder: Path) -> list[str]:
+    """True depth with a hole, resized by two with linear interpolation."""
+    files(folder, "clip", pictures())
+    (folder / "d").mkdir()
+    for i in range(12):
+        plane = true_depth(i)[::2, ::2].astype(np.float32)
+        plane[10:30, 10:40] = 0
+        np.save(folder / "d" / f"{i:04d}.npy", zoom(plane, 2, order=1).astype(np.float32))
+    return [*prepare("clip")(folder), "--depth", str(folder / "d")]
+
+
+def simulated(change, *words: str):
+    """A simulated clip with its right view, whose depth is changed."""
+
+    def make(folder: Path) -> list[str]:
+        size = ["--width", "192", "--height", "160", "--frames", "3"]
+        main(["simulate", "still", "--out", str(folder / "raw"), *size])
+        for file in (folder / "raw/depth").iterdir():
+            write_png(file, change(read_png(file).astype(np.uint16)).astype(np.uint16))
+        return prepare("raw", "--baseline", "4", *words, camera=())(folder)
+
+    return make
+
+
+def bars(shown: np.ndarray) -> np.ndarray:
+    """The grey desktop of a console on both sides."""
+    side = np.full((shown.shape[0], 60, 3), 90, np.uint8)
+    return np.hstack([side, shown, side])
+
+
+SURGEON_ROWS = [
+    Row("pictures, text of a console", of_tissue(lambda shown, i: with_text(shown)), "told", "burnt-in"),
+    Row("pictures, two recordings side by side", of_tissue(lambda shown, i: np.hstack([shown,
+        255 - tissue(FRAMES - 1 - i)])), "told", "a straight border crosses the pictures at column"),
+    Row("pictures, the grey desktop of a console beside them", of_tissue(lambda shown, i: bars(shown)), "told",
+        "a straight border crosses the pictures at column"),
+    Row("pictures, two of them exchanged", folder_of(exchanged(slow())), "told", "exchanged-frames"),
+    Row("video, two pictures exchanged", video("a.mp4", exchanged(slow())), "told", "exchanged-frames"),
+    Row("masks, mirrored", mirrored_masks(lambda mask: mask[:, ::-1]), "told", "flipped-masks"),
+    Row("masks, not mirrored", mirrored_masks(lambda mask: mask), "right"),
+    Row("depth, resized with interpolation across holes", soft_depth, "told", "blended-depth"),
+    Row("depth, 5000 steps a metre, with a right view", simulated(lambda z: 5 * z), "told",
+        "5000 steps a metre read as millimetres"),
+    Row("depth, 15 mm more, with a right view", simulated(lambda z: z + 15), "told", "mm more than"),
+    Row("calibration, k1 k2 k3 p1 p2", calibrated("a.yaml", OPENCV + OTHER_ORDER.format("-0.08, 0.0007, -0.0003")),
+        "told", "if they are k1 k2 k3 p1 p2"),
+    Row("camera, k1 k2 k3 p1 p2", folder_of(pictures(), "--distortion", "-0.1", "0.01", "-0.08", "0.001", "0.002"),
+        "told", "if they are k1 k2 k3 p1 p2"),
+]  # fmt: skip

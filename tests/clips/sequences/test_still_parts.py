@@ -1,0 +1,104 @@
+"""Burnt-in text and the border between two pictures are named where the rest moves, and nothing else is."""
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from data_folder import data_folder
+from endotsr.cli.main import main
+from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.checks.still_parts import StillParts
+from endotsr.clips.simulator.scenes import named_scene
+from endotsr.clips.simulator.simulate import simulate
+
+HEIGHT, WIDTH, FRAMES = 192, 256, 12
+_ROUGH = gaussian_filter(np.random.default_rng(0).uniform(0, 255, (HEIGHT + 80, WIDTH + 80)), 1.5)
+TEXTURE = np.interp(_ROUGH, (_ROUGH.min(), _ROUGH.max()), (40, 190))
+
+
+def tissue(i, step=4):
+    """Red tissue that moves by some pixels a frame."""
+    grey = TEXTURE[i * step // 2 : i * step // 2 + HEIGHT, i * step : i * step + WIDTH]
+    return np.stack([grey + 60, grey / 2, grey / 2], axis=2).astype(np.uint8)
+
+
+def with_text(picture):
+    found = np.ascontiguousarray(picture)
+    cv2.putText(found, "MEIER 1234", (40, 60), cv2.FONT_HERSHEY_SIMPLEX, 0.9, (255, 255, 255), 1)
+    return found
+
+
+def said(pictures, masks=None):
+    parts = StillParts(len(pictures))
+    for i, picture in enumerate(pictures):
+        parts.add(i, picture, None if masks is None else masks[i])
+    return [(found.code, found.what) for found in parts.findings("clip")]
+
+
+def test_text_is_named_with_its_place_and_moving_tissue_is_not():
+    assert said([tissue(i) for i in range(FRAMES)]) == []
+    ((code, what),) = said([with_text(tissue(i)) for i in range(FRAMES)])
+    assert code == "burnt-in" and "where the rest moves" in what
+    words = what.split()
+    left, right = (int(words[words.index("columns") + k]) for k in (1, 3))
+    assert 35 <= left < right <= 220
+
+
+def test_excluded_text_a_still_scene_and_few_frames_say_nothing():
+    pictures = [with_text(tissue(i)) for i in range(FRAMES)]
+    outside = np.ones((HEIGHT, WIDTH), bool)
+    outside[30:70] = False
+    assert said(pictures, [outside] * FRAMES) == []
+    assert said([with_text(tissue(0))] * FRAMES) == []
+    assert said(pictures[:3]) == []
+
+
+def test_masks_of_the_caller_stay_as_they_are():
+    masks = np.ones((FRAMES, HEIGHT, WIDTH), bool)
+    for i in range(FRAMES):
+        masks[i, : 2 * i] = False
+    before = masks.copy()
+    said([tissue(i) for i in range(FRAMES)], masks)
+    assert (masks == before).all()
+
+
+def test_a_second_picture_and_grey_bars_are_named_with_their_border():
+    beside = [np.hstack([tissue(i), 255 - tissue(FRAMES - 1 - i)]) for i in range(FRAMES)]
+    ((code, what),) = said(beside)
+    assert code == "straight-border" and any(f"column {WIDTH + k}:" in what for k in (-2, -1, 0, 1))
+    below = [np.vstack([tissue(i), np.full((40, WIDTH, 3), 90, np.uint8)]) for i in range(FRAMES)]
+    ((code, what),) = said(below)
+    assert code == "straight-border" and any(f"row {HEIGHT + k}:" in what for k in (-2, -1, 0, 1))
+
+
+@pytest.mark.parametrize("name", ["cutting", "moving-camera"])
+def test_simulated_clips_have_no_such_parts(name):
+    scene = simulate(msgspec.structs.replace(named_scene(name), width=256, height=192, frames=6)).sequence
+    images, masks = scene.images, scene.masks
+    assert said([np.ascontiguousarray(image.transpose(1, 2, 0)) for image in images], masks) == []
+
+
+def test_text_on_a_recorded_clip():
+    files = sorted((data_folder("sinus_endoscopy") / "images").iterdir())[::2]
+    pictures = [np.ascontiguousarray(read_picture(file)[::3, ::3]) for file in files]
+    assert said(pictures) == []
+
+    def burnt(picture):
+        cv2.putText(picture, "MEIER, A. 28.11.2026", (130, 90), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (255, 255, 255), 1)
+        return picture
+
+    assert [code for code, _ in said([burnt(picture.copy()) for picture in pictures])] == ["burnt-in"]
+
+
+def test_prepare_and_check_name_it(tmp_path, capsys):
+    (tmp_path / "raw").mkdir()
+    for i in range(FRAMES):
+        write_png(tmp_path / f"raw/{i:03d}.png", with_text(tissue(i)))
+    words = ["--camera", "250", "250", "128", "96"]
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), *words]) == 0
+    assert "warning: burnt-in: sharp edges stand still" in capsys.readouterr().out
+    main(["check", str(tmp_path / "clip")])
+    assert "warning: burnt-in:" in capsys.readouterr().out
