@@ -11,8 +11,8 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 FEWEST = 8  # frames
 # Steps to neighbours over steps across them, the smaller of both sides: at most 0.87 on five recorded clips and 0.95 on
-# eleven simulated ones that move; 1.1 to 6 where two frames are exchanged, in nine of ten places. The limit keeps a third
-# above the sound clips, and so passes over some exchanges.
+# eleven simulated ones that move; 1.1 to 6 where two frames are exchanged, in nine of ten places. The limit lies a
+# third above the sound clips, and so passes over some exchanges.
 EXCHANGED = 1.3
 MOVES = 0.85  # median of the same: 0.51 to 0.80 on these clips, 0.99 on one that stands still
 SELDOM = 0.1  # of the frames: motion that is fast for the frame rate looks like many exchanges
