@@ -4,6 +4,7 @@ import json
 
 import pytest
 from pages.full_size import sweeps
+from pages.store.intervals import interval
 
 from endotsr.errors import InputError
 
@@ -96,3 +97,12 @@ def test_a_pair_of_different_frames_is_refused(folder):
 def test_an_unknown_sweep_is_refused(folder):
     with pytest.raises(InputError, match="use one of: w"):
         sweeps.store("other", folder / "results.json")
+
+
+def test_the_prior_moves_psnr_by_less_than_its_interval_at_any_measured_weight():
+    """The sentences below the table: PSNR is not decided at a million times the published weight, LPIPS is."""
+    rows = sweeps.rows_of(FILES["matern_weight"])
+    apart = {key: sweeps.differences(rows, "lambda_msp 1000000", "lambda_msp 0", key) for key in ("psnr_full", "lpips")}
+    assert [len(values) for values in apart.values()] == [3, 3]
+    (psnr, of_psnr), (lpips, of_lpips) = map(interval, apart.values())
+    assert abs(psnr) < of_psnr and lpips > of_lpips

@@ -12,15 +12,15 @@ RISEN = {  # asked for: 0.1; the page shows these rises
     # before the parts of an iteration depended on the vectors, and the second thread slowed it by more than its share
     ("simulated_breathing", "sharp", "wall"): 0.15,
 }
+ASSUMED = {("endonerf_pulling", "quick", "wall", 64): 16}  # percent; the page says so
 TOO_LONG = {  # the page says so; by the bytes of a register: 32 = AVX2, 64 = AVX-512
     ("endonerf_cutting", "sharp", "wall", 32, "forecast"): 0.23,
-    ("endonerf_pulling", "quick", "wall", 64, "minute"): 0.35,
 }
 
 
 @pytest.mark.parametrize("row", RECORD["rows"], ids=waiting_text.named)
-def test_the_recorded_forecasts_hold_within_15_percent_but_two(row):
-    """The first line too, if the speed was measured; two are as in `TOO_LONG`. The time left rises by a tenth, or as in
+def test_the_recorded_forecasts_hold_within_15_percent_but_one(row):
+    """The first line too, if the speed was measured; one is as in `TOO_LONG`. The time left rises by a tenth, or as in
     `RISEN`."""
     for when in ("start", "forecast", "minute"):
         said = row["said"].get(when)
@@ -37,7 +37,8 @@ def test_the_first_line_of_an_assumed_speed_holds_today_on_the_machine_it_was_me
     shown = waiting_text.today(row)
     assert (shown == "-") == (row["said"]["start"]["speed"] == "measured" or not row["register_bytes"])
     if shown != "-":
-        assert abs(float(shown.partition("(")[2].rstrip("%)"))) <= 15
+        allowed = ASSUMED.get((row["clip"], row["preset"], row["clock"], row["register_bytes"]), 15)
+        assert abs(float(shown.partition("(")[2].rstrip("%)"))) <= allowed
 
 
 def test_what_is_excluded_takes_no_time(monkeypatch):

@@ -3,6 +3,7 @@
 from endotsr.clips.sequences.checks.check import Checked
 from endotsr.clips.sequences.checks.kinds import KINDS
 from endotsr.results.report import parts
+from endotsr.untrusted.names import counted
 
 COST = {  # key of the cost, label, factor, unit
     "sequence_bytes": ("frames as they are read", 1e-6, "MB"),
@@ -19,7 +20,7 @@ def check_page(checked: Checked) -> str:
     """The page as text: findings by level with remedies, and example pictures."""
     counts = {level: sum(f.level == level for f in checked.findings) for level in TITLES}
     verdict = "is ready for training" if not checked.refused else "is refused"
-    found = ", ".join(f"{counts[level]} {level}{'s' * (counts[level] != 1)}" for level in TITLES)
+    found = ", ".join(counted(counts[level], level) for level in TITLES)
     lead = f"{found}; {len(KINDS)} kinds of findings were checked"
     body = [
         f'<p class="eyebrow">endotsr check</p><h1>{parts.text(checked.source)} {verdict}</h1><p class="lead">{lead}</p>'

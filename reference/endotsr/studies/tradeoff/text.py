@@ -1,6 +1,7 @@
 """The results in `tradeoff.json` as table rows, and quantities as text."""
 
 from endotsr.studies.tradeoff.results import DatedMeasurement, Measurement, Point
+from endotsr.untrusted.names import counted
 
 LEVELS = 255.0  # levels of an 8-bit picture
 
@@ -47,9 +48,9 @@ def _row(point: Point) -> list[str]:
 def made(result: DatedMeasurement) -> str:
     """A sentence with date, machine, version and scene of the measurement."""
     processor, cores = (result["machine"].get(key) for key in ("processor", "cores"))
-    about, threads = result["scene"], result["threads"]
+    about, threads = result["scene"], counted(result["threads"], "thread")
     return (
-        f"Measured {result['date'][:10]} on {threads} thread{'s' * (threads != 1)} of {processor} ({cores} cores), "
+        f"Measured {result['date'][:10]} on {threads} of {processor} ({cores} cores), "
         f"endotsr {result['versions']['endotsr']}; medians of {result['repeats']} warm runs. Scene: {about['about']}, "
         f"{about['gaussians']} Gaussians at {about['width']}x{about['height']}."
     )

@@ -40,7 +40,7 @@ class Compared(NamedTuple):
     ray: FloatArray  # (N,) length of the ray to depth 1
 
 
-class PairFit(NamedTuple):
+class DepthAgainstPair(NamedTuple):
     """What relates a depth to that of the pair."""
 
     ratio: float  # median of depth over that of the pair
@@ -83,7 +83,7 @@ def _compared(clip: Clip, i: int) -> Compared | None:
     return Compared(frame.depth[used].astype(np.float64), of_pair, ray[used])
 
 
-def pair_fit(found: list[Compared]) -> PairFit | None:
+def pair_fit(found: list[Compared]) -> DepthAgainstPair | None:
     """The robust fits over all frames; None for few pixels, or where depth and pairs have little in common."""
     if sum(one.depth.size for one in found) < FEWEST:
         return None
@@ -97,7 +97,7 @@ def pair_fit(found: list[Compared]) -> PairFit | None:
     scale, offset = _fitted(np.column_stack([of_pair[near], ones]), depth[near])
     low, high = np.percentile(depth[near], (5, 95))
     usual = float(np.median(depth[near]))
-    return PairFit(float(np.exp(np.median(ratio))), along, scale, offset, usual, float(high - low))
+    return DepthAgainstPair(float(np.exp(np.median(ratio))), along, scale, offset, usual, float(high - low))
 
 
 def _fitted(design: FloatArray, values: FloatArray) -> tuple[float, float]:
@@ -110,7 +110,7 @@ def _fitted(design: FloatArray, values: FloatArray) -> tuple[float, float]:
     return float(found[0]), float(found[1])
 
 
-def fit_findings(fit: PairFit, has_baseline: bool, unit: str, where: str) -> list[Finding]:
+def fit_findings(fit: DepthAgainstPair, has_baseline: bool, unit: str, where: str) -> list[Finding]:
     """The finding of a fit that is not that of a depth along the optical axis with the scale of the pair."""
     if fit.along_ray > ALONG_RAY:
         what = (
