@@ -20,6 +20,24 @@ def by_nearness(sequence: Sequence, time: float) -> NDArray[np.integer]:
     return frames[np.lexsort((frames, np.round(distance, 9)))]  # times i / n have rounding errors
 
 
+def fill_from(
+    sequence: Sequence, frames: NDArray[np.integer], colours: NDArray[np.uint8], left: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Give each pixel the colour of the first of these frames in which it is tissue, in place.
+
+    colours   (3, H W)
+    left      flat indices of the pixels without a colour
+    returns   those that are tissue in none of the frames
+    """
+    for k in frames:
+        if not left.size:
+            break
+        tissue = sequence.masks[k].ravel()[left]
+        found, left = left[tissue], left[~tissue]
+        colours[:, found] = sequence.images[k].reshape(3, -1)[:, found]
+    return left
+
+
 def tissue_colours(sequence: Sequence, index: int) -> NDArray[np.uint8]:
     """The picture of frame `index` (3, H, W), with the colours of tissue in its excluded pixels.
 
@@ -27,11 +45,8 @@ def tissue_colours(sequence: Sequence, index: int) -> NDArray[np.uint8]:
     """
     height, width = sequence.masks[index].shape
     colours = np.where(sequence.masks[index], sequence.images[index], np.uint8(0)).reshape(3, -1)
-    left = np.flatnonzero(~sequence.masks[index])
-    for k in by_nearness(sequence, float(sequence.times[index]))[:NEAREST]:
-        tissue = sequence.masks[k].ravel()[left]
-        found, left = left[tissue], left[~tissue]
-        colours[:, found] = sequence.images[k].reshape(3, -1)[:, found]
+    nearest = by_nearness(sequence, float(sequence.times[index]))[:NEAREST]
+    left = fill_from(sequence, nearest, colours, np.flatnonzero(~sequence.masks[index]))
     if 0 < left.size < height * width:
         from endotsr.clips.opencv import nearest_pixels
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.tissue_colours import by_nearness
+from endotsr.clips.sequences.tissue_colours import by_nearness, fill_from
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.results.evaluation.baselines import MakeRenderer, neighbours, unit, unit_image
 
@@ -28,15 +28,10 @@ WHOLE = 0.999  # bilinear weight of tissue above which all four pixels are tissu
 
 def nearest_tissue(sequence: Sequence, time: float) -> NDArray[np.uint8]:
     """At every pixel, the training frame nearest in time in which it is tissue; 0 where none is. (3, H, W) uint8."""
-    image = np.zeros(sequence.images.shape[1:], np.uint8)
-    missing = np.ones(sequence.images.shape[2:], bool)
-    for k in by_nearness(sequence, time):
-        found = missing & sequence.masks[k]
-        np.copyto(image, sequence.images[k], where=found)
-        missing &= ~found
-        if not missing.any():
-            break
-    return image
+    height, width = sequence.masks.shape[1:]
+    colours = np.zeros((3, height * width), np.uint8)
+    fill_from(sequence, by_nearness(sequence, time), colours, np.arange(height * width))
+    return colours.reshape(3, height, width)
 
 
 def filled_picture(sequence: Sequence, index: int) -> NDArray[np.uint8]:
