@@ -7,6 +7,7 @@ changed module, which take longest. `--run` runs them and stops at the first tha
 write`: no run of tests rewrites its expected values.
 """
 
+import argparse
 import ast
 import subprocess
 import sys
@@ -143,10 +144,17 @@ def commands(paths: list[str]) -> list[str]:
 
 def main(words: list[str]) -> int:
     """Print the commands; with --run, run them. Returns: the exit code of the first that fails, or 0."""
-    given = [word for word in words if word != "--run"]
-    for command in commands(changed(given[0] if given else None)):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("revision", metavar="REVISION", nargs="?")
+    parser.add_argument("--run", action="store_true")
+    given = parser.parse_args(words)
+    try:
+        paths = changed(given.revision)
+    except subprocess.CalledProcessError as error:
+        parser.error(error.stderr.strip() or f"git ended with code {error.returncode}")
+    for command in commands(paths):
         print(command, flush=True)
-        if "--run" in words and not command.startswith(WRITE):
+        if given.run and not command.startswith(WRITE):
             code = subprocess.run(command.split(), cwd=ROOT, check=False).returncode
             if code:
                 return code

@@ -1,5 +1,7 @@
 """The commands after a change: every file that they name exists, and a change reaches its tests and its pages."""
 
+import pytest
+
 import after
 
 
@@ -38,3 +40,9 @@ def test_every_path_of_the_tables_exists():
     starts = {*after.MAKERS, *after.MORE}
     programs = {command.split()[1] for commands in after.MAKERS.values() for command in commands}
     assert not [path for path in tests | starts | programs if not (after.ROOT / path).exists()]
+
+
+def test_an_unknown_revision_is_named_in_one_line(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        after.main(["no-such-revision"])
+    assert "no-such-revision" in capsys.readouterr().err

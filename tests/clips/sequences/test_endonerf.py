@@ -420,8 +420,11 @@ def test_input_hashes_cover_every_file_that_is_read_and_notice_a_change(tmp_path
 
 
 @pytest.mark.data
-@pytest.mark.parametrize(("masks", "share"), [("masks", 0.6619), ("gt_masks", 0.7297)])
-def test_real_sequence(masks, share):
+@pytest.mark.parametrize(
+    ("masks", "share", "found"), [("masks", 0.6619, []), ("gt_masks", 0.7297, [("straight-border", "row 507")])]
+)
+def test_real_sequence(masks, share, found):
+    """`gt_masks` excludes instruments alone: the display of the console at the lower edge counts as tissue there."""
     folder = data_folder("endonerf_pulling")
     sequence = read_sequence(folder, SequenceConfig(masks=masks))
     assert sequence.images.shape == (63, 3, 512, 640)
@@ -429,6 +432,8 @@ def test_real_sequence(masks, share):
     assert sequence.tissue_fraction == pytest.approx(share, abs=1e-4)
     assert sequence.static_camera and sequence.cameras[0].fx == pytest.approx(569.468, abs=1e-3)
     assert (sequence.cameras[0].cx, sequence.cameras[0].cy) == (320, 256)
-    assert len(sequence.notes) == 2
+    assert len(sequence.notes) == 2 + len(found)
+    for (kind, place), note in zip(found, sequence.notes[2:], strict=True):
+        assert kind in note and place in note
     with pytest.raises(InputError, match="other polarity"):
         read_sequence(folder, SequenceConfig(masks=masks, excluded_value="black", frames="0:12"))

@@ -72,7 +72,8 @@ KINDS: dict[str, Kind] = {
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
     "alternating-views": Kind("warning", "two alternating cameras or kinds of light are not one scene",
                               "prepare each separately: --frames ::2, and --frames 1::2"),
-    "straight-border": Kind("warning", "two pictures in one, or bars that are not black, are not one view of one scene",
+    "straight-border": Kind("warning", "two pictures in one, bars that are not black and the display of a console are"
+                            " not one view of one scene",
                             "cut the picture out: endotsr prepare --crop; or exclude the rest: --unite-masks"),
     "burnt-in": Kind("warning", "training fits it as tissue that travels with the camera",
                      "exclude it: endotsr prepare --unite-masks FILE with a mask of it; or cut a row of text off with"
