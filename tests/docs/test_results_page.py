@@ -18,10 +18,10 @@ def test_the_figures_of_the_prose_are_those_of_the_records():
     for page in figures.pages():
         text = page.read_text(encoding="utf-8")
         assert figures.substituted(text) == text, page.name
-    readme = (RESULTS.parents[1] / "README.md").read_text(encoding="utf-8")
-    assert {"flow.tissue", "sharp.tissue", "paper.tissue", "blend.tissue"} <= set(
-        re.findall(r"<!--=([\w.]+)-->", readme)
-    )
+    named = {"flow.tissue", "sharp.tissue", "paper.tissue"}
+    for page, names in (("../README.md", named), ("interpolation.md", named | {"blend.tissue"})):
+        text = (RESULTS.parent / page).read_text(encoding="utf-8")
+        assert names <= set(re.findall(r"<!--=([\w.]+)-->", text)), page
 
 
 def test_a_planted_figure_is_replaced_and_one_without_a_number_or_a_record_is_refused():

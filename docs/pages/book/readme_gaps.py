@@ -1,4 +1,4 @@
-"""The tables of README.md that compare `sharp` with interpolation, by number of frames missing in a row.
+"""The tables that compare `sharp` with interpolation, by number of frames missing in a row.
 
 The records are those of `full_size.record`, `full_size.interpolation` and `full_size.network`. A difference is paired
 by frame. Where every eighth frame is missing, it has an interval over the frames. The frames of one block are too alike
@@ -86,19 +86,22 @@ def row_of_lpips(gap: int) -> list[str]:
     return [str(gap), *without, f"{by_frame(runs_of(gap), metric='lpips').mean():.4f}"]
 
 
-def table() -> str:
-    """PSNR and LPIPS, one row for each length of the gap."""
+def psnr() -> str:
+    """PSNR, one row for each length of the gap."""
     heads = (MISSING, "Held out", *(NAMES[name] for name in LEVELS), "`sharp`",
              "`sharp` - flow", "`sharp` - flow, tissue only")  # fmt: skip
     seeds = ", ".join(f"{len(runs_of(gap))} with {gap}" for gap in GAPS)
     about = (
         "EndoNeRF pulling, 640x512, PSNR of the tissue in dB. A difference has a 95 % interval over the frames, or one "
         f"mean for each block. Seeds of `sharp` by frames missing: {seeds}. Flow, blend and RIFE read every pixel of "
-        "the neighbours, instruments included."
+        "the neighbours, instruments included; *tissue only* reads none that the masks exclude."
     )
-    psnr = noted(heads, [row(gap) for gap in GAPS], about)
-    lpips = markdown((f"{MISSING}, LPIPS", *NAMES.values(), "`sharp`"), [row_of_lpips(gap) for gap in GAPS])
-    return f"{psnr}\n\n{lpips}"
+    return noted(heads, [row(gap) for gap in GAPS], about)
 
 
-PROGRAM = Program(__name__, "../README.md", {"table": table}, room="gaps")
+def lpips() -> str:
+    """LPIPS, one row for each length of the gap."""
+    return markdown((f"{MISSING}, LPIPS", *NAMES.values(), "`sharp`"), [row_of_lpips(gap) for gap in GAPS])
+
+
+PROGRAM = Program(__name__, ("../README.md", "interpolation.md"), {"psnr": psnr, "lpips": lpips}, room="gaps")
