@@ -1,4 +1,4 @@
-"""The answer of docs/claims.md in one paragraph and one table, for README.md and the head of docs/paper.md.
+"""The answer of docs/claims.md in one list and one table, for README.md and the head of docs/paper.md.
 
 Every number comes from a record; a clip that is not measured is named as such.
 """
@@ -42,7 +42,7 @@ def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record |
         parts.append(f"On the right camera at held-out times (half size) the components change PSNR by {right_eye}.")
     parts.append(truth(loaded(folder / "effects_truth.json")))
     parts += [f"The ablation on {clip} is not finished." for clip in CLIPS if clip not in known]
-    return " ".join(part for part in parts if part) + "\n\n" + levels(folder, found)
+    return "\n".join(f"- {part}" for part in parts if part) + "\n\n" + levels(folder, found)
 
 
 def components(known: Mapping[str, Record]) -> str:
@@ -173,10 +173,10 @@ def beaten(folder: Path, clip: str, record: Record) -> str:
     for name, value in zip(NAMES, of.values(), strict=True):
         stands.setdefault(against(mean, value, half), []).append(name)
     if len(stands) == 1:
-        return f"On {clip} the mean over the seeds is {next(iter(stands))} all four predictions without a model."
+        return f"On {clip} the mean of the full method is {next(iter(stands))} all four predictions without a model."
     texts = [f"{how} {', '.join(names[:-1])} and {names[-1]}" if names[1:] else f"{how} {names[0]}"
              for how, names in stands.items()]  # fmt: skip
-    return f"On {clip} the mean over the seeds is {', and '.join(texts)}."
+    return f"On {clip} the mean of the full method is {', and '.join(texts)}."
 
 
 def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str:
@@ -193,7 +193,7 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
     if not groups:
         return ""
     measured = f"{len(groups)} combinations of clip, size and held-out frames measured"
-    return f"It is below the blend in {below} of the {measured}."
+    return f"The mean of the full method is below the blend in {below} of the {measured}."
 
 
 def truth(found: Record) -> str:
