@@ -65,32 +65,30 @@ def table(columns: Columns = MEASURED) -> str:
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 
 
-# register bytes, clock and compilation of the columns of `whole`, which are left out if nothing is measured
-WHOLE = {
-    (size, clock, cold): ", ".join(filter(None, (name, CLOCKS[clock], "first training" * cold)))
-    for size, name in VECTORS.items()
-    for clock in CLOCKS
-    for cold in (True, False)
-}
-
-
 def whole() -> str:
-    """The time of whole commands by clip and preset, on machines with AVX-512 and without, cold and warm."""
-    found: dict[tuple[str, str], dict[tuple[int, str, bool], str]] = {}
+    """The time of whole commands by preset and clip: of two threads on the clock, or else of one processor thread."""
     rows = [row for row in loaded(RESULTS / "waiting.json")["rows"] if row["seed"] == 0]
-    for row in rows:
-        name = f"`{row['preset']}`", f"{row['clip']}, {row['frames']} frames"
-        kind = row["register_bytes"], row["clock"], row["cold"]
-        found.setdefault(name, {})[kind] = duration(row["whole"])
-    kinds = [kind for kind in WHOLE if any(kind in of for of in found.values())]
-    cells = [[*name, *(of.get(kind, "-") for kind in kinds)] for name, of in sorted(found.items())]
+    clocks = list(CLOCKS)
+    on_clock = {(row["preset"], row["clip"]) for row in rows if row["clock"] == "wall"}
+    shown = [row for row in rows if row["clock"] == "wall" or (row["preset"], row["clip"]) not in on_clock]
+    shown.sort(key=lambda row: (row["preset"], row["clip"], clocks.index(row["clock"]), row["whole"]))
+    cells = [
+        [
+            f"`{row['preset']}`",
+            f"{row['clip']}, {row['frames']} frames",
+            duration(row["whole"]),
+            ", ".join(filter(None, (VECTORS[row["register_bytes"]], CLOCKS[row["clock"]]))),
+            "yes" if row["cold"] else "no",
+        ]
+        for row in shown
+    ]
     machines, sizes = sorted({row["machine"]["processor"] for row in rows}), sorted({row["size"] for row in rows})
     about = (
-        "Whole commands in minutes, from reading the clip to its report, with LPIPS; "
-        "*first training* includes the compilation of the kernels, once on a machine. "
+        "Time of the whole command, from reading the clip to its report, with LPIPS; kernels are compiled once on a "
+        "machine. "
         f"Frames of {', '.join(sizes)}; {', '.join(machines)}; {max(row['date'] for row in rows)}."
     )
-    return noted(("Preset", "Clip", *(WHOLE[kind] for kind in kinds)), cells, about)
+    return noted(("Preset", "Clip", "Minutes", "Measured on", "With compilation"), cells, about)
 
 
 def recorded() -> str:
