@@ -27,9 +27,9 @@ import msgspec
 import numpy as np
 
 import endotsr
+from endotsr.clips.flow import between as definition
+from endotsr.clips.flow.between import Flows, flows_between, frame_between, motion_between
 from endotsr.clips.opencv import warp_cubic
-from endotsr.clips.sequences import between as definition
-from endotsr.clips.sequences.between import Flows, flows_between, frame_between, motion_between
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
@@ -190,7 +190,7 @@ assert swing[both] < swing[alone] - 2
 # The flow reads the whole pictures. Where only one of $J_0,J_1$ is tissue, this one is the target. Where one of the four
 # pictures is excluded, the comparison with the static pair says nothing, and $q=0$.
 #
-# <!-- definition: endotsr.clips.sequences.between.motion_between -->
+# <!-- definition: endotsr.clips.flow.between.motion_between -->
 # ```python
 # def motion_between(flows: Flows, fraction: float) -> FloatArray:
 #     """The motion field v at the time fraction `fraction` (B14).
@@ -204,7 +204,7 @@ assert swing[both] < swing[alone] - 2
 #     return motion_field(flows.forward, flows.backward, fraction)
 # ```
 #
-# <!-- definition: endotsr.clips.sequences.between.frame_between -->
+# <!-- definition: endotsr.clips.flow.between.frame_between -->
 # ```python
 # def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
 #     """The picture, tissue mask and prior depth at a time between two frames, as a `Frame` (B14).
@@ -237,7 +237,7 @@ assert swing[both] < swing[alone] - 2
 #     return Frame(np.ascontiguousarray(np.clip(image, 0, 1)), mask, depth, time, camera)
 # ```
 #
-# <!-- definition: endotsr.clips.sequences.between._mixed -->
+# <!-- definition: endotsr.clips.flow.between._mixed -->
 # ```python
 # def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArray, weights: FloatArray) -> FloatArray:
 #     """(3, H, W) the warped and the unwarped pair, mixed with weights inverse to the local difference within each.
@@ -253,7 +253,7 @@ assert swing[both] < swing[alone] - 2
 #     return (1 - fraction) * _blended(moved, seen, weights) + fraction * at_rest  # (18.6)
 # ```
 #
-# <!-- definition: endotsr.clips.sequences.between._difference -->
+# <!-- definition: endotsr.clips.flow.between._difference -->
 # ```python
 # def _difference(pair: FloatArray) -> FloatArray:
 #     """(H, W) local mean squared difference of two pictures (2, 3, H, W), at least `ONE_STEP`."""

@@ -27,7 +27,7 @@ import msgspec
 import numpy as np
 
 import endotsr
-from endotsr.clips.sequences.tracks import follow
+from endotsr.clips.flow.tracks import follow
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.trajectories import material_at, material_tracks
@@ -129,7 +129,7 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # within 2.5 %<!--=tracks.again--> of its own. This limit is narrower than in (19.3), because the depth is the only evidence for the same
 # piece of tissue.
 #
-# <!-- definition: endotsr.clips.sequences.tracks._step -->
+# <!-- definition: endotsr.clips.flow.tracks._step -->
 # ```python
 # def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flows) -> _Points:
 #     """The points at the second frame."""
@@ -149,7 +149,7 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 #     return _Points(position, followed)
 # ```
 #
-# <!-- definition: endotsr.clips.sequences.tracks._motion_around -->
+# <!-- definition: endotsr.clips.flow.tracks._motion_around -->
 # ```python
 # def _motion_around(before: FloatArray, after: FloatArray, followed: BoolArray, lost: BoolArray) -> FloatArray:
 #     """(3, lost) mean displacement of the nearest followed points, weighted by inverse distance."""
@@ -161,7 +161,7 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 #     return (motion * weight).sum(axis=2) / weight.sum(axis=1)
 # ```
 #
-# <!-- definition: endotsr.clips.sequences.tracks._refind -->
+# <!-- definition: endotsr.clips.flow.tracks._refind -->
 # ```python
 # def _refind(sequence: Sequence, frame: int, position: FloatArray, followed: BoolArray, lost: BoolArray) -> None:
 #     """Follow lost points again, in place, where the frame shows tissue at their depth."""

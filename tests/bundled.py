@@ -1,7 +1,7 @@
 """What the wheel of PyAV holds, from the files that are installed: python tests/bundled.py
 
 Prints the licence that each library of FFmpeg states, the libraries beside it, those of them under the GPL, and the
-encoders of FFmpeg that `clips/sequences/film_file.py` asks for.
+encoders of FFmpeg that `clips/formats/film_file.py` asks for.
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ from av._core import library_meta
 from av.codec import Codec
 from av.codec.codec import UnknownCodecError
 
-from endotsr.clips.sequences.film_file import H264, VP9
+from endotsr.clips.formats.film_file import H264, VP9
 
 UNDER_GPL = ("x264", "x265", "xvid", "rubberband", "vidstab")
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from hypothesis import HealthCheck, settings
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE / "method" / "splatting")]  # made_up_scenes is used in other folders too
+# Helpers of these folders are used in other folders too.
+sys.path[:0] = [str(HERE), str(HERE / "clips"), str(HERE / "method" / "splatting")]
 sys.path += [str(HERE.parent / name) for name in ("golden", "docs", "notebooks")]  # not installed
 
 # No deadline: the first call of a kernel compiles it. Fixtures hold nothing that an example changes.

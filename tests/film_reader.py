@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from endotsr.clips.sequences.video_file import video_facts, video_pictures
+from endotsr.clips.formats.video_file import video_facts, video_pictures
 
 
 def read_video(path: Path) -> list:

@@ -18,7 +18,10 @@ ALL = (
         "tests/faults",
         "tests/port/judge",
         "tests/results/report",
+        "tests/clips/formats",
         "tests/clips/sequences",
+        "tests/clips/masks",
+        "tests/clips/prepare",
         "tests/clips/simulator",
     ),
     *(

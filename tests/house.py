@@ -21,7 +21,7 @@ STOREYS: dict[str, tuple[str, ...]] = {
     "config": (),
     "definition": (),
     "method": ("kernels", "equations", "losses", "splatting"),
-    "clips": ("opencv", "poses", "sequences", "simulator", "effects"),
+    "clips": ("opencv", "poses", "formats", "sequences", "flow", "masks", "prepare", "simulator", "effects"),
     "training": ("scene", "fitting", "runs"),
     "results": ("evaluation", "report", "export", "views"),
     "port": ("stages", "gradcheck", "judge", "contract", "reference", "search"),
@@ -35,7 +35,8 @@ METHOD = (
     "definition", "method.kernels", "method.equations", "method.losses", "method.splatting", "training.scene",
     "training.fitting",
 )  # fmt: skip
-GROUND = ("errors", "untrusted", "config", "clips.opencv", "clips.sequences")  # what the method may know beside itself
+# What the method may know beside itself.
+GROUND = ("errors", "untrusted", "config", "clips.opencv", "clips.sequences", "clips.flow")
 BESIDE = ("golden", "docs/pages")  # folders of programs that run in the repository and are not installed
 LONGEST_FUNCTION = 40  # lines
 MOST_POSITIONAL = 12

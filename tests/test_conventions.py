@@ -219,7 +219,7 @@ def test_no_pickle_through_numpy():
 
 @pytest.mark.parametrize(
     ("library", "files"),
-    [("cv2", ["clips/opencv/library.py"]), ("av", ["clips/sequences/film_file.py", "clips/sequences/video_file.py"])],
+    [("cv2", ["clips/opencv/library.py"]), ("av", ["clips/formats/film_file.py", "clips/formats/video_file.py"])],
 )
 def test_a_decoder_is_imported_in_one_file_and_an_encoder_in_another(library, files):
     assert [f.relative_to(PACKAGE).as_posix() for f in SOURCES if library in imported(f)] == files

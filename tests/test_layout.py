@@ -64,8 +64,8 @@ def test_equations_know_nothing_but_kernels():
 
 def test_the_trainer_knows_no_file_format():
     known = {
-        "clips.sequences.sequence", "clips.sequences.splits", "clips.sequences.between",
-        "clips.sequences.between_kernels", "clips.sequences.smaller",
+        "clips.sequences.sequence", "clips.sequences.splits", "clips.flow.between",
+        "clips.flow.between_kernels", "clips.sequences.smaller",
     }  # fmt: skip
     assert {
         b for a, b in house.imports() if house.room(a) == "training.fitting" and house.room(b) == "clips.sequences"

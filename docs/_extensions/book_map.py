@@ -51,13 +51,13 @@ UNDIFFERENTIATED = {
         "tests/training/scene/test_initialisation.py",
     ),
     "b14": Undifferentiated(
-        ("endotsr.clips.sequences.between.frame_between", "endotsr.clips.sequences.between.motion_between"),
+        ("endotsr.clips.flow.between.frame_between", "endotsr.clips.flow.between.motion_between"),
         "a target is held fixed",
-        "tests/clips/sequences/test_between.py",
+        "tests/clips/flow/test_between.py",
         "none: dense optical flow is an estimate, and a port may take any",
     ),
     "b15": Undifferentiated(
-        ("endotsr.clips.sequences.tracks.follow", "endotsr.training.scene.tracked_motion.with_tracked_motion"),
+        ("endotsr.clips.flow.tracks.follow", "endotsr.training.scene.tracked_motion.with_tracked_motion"),
         "it comes before training",
         "tests/training/scene/test_tracked_motion.py",
         "none: dense optical flow is an estimate, and a port may take any",

@@ -225,7 +225,7 @@ def estimate_poses(sequence: Sequence) -> Sequence:
     Raises: InputError for a single frame, without depth, if too few points match, or if more than 8 frames in a row
             have no pose.
     """
-    from endotsr.clips.sequences.make_poses import estimate_poses as estimated
+    from endotsr.clips.prepare.make_poses import estimate_poses as estimated
 
     found = estimated(sequence)
     interpolated = sorted(found.interpolated + found.held)

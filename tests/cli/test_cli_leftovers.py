@@ -9,8 +9,8 @@ from tiny import assert_refused
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
+from endotsr.clips.prepare.prepare import PrepareSettings, prepare
 from endotsr.clips.sequences.layouts import describe
-from endotsr.clips.sequences.prepare import PrepareSettings, prepare
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.training.runs import folder
 from endotsr.training.runs.folder import RunFolder, create_run

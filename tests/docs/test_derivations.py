@@ -8,9 +8,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "reference/endotsr"
 OPTIONS = (
-    "clips/sequences/between",
-    "clips/sequences/between_kernels",
-    "clips/sequences/tracks",
+    "clips/flow/between",
+    "clips/flow/between_kernels",
+    "clips/flow/tracks",
     "clips/sequences/smaller",
     "training/scene/tracked_motion",
     "training/fitting/coarse_start",

@@ -14,7 +14,7 @@ from pages.full_size import page as full_size
 from pages.hard_cases.page import rounded_up
 from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
 
-from endotsr.clips.sequences.between import flows_between, frame_between
+from endotsr.clips.flow.between import flows_between, frame_between
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, PRESETS, with_iterations

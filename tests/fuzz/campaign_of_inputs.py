@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 # The writers of good files are those of the tests of sequences.
-sys.path[:0] = [str(Path(__file__).parents[1] / "clips" / "sequences")]
+sys.path[:0] = [str(Path(__file__).parents[1] / "clips"), str(Path(__file__).parents[1] / "clips" / "sequences")]
 
 import mutate  # noqa: E402
 from readers import CORPUS, READERS, Reader  # noqa: E402

@@ -15,17 +15,17 @@ import raw_sources
 from PIL import Image
 from scipy.io import savemat
 
-from endotsr.clips.sequences.calibrations import calibrated
-from endotsr.clips.sequences.colmap_model import read_model
+from endotsr.clips.formats.calibrations import calibrated
+from endotsr.clips.formats.colmap_model import read_model
+from endotsr.clips.formats.film_file import write_video
+from endotsr.clips.formats.time_lists import nanosecond_list, picture_times
+from endotsr.clips.formats.trajectory import filled, poses_of_frames
+from endotsr.clips.formats.trajectory import read_trajectory as read_poses_of
+from endotsr.clips.formats.video_file import video_facts, video_pictures
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
-from endotsr.clips.sequences.film_file import write_video
 from endotsr.clips.sequences.layouts import points, tum
 from endotsr.clips.sequences.sequence_file import read_poses
 from endotsr.clips.sequences.sequence_file import read_sequence_file as read_file
-from endotsr.clips.sequences.time_lists import nanosecond_list, picture_times
-from endotsr.clips.sequences.trajectory import filled, poses_of_frames
-from endotsr.clips.sequences.trajectory import read_trajectory as read_poses_of
-from endotsr.clips.sequences.video_file import video_facts, video_pictures
 
 
 @cache

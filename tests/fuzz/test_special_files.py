@@ -10,7 +10,7 @@ from campaign_of_inputs import bounded_memory
 from readers import READERS
 from recordings import COLMAP_TEXT
 
-from endotsr.clips.sequences.colmap_model import read_model
+from endotsr.clips.formats.colmap_model import read_model
 from endotsr.errors import InputError
 from special_files import DAMAGE, NO_FILES
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import endotsr
 from endotsr.api import Run
-from endotsr.clips.sequences.between import flows_between
+from endotsr.clips.flow.between import flows_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.results.evaluation.baselines import flow_interpolation, neighbours, unit_image
 from endotsr.results.report.tables import markdown

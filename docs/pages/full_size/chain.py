@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.flow.tracks import follow
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.tracks import follow
 from endotsr.method.splatting.camera import backproject, project
 from endotsr.results.evaluation.evaluate import training_sample
 from endotsr.results.evaluation.trajectories import TruePositions

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import endotsr
-from endotsr.clips.sequences.between import flows_between
+from endotsr.clips.flow.between import flows_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 from endotsr.results.evaluation.baselines import BASELINES, RenderFrame, neighbours, unit_image

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import endotsr
+from endotsr.clips.flow.between import Flows, flows_between, frame_between, motion_between
+from endotsr.clips.flow.tissue_colours import tissue_colours
 from endotsr.clips.opencv import warp_cubic
-from endotsr.clips.sequences.between import Flows, flows_between, frame_between, motion_between
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.tissue_colours import tissue_colours
 from endotsr.results.evaluation.baselines import neighbours, two_neighbours, unit_image
 from endotsr.training.runs.machine import dated
 from pages.full_size.interpolation import SPLITS

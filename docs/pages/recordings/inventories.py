@@ -11,22 +11,22 @@ from collections.abc import Iterable
 
 from endotsr.cli.parts.related_options import RELATIONS
 from endotsr.cli.parts.relations import Needs, shown
-from endotsr.clips.sequences.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.formats.calibration_fields import INI, KALIBR, OPENCV, ROS
+from endotsr.clips.formats.inventory import Inventory
+from endotsr.clips.formats.matlab_calibrations import BOUGUET
+from endotsr.clips.formats.matlab_calibrations import CAMERA as MATLAB
+from endotsr.clips.formats.matlab_calibrations import PAIR as MATLAB_PAIR
+from endotsr.clips.formats.picture_fields import BMP, JPEG, PNG, TIFF, WEBP
+from endotsr.clips.formats.point_files import CLOUD
+from endotsr.clips.formats.pose_fields import COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF
+from endotsr.clips.formats.slam_calibrations import EUROC, ORB
+from endotsr.clips.formats.stream_marks import AVI, PROGRAM, TRANSPORT
+from endotsr.clips.formats.trajectory_lines import FIELDS as TRAJECTORY
+from endotsr.clips.formats.video_marks import MATROSKA, MP4
 from endotsr.clips.sequences.checks.kinds import KINDS
 from endotsr.clips.sequences.depth_files import FILES as DEPTH
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import c3vd, hamlyn, scared, servct
 from endotsr.clips.sequences.layouts.nerfstudio import FIELDS, FRAME_FIELDS
-from endotsr.clips.sequences.matlab_calibrations import BOUGUET
-from endotsr.clips.sequences.matlab_calibrations import CAMERA as MATLAB
-from endotsr.clips.sequences.matlab_calibrations import PAIR as MATLAB_PAIR
-from endotsr.clips.sequences.picture_fields import BMP, JPEG, PNG, TIFF, WEBP
-from endotsr.clips.sequences.point_files import CLOUD
-from endotsr.clips.sequences.pose_fields import COLMAP_CAMERA, COLMAP_IMAGE, COLMAP_POINT, LLFF
-from endotsr.clips.sequences.slam_calibrations import EUROC, ORB
-from endotsr.clips.sequences.stream_marks import AVI, PROGRAM, TRANSPORT
-from endotsr.clips.sequences.trajectory_lines import FIELDS as TRAJECTORY
-from endotsr.clips.sequences.video_marks import MATROSKA, MP4
 from endotsr.results.export.ply import GAUSSIAN
 from endotsr.results.report.tables import markdown
 from pages.store.program import Program

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from endotsr.clips.masks.propose_masks import propose_masks
 from endotsr.clips.sequences.clip import Picture
-from endotsr.clips.sequences.propose_masks import propose_masks
 from endotsr.method.kernels.arrays import BoolArray
 from pages.recordings.masked_clips import real, simulated
 from pages.store.program import DATA, Program

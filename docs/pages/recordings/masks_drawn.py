@@ -13,9 +13,9 @@ from typing import Any
 
 import msgspec
 
-from endotsr.clips.sequences.carry_masks import carry_masks
-from endotsr.clips.sequences.clip_flows import motion_of
-from endotsr.clips.sequences.drawn_masks import DrawnFile, key_masks
+from endotsr.clips.flow.clip_flows import motion_of
+from endotsr.clips.masks.carry_masks import carry_masks
+from endotsr.clips.masks.drawn_masks import DrawnFile, key_masks
 from endotsr.clips.sequences.splits import even_frames
 from pages.recordings.masked_clips import MARGIN, SIZE, pictures_of, quality, scene_frames
 from pages.store.program import RESULTS, Program

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.sequences import carry_masks as carry
+from endotsr.clips.flow.clip_flows import motion_of
+from endotsr.clips.masks import carry_masks as carry
+from endotsr.clips.masks.drawing import instruments_of, plausible_drafts
+from endotsr.clips.masks.propose_masks import propose_masks
 from endotsr.clips.sequences.clip import Picture
-from endotsr.clips.sequences.clip_flows import motion_of
 from endotsr.clips.sequences.clip_pictures import left_pictures
-from endotsr.clips.sequences.drawing import instruments_of, plausible_drafts
 from endotsr.clips.sequences.layouts import describe
-from endotsr.clips.sequences.propose_masks import propose_masks
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray

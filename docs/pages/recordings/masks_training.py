@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 import endotsr
-from endotsr.clips.sequences.carry_masks import carry_masks
-from endotsr.clips.sequences.clip_flows import motion_of
+from endotsr.clips.flow.clip_flows import motion_of
+from endotsr.clips.masks.carry_masks import carry_masks
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray

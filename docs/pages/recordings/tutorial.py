@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 
+from endotsr.clips.formats.video_file import video_pictures
+from endotsr.clips.masks.propose_masks import overlay
 from endotsr.clips.opencv import read_png
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.sequences.layouts import describe
-from endotsr.clips.sequences.propose_masks import overlay
-from endotsr.clips.sequences.video_file import video_pictures
 from pages.store.commands import said
 from pages.store.program import RESULTS
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.result import JsonFile, write_result
-from endotsr.clips.sequences.choices import Align, Pairing
-from endotsr.clips.sequences.stereo_depth import StereoSettings
+from endotsr.clips.formats.choices import Align, Pairing
+from endotsr.clips.prepare.stereo_depth import StereoSettings
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
 
@@ -18,7 +18,7 @@ STEREO = StereoSettings()
 LARGEST_RATIO = 100.0  # farthest to nearest tissue
 
 if TYPE_CHECKING:
-    from endotsr.clips.sequences.make_depth import DepthReport
+    from endotsr.clips.prepare.make_depth import DepthReport
 
 
 @dataclass
@@ -127,9 +127,9 @@ def _check_ratio(options: DepthOptions) -> None:
 
 def _made(options: DepthOptions) -> "DepthReport":
     """Compute or read the depth and write it."""
+    from endotsr.clips.prepare.make_depth import from_files, from_pairs, from_relative, write_depth
+    from endotsr.clips.prepare.relative_depth import flat_depth
     from endotsr.clips.sequences.layouts.common import describe_prepared
-    from endotsr.clips.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
-    from endotsr.clips.sequences.relative_depth import flat_depth
 
     folder, given = options.sequence, options.given
     if options.flat:

@@ -50,9 +50,9 @@ class MasksOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(MasksOptions, words, "masks")
-    from endotsr.clips.sequences.files import shortened
+    from endotsr.clips.formats.files import shortened
+    from endotsr.clips.masks.make_masks import OVERLAY, enter_masks, from_keys, write_proposal
     from endotsr.clips.sequences.layouts import describe
-    from endotsr.clips.sequences.make_masks import OVERLAY, enter_masks, from_keys, write_proposal
     from endotsr.clips.sequences.sequence_file import MASKS
     from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.untrusted.writing import refuse_existing
@@ -92,8 +92,8 @@ def run(words: list[str]) -> int:
 
 def _draw(options: MasksOptions, page: Path) -> int:
     """Write the page to draw on."""
+    from endotsr.clips.masks.make_masks import drawing_for
     from endotsr.clips.sequences.layouts import describe
-    from endotsr.clips.sequences.make_masks import drawing_for
     from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.results.views.draw_page import check_draw_page, write_draw_page
 

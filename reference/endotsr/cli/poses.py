@@ -12,8 +12,8 @@ from endotsr.cli.parts.result import JsonFile, write_result
 
 if TYPE_CHECKING:
     from endotsr.clips.poses.movement import Movement
-    from endotsr.clips.sequences.make_poses import PoseReport
-    from endotsr.clips.sequences.make_structure import StructureReport
+    from endotsr.clips.prepare.make_poses import PoseReport
+    from endotsr.clips.prepare.make_structure import StructureReport
     from endotsr.method.splatting.camera import Camera
 
 
@@ -68,7 +68,7 @@ Said = tuple[bool, list[str], Callable[[], str]]  # whether poses are written, t
 def _estimate(options: PosesOptions) -> Said:
     """Poses from pictures and depth."""
     from endotsr.cli.parts.progress import StepBar
-    from endotsr.clips.sequences.make_poses import PoseProgress, enter_poses, lines_of
+    from endotsr.clips.prepare.make_poses import PoseProgress, enter_poses, lines_of
     from endotsr.results.report.poses_page import poses_page
 
     with StepBar("poses") as bar:
@@ -81,8 +81,8 @@ def _estimate(options: PosesOptions) -> Said:
 def _structure(options: PosesOptions) -> Said:
     """Poses by structure from motion."""
     from endotsr.cli.parts.progress import StepBar
-    from endotsr.clips.sequences.make_poses import PoseProgress
-    from endotsr.clips.sequences.make_structure import enter_structure, structure_lines
+    from endotsr.clips.prepare.make_poses import PoseProgress
+    from endotsr.clips.prepare.make_structure import enter_structure, structure_lines
     from endotsr.results.report.poses_page import structure_page
 
     with StepBar("poses") as bar:

@@ -10,7 +10,7 @@ from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.related_options import PREPARE
 from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import JsonFile, write_result
-from endotsr.clips.sequences.choices import (
+from endotsr.clips.formats.choices import (
     Axes,
     Border,
     DepthOfPoints,
@@ -121,9 +121,9 @@ class PrepareOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(PrepareOptions, words, "prepare")
-    from endotsr.clips.sequences.editing import cropped, united
+    from endotsr.clips.prepare.editing import cropped, united
+    from endotsr.clips.prepare.prepare import PrepareSettings, prepare
     from endotsr.clips.sequences.layouts import describe
-    from endotsr.clips.sequences.prepare import PrepareSettings, prepare
     from endotsr.clips.sequences.sequence_file import RIGHT
 
     _check_options(options, words)
@@ -140,7 +140,7 @@ def run(words: list[str]) -> int:
     print(f"source: {options.source}, layout {clip.layout}, {clip.count} frames", flush=True)
     found, notes = prepare(clip, options.out, settings, replace=options.replace)
     if options.also:
-        from endotsr.clips.sequences.for_others import describe_for
+        from endotsr.clips.prepare.for_others import describe_for
 
         notes += describe_for(options.out, options.also)
     pair = (options.out / RIGHT).is_dir()

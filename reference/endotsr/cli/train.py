@@ -264,8 +264,8 @@ def _progress(
     import numba
 
     from endotsr.cli.parts.waiting import waiting_line
+    from endotsr.clips.formats.files import has_truth
     from endotsr.clips.sequences.checks.duration import TimedCommand, frames_of, vector_factor
-    from endotsr.clips.sequences.files import has_truth
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before

@@ -13,8 +13,8 @@ import endotsr
 from endotsr.cli.main import main
 from endotsr.clips.poses.movement import STILL
 from endotsr.clips.poses.views import Views
-from endotsr.clips.sequences import make_poses
-from endotsr.clips.sequences.make_poses import PARTIAL, PoseProgress, enter_poses
+from endotsr.clips.prepare import make_poses
+from endotsr.clips.prepare.make_poses import PARTIAL, PoseProgress, enter_poses
 from endotsr.clips.simulator.settings import SimulatorSettings, with_effects
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import with_settings
@@ -134,7 +134,7 @@ def test_windows_that_overlap_have_the_same_poses(clip):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from endotsr.clips.sequences import make_poses
+from endotsr.clips.prepare import make_poses
 make_poses.KEEP_EVERY, steps = 2, [0]
 
 def step():

@@ -26,8 +26,8 @@ from endotsr.clips.poses import structure
 from endotsr.clips.poses.chain import LONGEST_GAP
 from endotsr.clips.poses.structure import MISSING, Structure, reconstructed, refuse_too_few
 from endotsr.clips.poses.views import IDENTITY, compose, inverse
-from endotsr.clips.sequences import make_structure
-from endotsr.clips.sequences.make_structure import METHOD, OWN_UNIT, enter_structure
+from endotsr.clips.prepare import make_structure
+from endotsr.clips.prepare.make_structure import METHOD, OWN_UNIT, enter_structure
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose

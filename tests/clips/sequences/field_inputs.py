@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from endotsr.clips.formats import calibration_fields, matlab_calibrations
+from endotsr.clips.formats.calibrations import calibrated
+from endotsr.clips.formats.inventory import Inventory
 from endotsr.clips.opencv import write_png
-from endotsr.clips.sequences import calibration_fields, matlab_calibrations
-from endotsr.clips.sequences.calibrations import calibrated
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import describe, nerfstudio
 
 WIDTH, HEIGHT, FRAMES = 32, 24, 3

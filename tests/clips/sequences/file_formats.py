@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from field_inputs import FRAMES, HEIGHT, WIDTH, Format, Keys, pictures, result
 
-from endotsr.clips.sequences import picture_fields, pose_fields
-from endotsr.clips.sequences.colmap_model import MODELS
+from endotsr.clips.formats import picture_fields, pose_fields
+from endotsr.clips.formats.colmap_model import MODELS
+from endotsr.clips.formats.point_files import CLOUD, read_cloud
+from endotsr.clips.formats.trajectory import read_trajectory
+from endotsr.clips.formats.trajectory_lines import FIELDS as TRAJECTORY
 from endotsr.clips.sequences.layouts import describe
-from endotsr.clips.sequences.point_files import CLOUD, read_cloud
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.trajectory import read_trajectory
-from endotsr.clips.sequences.trajectory_lines import FIELDS as TRAJECTORY
 from endotsr.results.export.ply import GAUSSIAN, read_gaussians
 
 CAMERA = (30.0, 31.0, 15.0, 11.0)

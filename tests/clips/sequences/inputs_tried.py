@@ -18,6 +18,7 @@ from pathlib import Path
 import av
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import test_relative_depth as one_view
 from careless_inputs import CARELESS_ROWS

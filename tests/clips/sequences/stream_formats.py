@@ -10,7 +10,7 @@ from file_formats import saved, whole
 from made_videos import pictures, write
 from video_formats import told as with_count
 
-from endotsr.clips.sequences import picture_fields, stream_marks
+from endotsr.clips.formats import picture_fields, stream_marks
 
 KINDS = {"avi": ("rawvideo", "bgr24"), "ts": ("libx264", "yuv420p"), "vob": ("mpeg2video", "yuv420p")}
 TAG = {name: number for number, name in stream_marks.TAGS.items()}

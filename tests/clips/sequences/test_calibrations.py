@@ -7,7 +7,7 @@ import yaml
 from public_layouts import K, stereo_yaml
 from raw_sources import ini
 
-from endotsr.clips.sequences.calibrations import calibrated
+from endotsr.clips.formats.calibrations import calibrated
 from endotsr.errors import InputError
 
 SIZE = (128, 96)

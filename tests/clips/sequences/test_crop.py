@@ -4,7 +4,7 @@ import pytest
 from common_folder import HEIGHT, WIDTH, written
 
 from endotsr.cli.main import main
-from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.layouts import describe

@@ -9,8 +9,8 @@ import pytest
 
 from data_folder import data_folder
 from endonerf_writer import write_endonerf
+from endotsr.clips.formats.files import check_pairing
 from endotsr.clips.sequences.depth_files import clip_depth
-from endotsr.clips.sequences.files import check_pairing
 from endotsr.clips.sequences.read import file_hashes, read_sequence
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError

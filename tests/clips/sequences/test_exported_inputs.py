@@ -9,7 +9,7 @@ from made_videos import HEIGHT, WIDTH
 from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
-from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.depth import depth_facts, mark_finding
 from endotsr.clips.sequences.pairing import paired

@@ -8,8 +8,8 @@ import pytest
 from made_videos import files, write
 
 from endotsr.cli.main import main
+from endotsr.clips.formats.camera import intrinsics_of_view
 from endotsr.clips.opencv import read_png
-from endotsr.clips.sequences.camera import intrinsics_of_view
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.sequence_file import read_sequence_file

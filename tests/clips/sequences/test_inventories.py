@@ -9,7 +9,7 @@ from layout_formats import OTHER_NAMES as OF_FOLDERS
 from stream_formats import BY_PILLOW, STREAMS
 from video_formats import REPEATED, TRACKS
 
-from endotsr.clips.sequences.inventory import Inventory
+from endotsr.clips.formats.inventory import Inventory
 from endotsr.errors import InputError
 
 FORMATS = NAMED | FILES | TRACKS | LAYOUTS | STREAMS
@@ -100,7 +100,7 @@ def test_a_file_with_a_new_field_says_so(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["kalibr", "ros", "ros echo", "opencv", "ini", "matlab pair", "bouguet"])
 def test_a_calibration_with_a_new_field_says_so(name, tmp_path):
-    from endotsr.clips.sequences.calibrations import calibrated
+    from endotsr.clips.formats.calibrations import calibrated
 
     found = FORMATS[name]
     found.write(tmp_path, found.base | {"thin_prism": 1})

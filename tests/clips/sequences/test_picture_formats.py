@@ -9,10 +9,10 @@ import pytest
 from PIL import Image
 
 from endonerf_writer import write_endonerf
+from endotsr.clips.formats.picture_fields import colours_differ
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.depth_files import FILES, read_plane
-from endotsr.clips.sequences.picture_fields import colours_differ
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate

@@ -10,9 +10,9 @@ from made_videos import files, write
 
 from data_folder import data_folder
 from endotsr.cli.main import main
+from endotsr.clips.masks.propose_masks import Proposal, propose_masks
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.propose_masks import Proposal, propose_masks
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
@@ -112,7 +112,7 @@ def test_a_proposal_that_leaves_no_tissue_is_refused_with_the_frames(tmp_path, c
     for count, code in ((3, 2), (2, 0)):
         masks = [whole if i < count else ~whole for i in range(5)]
         made = Proposal(masks, "made up", 0.0, tuple(range(count)))
-        monkeypatch.setattr("endotsr.clips.sequences.make_masks.propose_masks", lambda pictures, made=made: made)
+        monkeypatch.setattr("endotsr.clips.masks.make_masks.propose_masks", lambda pictures, made=made: made)
         assert main(["masks", str(tmp_path / "source"), "--out", str(tmp_path / "m")]) == code
         said = capsys.readouterr()
         assert refused in said.err if code else warned in said.out

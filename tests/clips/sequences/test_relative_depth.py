@@ -8,10 +8,10 @@ from test_stated_depth import FRAMES, recording, true_depth
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.prepare.relative_depth import FEWEST, StraightLine, fitted_line
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
-from endotsr.clips.sequences.relative_depth import FEWEST, StraightLine, fitted_line
 from endotsr.clips.sequences.sequence_file import PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.config import PAPER
 

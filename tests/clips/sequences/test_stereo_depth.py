@@ -10,13 +10,13 @@ from test_common import write_plane
 
 from data_folder import data_folder
 from endotsr.cli.main import main
+from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.prepare.make_depth import depth_of_values, from_files, write_depth
+from endotsr.clips.prepare.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.clips.sequences.layouts import describe
-from endotsr.clips.sequences.make_depth import depth_of_values, from_files, write_depth
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
-from endotsr.clips.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 

@@ -16,9 +16,9 @@ from field_inputs import pictures as pictures_of
 from left_inputs import hidden_lead_in
 from made_videos import pictures, turn
 
-from endotsr.clips.sequences import video_marks
+from endotsr.clips.formats import video_marks
+from endotsr.clips.formats.slam_calibrations import EUROC, ORB
 from endotsr.clips.sequences.layouts import describe
-from endotsr.clips.sequences.slam_calibrations import EUROC, ORB
 from endotsr.clips.sequences.source_options import SourceOptions
 
 STATED = SourceOptions(camera=(100.0, 100.0, 64.0, 48.0), baseline=4.0, orientation="turned")

@@ -12,11 +12,11 @@ import pytest
 from browser import browser
 from remote import Remote
 
+from endotsr.clips.masks.drawing import Draft, DrawnClip, DrawnFrame
+from endotsr.clips.masks.drawn_masks import key_masks, read_drawn
+from endotsr.clips.masks.mask_shapes import MaskShape
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.drawing import Draft, DrawnClip, DrawnFrame
-from endotsr.clips.sequences.drawn_masks import key_masks, read_drawn
-from endotsr.clips.sequences.mask_shapes import MaskShape
 from endotsr.errors import InputError
 from endotsr.results.views.draw_page import check_draw_page, draw_page, write_draw_page
 

@@ -8,9 +8,9 @@ import pytest
 from browser import seen
 from PIL import Image
 
-from endotsr.clips.sequences import film_file
+from endotsr.clips.formats import film_file
+from endotsr.clips.formats.video_file import video_facts
 from endotsr.clips.sequences.sequence import Frame
-from endotsr.clips.sequences.video_file import video_facts
 from endotsr.errors import InputError
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.depth import normalised_depth

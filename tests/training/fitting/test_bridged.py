@@ -9,7 +9,7 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.clips.sequences.between import flows_between, frame_between
+from endotsr.clips.flow.between import flows_between, frame_between
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import DEMO, TrainingConfig

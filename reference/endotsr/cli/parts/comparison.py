@@ -153,7 +153,7 @@ def _metrics(
         if not is_windowed(path):
             _refuse_earlier(path, metrics)
         return cast("EvaluationRecord", metrics), sequence
-    from endotsr.clips.sequences.video_file import is_video
+    from endotsr.clips.formats.video_file import is_video
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
 

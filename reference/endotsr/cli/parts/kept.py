@@ -10,7 +10,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_dir
 
-from endotsr.clips.sequences.clip_flows import flow_folder
+from endotsr.clips.flow.clip_flows import flow_folder
 from endotsr.errors import InputError
 from endotsr.untrusted.names import plain_line
 

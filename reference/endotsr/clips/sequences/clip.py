@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, StereoCalibration
+from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, StereoCalibration
 from endotsr.clips.sequences.checks.kinds import Finding
 from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.mask_values import MaskLevels

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.formats.camera import Intrinsics
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:

@@ -1,21 +1,19 @@
 """Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .npz, .mat or .pfm. OpenEXR is refused by name."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.depth_stacks import array_of, plane_of_stack
+from endotsr.clips.formats.inventory import Inventory
+from endotsr.clips.formats.plain_arrays import read_npy, read_pfm
 from endotsr.clips.opencv import area_resize, write_png
 from endotsr.clips.opencv.pictures import TIFF_ENDINGS, no_data, read_picture, read_points
 from endotsr.clips.sequences.clip import grey_plane
-from endotsr.clips.sequences.depth_stacks import array_of, plane_of_stack
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.mask_polarity import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.untrusted import arrays as untrusted
-from endotsr.untrusted.files import read_bytes
 
 CLIPPED = SequenceConfig().depth_percentiles  # depth is clipped to these before resizing
 ANOTHER_SCALE = 64.0  # times the usual median depth; 8 bits stretched to 16 give 256
@@ -35,9 +33,6 @@ FILES = Inventory(
 )
 DEPTH_ENDINGS = (".png", ".npy", ".npz", ".mat", ".pfm", *TIFF_ENDINGS, ".exr")  # listed in a folder of depth
 DEPTH_LEVELS = 65535 // 8  # for the usual largest depth of a frame; eight times more still fits into 16 bits
-LARGEST_FILE = 1 << 32  # bytes
-PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
-ALLOWED = "allowed: an .npy file of numbers"
 
 
 def read_plane(path: Path) -> NDArray:
@@ -65,46 +60,6 @@ def read_plane(path: Path) -> NDArray:
     if plane.ndim != 2:
         raise InputError(f"{path}: array of shape {array.shape}; allowed: one plane (height, width)")
     return plane
-
-
-def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) -> NDArray:
-    """The array of real numbers in an .npy file. Pickled objects are never loaded.
-
-    largest  size limit, bytes
-    allowed  allowed files, for the message
-
-    Raises:  InputError for a missing, invalid or truncated file, and for anything but real numbers.
-    """
-    try:
-        array = untrusted.read_npy(Path(path), largest)
-    except InputError as error:
-        raise InputError(f"{error}; {allowed}") from None
-    if array.dtype.kind not in "fiu":
-        raise InputError(f"{path}: not one array of real numbers")
-    return array
-
-
-def read_pfm(path: Path) -> NDArray[np.float32]:
-    """The plane (H, W) of a greyscale PFM file, top row first.
-
-    Raises:  InputError for any other file, and for a scale factor, which some programs apply and others ignore.
-    """
-    data = read_bytes(Path(path), LARGEST_FILE)
-    header = PFM_HEADER.match(data)
-    if not header or header[1] != b"Pf":
-        raise InputError(f"{path}: not a grey PFM file (its first bytes are not `Pf width height scale`)")
-    width, height, scale = int(header[2]), int(header[3]), float(header[4])
-    if abs(scale) != 1.0:
-        raise InputError(
-            f"{path}: its first lines state the scale factor {abs(scale):g}, which some programs apply and others"
-            " ignore; allowed: 1 or -1, with the values as they are meant"
-        )
-    if len(data) - header.end() != 4 * width * height:
-        raise InputError(
-            f"{path}: {len(data) - header.end()} bytes of pixels, {width}x{height} need {4 * width * height}"
-        )
-    plane = np.frombuffer(data, "<f4" if scale < 0 else ">f4", offset=header.end()).reshape(height, width)
-    return np.ascontiguousarray(plane[::-1], np.float32)  # the format stores the bottom row first
 
 
 def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32]:

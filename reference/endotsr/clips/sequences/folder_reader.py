@@ -7,11 +7,11 @@ from typing import TypeVar
 
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import check_pairing, list_pictures
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.clip import Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
-from endotsr.clips.sequences.files import check_pairing, list_pictures
 from endotsr.clips.sequences.mask_values import levels_of_set
 from endotsr.clips.sequences.masks import tissue_masks
 from endotsr.clips.sequences.unread import folders_of, together

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.files import shortened
+from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.masks import ALLOW, LEAST_TISSUE_FRACTION
 from endotsr.errors import InputError
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.depth_stacks import ENDINGS
+from endotsr.clips.formats.depth_stacks import ENDINGS
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 

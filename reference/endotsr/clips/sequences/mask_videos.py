@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.depth_stacks import ENDINGS, stack_planes
+from endotsr.clips.formats.mask_arrays import KINDS, array_plane, in_array
+from endotsr.clips.formats.video_file import is_video, video_facts, video_pictures
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.clip import grey_plane
-from endotsr.clips.sequences.depth_stacks import ENDINGS, stack_planes
-from endotsr.clips.sequences.mask_arrays import KINDS, array_plane, in_array
 from endotsr.clips.sequences.mask_values import LEAST_WHITE, OBJECTS
-from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
 
 MOST_BYTES = 1 << 31  # of the planes of a video that are held

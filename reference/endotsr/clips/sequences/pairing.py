@@ -9,9 +9,9 @@ In: frames and files. Out: one file per frame or None, with a sentence where the
 from pathlib import Path
 from typing import Literal, NamedTuple, NoReturn
 
-from endotsr.clips.sequences.choices import Pairing
+from endotsr.clips.formats.choices import Pairing
+from endotsr.clips.formats.files import check_pairing, frame_numbers, shortened
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import check_pairing, frame_numbers, shortened
 from endotsr.errors import InputError
 
 WAYS = {

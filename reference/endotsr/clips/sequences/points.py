@@ -6,7 +6,7 @@ In: the world points that a frame sees. Out: depth (H, W), 0 = none.
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.formats.camera import Intrinsics
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 

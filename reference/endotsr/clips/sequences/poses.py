@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.camera import AXES, Intrinsics, pose_of, scene_factor
+from endotsr.clips.formats.camera import AXES, Intrinsics, pose_of, scene_factor
+from endotsr.clips.formats.plain_arrays import read_npy
 from endotsr.clips.sequences.clip import REST, rests
-from endotsr.clips.sequences.depth_files import read_npy
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose, camera_centre
 

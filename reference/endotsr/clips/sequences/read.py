@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import hash_files
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.copies import copied_frames, steps_between, without_twins
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts, depth_note, far_limits
@@ -21,7 +22,6 @@ from endotsr.clips.sequences.checks.kinds import KINDS, ONE_CAMERA
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import check_depth_scale, clip_depth, depth_plane, read_plane
 from endotsr.clips.sequences.depth_outliers import outlying_frames, remove_outliers
-from endotsr.clips.sequences.files import hash_files
 from endotsr.clips.sequences.folder_reader import of_size
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training, without_faults

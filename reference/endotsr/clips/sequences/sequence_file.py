@@ -46,8 +46,8 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, scene_factor
-from endotsr.clips.sequences.choices import Axes, Direction, Unit
+from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, checked_intrinsics, pose_of, scene_factor
+from endotsr.clips.formats.choices import Axes, Direction, Unit
 from endotsr.clips.sequences.clip import Assumed
 from endotsr.clips.sequences.crop import stated_crop
 from endotsr.errors import InputError

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from endotsr.clips.sequences.choices import (
+from endotsr.clips.formats.choices import (
     Axes,
     DepthOfPoints,
     Direction,

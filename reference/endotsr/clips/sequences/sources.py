@@ -11,21 +11,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.calibrations import StatedCamera, calibrated
+from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, checked_intrinsics, intrinsics_of_view, scene_factor
+from endotsr.clips.formats.depth_stacks import ENDINGS as ARRAY_ENDINGS
+from endotsr.clips.formats.depth_stacks import stack_planes
+from endotsr.clips.formats.files import list_pictures
+from endotsr.clips.formats.trajectory import poses_of_frames, read_trajectory
 from endotsr.clips.opencv import stretched
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
-from endotsr.clips.sequences.camera import ARBITRARY, Intrinsics, checked_intrinsics, intrinsics_of_view, scene_factor
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
-from endotsr.clips.sequences.depth_stacks import ENDINGS as ARRAY_ENDINGS
-from endotsr.clips.sequences.depth_stacks import stack_planes
-from endotsr.clips.sequences.files import list_pictures
 from endotsr.clips.sequences.mask_values import levels_of_set, refuse_coded_objects, white_pixels
 from endotsr.clips.sequences.mask_videos import coloured_plane_of, mask_files, plane_of
 from endotsr.clips.sequences.pairing import paired
 from endotsr.clips.sequences.smaller import nearest_pixels
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.trajectory import poses_of_frames, read_trajectory
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from endotsr.clips.formats.files import shortened
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.source_options import SourceOptions
 
 # What accompanies recordings and says nothing about them.

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.files import TRUTH
+from endotsr.clips.formats.files import TRUTH
 from endotsr.clips.sequences.poses import POSE_FILES, rows_from_cameras
 from endotsr.clips.sequences.splits import split_frames
 from endotsr.clips.simulator.cameras import camera_centres

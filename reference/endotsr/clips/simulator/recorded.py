@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.sequences.files import has_truth
+from endotsr.clips.formats.files import has_truth
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.simulator.surface import Surface, make_surface, surface_point
 from endotsr.clips.simulator.truth import SceneTruth, read_truth

@@ -52,7 +52,7 @@ def write_recording(
 
     Raises:  InputError as `check_recording` does, or where the settings fold the tissue over itself.
     """
-    from endotsr.clips.sequences.film_file import write_video
+    from endotsr.clips.formats.film_file import write_video
 
     check_recording(settings)
     scene = make_scene(settings)

@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.files import TRUTH
+from endotsr.clips.formats.files import TRUTH
 from endotsr.clips.simulator.frames import SimulatedFrame, SimulatedScene
 from endotsr.clips.simulator.gain import GainSpectrum, gain_series, gain_spectrum
 from endotsr.clips.simulator.scenes import effects_on

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import frame_numbers, shortened, visible_files
+from endotsr.clips.formats.video_file import is_video, video_facts, video_pictures
 from endotsr.clips.opencv import pictures as stored
-from endotsr.clips.sequences.files import frame_numbers, shortened, visible_files
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.video_file import is_video, video_facts, video_pictures
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array, FloatArray
 from endotsr.results.evaluation.evaluate import evaluate_model

@@ -150,10 +150,10 @@ def _frame(
 
 def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) -> Callable[[int], NDArray[np.uint8]]:
     """Frame number -> right picture (3, H, W) in the size of the sequence; InputError if unreadable or smaller."""
+    from endotsr.clips.formats.files import list_pictures
     from endotsr.clips.opencv import area_resize
     from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
     from endotsr.clips.sequences.clip import colour_picture
-    from endotsr.clips.sequences.files import list_pictures
     from endotsr.clips.sequences.splits import parse_frame_range
 
     files, width, height = list_pictures(folder, PICTURE_ENDINGS), sequence.width, sequence.height

@@ -18,8 +18,8 @@ where no training frame is. Of two equally near frames, the earlier is taken. Sp
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.flow.tissue_colours import by_nearness, fill_from
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.tissue_colours import by_nearness, fill_from
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.results.evaluation.baselines import MakeRenderer, neighbours, unit, unit_image
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.inventory import Inventory
+from endotsr.clips.formats.inventory import Inventory
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.constants import Y00

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from endotsr.clips.sequences.make_poses import EstimatedPoses, PoseReport
-from endotsr.clips.sequences.make_structure import StructureReport
+from endotsr.clips.prepare.make_poses import EstimatedPoses, PoseReport
+from endotsr.clips.prepare.make_structure import StructureReport
 from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
 from endotsr.results.report import parts
 from endotsr.results.report.line_chart import ChartCurve, chart_svg

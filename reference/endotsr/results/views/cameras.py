@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.sequences.between import camera_between
-from endotsr.clips.sequences.camera import checked_rotation
+from endotsr.clips.flow.between import camera_between
+from endotsr.clips.formats.camera import checked_rotation
 from endotsr.clips.sequences.record import RecordedCamera
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray

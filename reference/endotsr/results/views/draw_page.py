@@ -12,9 +12,9 @@ from typing import Any
 
 import msgspec
 
-from endotsr.clips.sequences.drawing import DrawnClip, DrawnFrame
-from endotsr.clips.sequences.drawn_masks import FORMAT
-from endotsr.clips.sequences.mask_shapes import MaskShape
+from endotsr.clips.masks.drawing import DrawnClip, DrawnFrame
+from endotsr.clips.masks.drawn_masks import FORMAT
+from endotsr.clips.masks.mask_shapes import MaskShape
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.results.report.figures import data_uri, encode

@@ -35,7 +35,7 @@ def check_film(file: Path, rate: float | None = None, slow: float | None = None)
     if slow is not None and not 0 < slow < float("inf"):
         raise InputError(f"render: --slow {slow:g} is not allowed; allowed: a number > 0")
     if file.suffix.lower() != ".gif":
-        from endotsr.clips.sequences.film_file import encoder_of
+        from endotsr.clips.formats.film_file import encoder_of
 
         encoder_of(file)
 
@@ -101,7 +101,7 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     if file.suffix.lower() == ".gif":
         replace_file(file, lambda temporary: _write_gif(temporary, counted(), rate))
     else:
-        from endotsr.clips.sequences.film_file import write_video
+        from endotsr.clips.formats.film_file import write_video
 
         replace_file(file, lambda temporary: write_video(temporary, map(_even, counted()), rate))
     return count

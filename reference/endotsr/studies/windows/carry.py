@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from endotsr.clips.flow.tracks import follow
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.tracks import follow
 from endotsr.config import Config, with_settings
 from endotsr.errors import InputError
 from endotsr.method.equations.dictionary import dictionary_forward

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from endotsr.clips.sequences.between import flows_between, frame_between
+from endotsr.clips.flow.between import flows_between, frame_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config
 from endotsr.method.kernels.arrays import Array

@@ -116,8 +116,8 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
     """Targets, losses and optimiser; with `everything` also the terms that the schedule activates later."""
     import numpy as np
 
-    from endotsr.clips.sequences.between import Flows, motion_between
-    from endotsr.clips.sequences.between_kernels import moved_priors
+    from endotsr.clips.flow.between import Flows, motion_between
+    from endotsr.clips.flow.between_kernels import moved_priors
     from endotsr.method.losses.masked_ssim import stored_target
     from endotsr.method.splatting.render import RenderOut
     from endotsr.training.fitting.objective import full_weights, image_loss

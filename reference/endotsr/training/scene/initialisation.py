@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from endotsr.clips.flow.tracks import follow
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.tracks import follow
 from endotsr.config import InitialisationConfig, ModelConfig
 from endotsr.errors import InputError
 from endotsr.method.equations.dictionary import frequencies

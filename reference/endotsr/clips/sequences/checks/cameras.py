@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from endotsr.clips.sequences.camera import Intrinsics
+from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.world import FAR_FROM_ORIGIN

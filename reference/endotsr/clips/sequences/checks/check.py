@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import has_truth
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import baseline_findings, camera_findings
@@ -46,7 +47,6 @@ from endotsr.clips.sequences.checks.still_parts import StillParts
 from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.field_of_view import FieldOfView
-from endotsr.clips.sequences.files import has_truth
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_masks

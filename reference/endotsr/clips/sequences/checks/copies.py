@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.checks.kinds import Finding, finding
-from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.splits import LEAST_TRAINING_FRAMES
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray, IndexArray

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import frame_numbers, shortened
+from endotsr.clips.formats.picture_fields import colours_differ
 from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
-from endotsr.clips.sequences.files import frame_numbers, shortened
-from endotsr.clips.sequences.picture_fields import colours_differ
 from endotsr.clips.sequences.splits import evenly_spaced
 
 SMALL = 8  # pixels between the sampled rows and columns

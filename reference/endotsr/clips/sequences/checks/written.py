@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.choices import Border
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
@@ -10,7 +11,6 @@ from endotsr.clips.sequences.checks.exchanged import MaskOrder
 from endotsr.clips.sequences.checks.guard import notes_of
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.still_parts import StillParts
-from endotsr.clips.sequences.choices import Border
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.method.kernels.arrays import BoolArray

@@ -13,16 +13,16 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import NamedTuple
 
+from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.formats.camera import ARBITRARY, MILLIMETRES
+from endotsr.clips.formats.files import shortened
+from endotsr.clips.formats.video_file import VIDEO_ENDINGS
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.camera import ARBITRARY, MILLIMETRES
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
-from endotsr.clips.sequences.files import shortened
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import MASK_ENDINGS
 from endotsr.clips.sequences.unread import folders_of, together, unread
-from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.untrusted.names import plain_line

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.camera import checked_rotation, intrinsics_of_matrix, inverse_pose, rows_of_motion
+from endotsr.clips.formats.files import visible_files
+from endotsr.clips.formats.inventory import Inventory
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.opencv.stereo import Maps, remapped
-from endotsr.clips.sequences.camera import checked_rotation, intrinsics_of_matrix, inverse_pose, rows_of_motion
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
-from endotsr.clips.sequences.files import visible_files
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions

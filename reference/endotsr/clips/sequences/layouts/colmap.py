@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.sequences.camera import ARBITRARY, shared_intrinsics
+from endotsr.clips.formats.camera import ARBITRARY, shared_intrinsics
+from endotsr.clips.formats.colmap_folders import choose_model, files_of_model, find_models, unregistered
+from endotsr.clips.formats.colmap_model import ModelImage, read_model
+from endotsr.clips.formats.files import shortened, time_order, visible_files
+from endotsr.clips.formats.picture_fields import picture_notes
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.colmap_folders import choose_model, files_of_model, find_models, unregistered
-from endotsr.clips.sequences.colmap_model import ModelImage, read_model
-from endotsr.clips.sequences.files import shortened, time_order, visible_files
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.pictures import PAIRS
-from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import pictures_from_files, stated_masks
 from endotsr.clips.sequences.unread import folders_of, together

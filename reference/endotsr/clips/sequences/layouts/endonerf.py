@@ -9,10 +9,10 @@ File names are free, with one pattern per folder. The number in the name orders 
 
 from pathlib import Path
 
+from endotsr.clips.formats.picture_fields import picture_notes
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.folder_reader import FolderReader
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.poses import (
     POSE_FILES,
     RowConvention,

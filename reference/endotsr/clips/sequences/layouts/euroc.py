@@ -14,14 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.formats.calibrations import StatedCamera, calibrated
+from endotsr.clips.formats.camera import StereoCalibration, checked_rotation, inverse_pose, rows_of_motion
+from endotsr.clips.formats.files import shortened, visible_files
+from endotsr.clips.formats.picture_fields import picture_notes
+from endotsr.clips.formats.time_lists import TimedFile, nanosecond_list
+from endotsr.clips.formats.trajectory import poses_at, read_trajectory
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
-from endotsr.clips.sequences.camera import StereoCalibration, checked_rotation, inverse_pose, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import shortened, visible_files
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     pictures_from_files,
@@ -31,8 +33,6 @@ from endotsr.clips.sequences.sources import (
     stated_masks,
     unit_of,
 )
-from endotsr.clips.sequences.time_lists import TimedFile, nanosecond_list
-from endotsr.clips.sequences.trajectory import poses_at, read_trajectory
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.camera import (
+from endotsr.clips.formats.camera import (
     ARBITRARY,
     Intrinsics,
     checked_intrinsics,
@@ -21,15 +20,16 @@ from endotsr.clips.sequences.camera import (
     scene_factor,
     shared_intrinsics,
 )
+from endotsr.clips.formats.colmap_folders import unregistered
+from endotsr.clips.formats.files import time_order
+from endotsr.clips.formats.inventory import Inventory
+from endotsr.clips.formats.picture_fields import picture_notes
+from endotsr.clips.formats.point_files import read_cloud
+from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.colmap_folders import unregistered
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
-from endotsr.clips.sequences.files import time_order
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.picture_fields import picture_notes
-from endotsr.clips.sequences.point_files import read_cloud
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
 from endotsr.clips.sequences.unread import folders_of, together

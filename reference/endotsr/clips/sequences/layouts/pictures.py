@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import check_pairing, frame_numbers, visible_files
+from endotsr.clips.formats.picture_fields import picture_notes
+from endotsr.clips.formats.time_lists import PictureTimes, picture_times
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.checks.frames import gap_findings
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import check_pairing, frame_numbers, visible_files
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
-from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     files_of,
@@ -30,7 +31,6 @@ from endotsr.clips.sequences.sources import (
     stated_poses,
     unit_of,
 )
-from endotsr.clips.sequences.time_lists import PictureTimes, picture_times
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 

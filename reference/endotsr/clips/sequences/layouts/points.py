@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.formats.camera import ARBITRARY, checked_rotation, intrinsics_of_matrix, rows_of_motion
+from endotsr.clips.formats.files import frame_numbers, list_pictures
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.camera import ARBITRARY, checked_rotation, intrinsics_of_matrix, rows_of_motion
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import frame_numbers, list_pictures
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_of, stated_masks

@@ -12,11 +12,11 @@ import tarfile
 from dataclasses import replace
 from pathlib import Path
 
-from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.camera import checked_rotation, rows_of_motion
+from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.formats.camera import checked_rotation, rows_of_motion
+from endotsr.clips.formats.files import frame_numbers, shortened, visible_files
+from endotsr.clips.formats.inventory import Inventory
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import frame_numbers, shortened, visible_files
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.formats.camera import Intrinsics, intrinsics_of_matrix
+from endotsr.clips.formats.files import check_pairing, list_pictures
+from endotsr.clips.formats.inventory import Inventory
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.camera import Intrinsics, intrinsics_of_matrix
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
-from endotsr.clips.sequences.files import check_pairing, list_pictures
-from endotsr.clips.sequences.inventory import Inventory
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions

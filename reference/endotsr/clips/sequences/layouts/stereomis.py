@@ -9,16 +9,16 @@ masks/000123l.png          of the left picture, any value above 0 = tissue, perh
 from dataclasses import replace
 from pathlib import Path
 
+from endotsr.clips.formats.files import list_pictures, visible_files
+from endotsr.clips.formats.video_file import VIDEO_ENDINGS
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.files import list_pictures, visible_files
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import masks_of
 from endotsr.clips.sequences.unread import folders_of
-from endotsr.clips.sequences.video_file import VIDEO_ENDINGS
 from endotsr.errors import InputError
 
 CALIBRATION = "StereoCalibration.ini"

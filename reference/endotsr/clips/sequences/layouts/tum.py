@@ -9,15 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
+from endotsr.clips.formats.calibrations import StatedCamera, calibrated
+from endotsr.clips.formats.camera import Intrinsics
+from endotsr.clips.formats.files import shortened, visible_files
+from endotsr.clips.formats.picture_fields import picture_notes
+from endotsr.clips.formats.trajectory import TICKS, poses_at, read_trajectory
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
-from endotsr.clips.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.clips.sequences.calibrations import StatedCamera, calibrated
-from endotsr.clips.sequences.camera import Intrinsics
 from endotsr.clips.sequences.clip import Clip, Depth
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
-from endotsr.clips.sequences.files import shortened, visible_files
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.picture_fields import picture_notes
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     depth_of,
@@ -27,7 +28,6 @@ from endotsr.clips.sequences.sources import (
     stated_depth,
     stated_masks,
 )
-from endotsr.clips.sequences.trajectory import TICKS, poses_at, read_trajectory
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose

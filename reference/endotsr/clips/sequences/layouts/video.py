@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import visible_files
+from endotsr.clips.formats.video_file import VideoFacts, is_video, video_facts, video_pictures
+from endotsr.clips.formats.view_marks import chosen_views
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
-from endotsr.clips.sequences.files import visible_files
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
 from endotsr.clips.sequences.layouts.pictures import SIDE
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -27,8 +29,6 @@ from endotsr.clips.sequences.sources import (
     stated_poses,
     unit_of,
 )
-from endotsr.clips.sequences.video_file import VideoFacts, is_video, video_facts, video_pictures
-from endotsr.clips.sequences.view_marks import chosen_views
 from endotsr.errors import InputError
 
 SAME_RATE = 0.01  # relative difference of the frame rates of two videos of a pair

@@ -1,0 +1,1 @@
+"""Optical flow of a clip: its pairs, chained tracks, and the frames between two frames."""

@@ -1,0 +1,1 @@
+"""File formats of others: calibrations, trajectories, reconstructions, videos, stacks. From bytes to checked values."""

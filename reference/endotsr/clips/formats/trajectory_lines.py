@@ -1,0 +1,162 @@
+"""The lines of a trajectory file: `stamp tx ty tz qx qy qz qw` of TUM and EuRoC, the matrices of KITTI, or .npy.
+
+A head line that names position and quaternion states the columns, in any order; without one, the order is the one
+above. Lines that begin with # are comments. Matrices have no stamps: one per frame, in order.
+"""
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.clips.formats.camera import rows_of_motion
+from endotsr.clips.formats.inventory import Inventory
+from endotsr.clips.formats.plain_arrays import read_npy
+from endotsr.errors import InputError
+from endotsr.method.kernels.arrays import FloatArray
+from endotsr.untrusted.files import read_text
+from endotsr.untrusted.names import decimal_commas
+
+COLUMNS = (7, 8, 12, 16)
+ALLOWED = (
+    "allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw; without stamps 7, or the 12 or 16 of a matrix, as KITTI has"
+    " them; or other columns that a head line names"
+)
+LONGEST_HEAD = 4096  # characters; the search for brackets takes the square of it
+NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
+# Names in head lines, in lower case: the axis is the last letter, behind q, t, p or the words that stand for them.
+QUATERNION = re.compile(r"(?:q|quat|quaternion|rot|orientation)(?:[._]\w*?)??[._]?([wxyz])")
+POSITION = re.compile(r"(?:(?:t|p|pos|position|trans|translation)(?:[._]\w*?)??[._]?)?([xyz])")
+FIELDS = Inventory(
+    "the columns of a trajectory, as its head line names them",
+    used={
+        "stamp": "the first column: seconds, frame number, or nanoseconds as in EuRoC",
+        "tx ty tz": "position",
+        "qx qy qz qw": "unit quaternion, in the order of the head line or x y z w",
+    },
+    harmless={"v_* b_* w_* vel* bias* gyro* acc*": "velocities and sensor biases follow from no picture"},
+)
+USED = ("tx", "ty", "tz", "qx", "qy", "qz", "qw")
+
+
+class StoredPose(NamedTuple):
+    """A pose as it is stored."""
+
+    stamp: float
+    rotation: FloatArray  # (3, 3)
+    position: FloatArray  # (3,)
+    where: str
+
+
+class StoredPoses(NamedTuple):
+    """The poses of a file."""
+
+    rows: list[StoredPose]
+    stamped: bool  # False: the stamps count from 0
+    notes: list[str]
+
+
+def stored_poses(path: Path) -> StoredPoses:
+    """The poses of a file. Raises InputError naming the line and the reason."""
+    if path.suffix.lower() == ".npy":
+        lines, head = _array_lines(path), []
+    else:
+        lines, head = _text_lines(path)
+    if not lines:
+        raise InputError(f"{path}: holds no pose; {ALLOWED}")
+    sizes = {len(row) for _, row in lines}
+    if len(sizes) > 1:
+        raise InputError(f"{path}: lines of {' and '.join(map(str, sorted(sizes)))} numbers; {ALLOWED}")
+    if sizes & {12, 16} and {len(head)} != sizes:
+        found = [StoredPose(k, *rows_of_motion(np.array(row).reshape(-1, 4), where), where)
+                 for k, (where, row) in enumerate(lines)]  # fmt: skip
+        return StoredPoses(found, False, [])
+    names, notes = _columns_of(path, head, sizes.pop())
+    place = [names.index(name) for name in USED]
+    stamp = names.index("stamp") if "stamp" in names else None
+    found = []
+    for k, (where, row) in enumerate(lines):
+        position, quaternion = np.array([row[i] for i in place[:3]]), [row[i] for i in place[3:]]
+        found.append(
+            StoredPose(float(k) if stamp is None else row[stamp], _rotation(quaternion, where), position, where)
+        )
+    return StoredPoses(found, stamp is not None, notes)
+
+
+def _columns_of(path: Path, head: list[str], size: int) -> tuple[list[str], list[str]]:
+    """The name of every column, and notes on the order and on columns that are not used.
+
+    Raises:  InputError for a head line that names another number of columns.
+    """
+    if not head:
+        return (["stamp"] if size == 8 else []) + list(USED), ["quaternions are read as x y z w"]
+    if len(head) == 8 and size == 7 and head[0] == "stamp":  # a stamp that the lines do not have
+        head = head[1:]
+    if len(head) != size:
+        raise InputError(f"{path}: its head line names {len(head)} columns, its lines have {size} numbers; {ALLOWED}")
+    order = " ".join(name[1] for name in head if name in USED[3:])
+    return head, [f"quaternions are {order} by the head line", *FIELDS.noted(head, path)]
+
+
+def _array_lines(path: Path) -> list[tuple[str, list[float]]]:
+    """The rows of an array (n, 7 | 8 | 12 | 16), (n, 3, 4) or (n, 4, 4), with their place."""
+    array = read_npy(path).astype(np.float64)
+    rows = array.reshape(len(array), -1) if array.ndim in (2, 3) and len(array) else np.zeros((0, 0))
+    if rows.shape[1] not in COLUMNS or not np.isfinite(rows).all():
+        raise InputError(f"{path}: array of shape {array.shape}; {ALLOWED}")
+    return [(f"{path}: row {i}", row) for i, row in enumerate(rows.tolist())]
+
+
+def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
+    """Place and numbers of every line, and the columns that a head line names; a head line may have no mark."""
+    found: list[tuple[str, list[float]]] = []
+    head: list[str] = []
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        words, where = re.sub(r"[\[\],;]", " ", line).split(), f"{path}: line {number}"
+        if not words or words[0].startswith("#"):
+            head = _named_columns(line) or head
+            continue
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if not row and not found and _named_columns(line):
+            head = _named_columns(line)
+            continue
+        if not row or len(row) not in (*COLUMNS, len(head)) or not np.isfinite(row).all():
+            raise InputError(f"{where}: {ALLOWED}{decimal_commas(line)}{_angles(line)}")
+        found.append((where, row))
+    return found, head
+
+
+def _angles(line: str) -> str:
+    """The end of a message about a head line with angles; else nothing."""
+    return "; angles are not read: write quaternions" if re.search("roll|pitch|yaw|euler", line.lower()) else ""
+
+
+def _named_columns(line: str) -> list[str]:
+    """The columns that a line names: stamp, tx .. qw, others as they are; [] unless it names a pose."""
+    if len(line) > LONGEST_HEAD:
+        return []
+    plain = re.sub(r"\[[^\]]*\]|\([^)]*\)|#", " ", line).replace(";", ",")
+    words = [word.strip() for word in (plain.split(",") if "," in plain else plain.split())]
+    found = []
+    for k, word in enumerate(word for word in words if word):
+        lower = word.lower()
+        if turned := QUATERNION.fullmatch(lower):
+            found.append(f"q{turned[1]}")
+        elif moved := POSITION.fullmatch(lower):
+            found.append(f"t{moved[1]}")
+        else:
+            found.append(word if k else "stamp")
+    return found if all(found.count(name) == 1 for name in USED) else []
+
+
+def _rotation(quaternion: list[float], where: str) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
+    length = np.linalg.norm(quaternion)
+    if abs(length - 1) > NORM_TOLERANCE:
+        raise InputError(f"{where}: the quaternion has length {length:.4g}; allowed: 1, in the order x y z w")
+    return Rotation.from_quat(quaternion).as_matrix()

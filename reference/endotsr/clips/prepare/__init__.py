@@ -1,0 +1,1 @@
+"""What writes a sequence: the commands `prepare`, `depth` and `poses`, and files for other programs."""

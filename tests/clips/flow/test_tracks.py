@@ -1,0 +1,145 @@
+"""Tests of `sequences.tracks`: points followed along optical flow, on simulated tissue whose motion is known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from endotsr.clips.flow import tracks
+from endotsr.clips.flow.tracks import follow
+from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
+from endotsr.method.splatting.camera import backproject
+
+SIZE = {"width": 96, "height": 80, "frames": 10}
+
+
+def lifted(sequence, place: int, step: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions of a grid of tissue pixels of a training frame, and their columns and rows."""
+    frame = sequence.train_index[place]
+    row, column = (a.ravel() for a in np.mgrid[12 : sequence.height - 12 : step, 12 : sequence.width - 12 : step])
+    tissue = sequence.masks[frame, row, column]
+    row, column = row[tissue], column[tissue]
+    depth = sequence.depth[frame, row, column].astype(float)
+    return backproject(sequence.cameras[frame], column.astype(float), row.astype(float), depth), column, row
+
+
+def truth(simulated, place: int, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """(n, 3, P) true positions at the training frames."""
+    train = simulated.sequence.train_index
+    return np.stack([simulated.true_positions(train[place], i)[:, row, column] for i in train])
+
+
+@pytest.fixture(scope="module")
+def breathing():
+    return simulate(with_effects(SimulatorSettings(**SIZE), "breathing"))
+
+
+@pytest.mark.parametrize("place", [0, 4, 7])
+def test_points_follow_the_tissue_forwards_and_backwards(breathing, place):
+    position, column, row = lifted(breathing.sequence, place)
+    found = follow(breathing.sequence, np.full(column.size, place), position)
+    true = truth(breathing, place, column, row)
+    moved = np.linalg.norm(true - true[place], axis=1).mean()
+    error = np.linalg.norm(found.position - true, axis=1)
+    assert moved > 0.5 and error[found.followed].mean() < 0.15 * moved
+    assert found.followed.mean() > 0.8
+    np.testing.assert_array_equal(found.position[place], position.astype(np.float32))
+
+
+def test_points_of_different_frames_do_not_affect_one_another_while_all_are_followed():
+    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
+    first, *_ = lifted(sequence, 0)
+    third, *_ = lifted(sequence, 2)
+    start = np.repeat([0, 2], [first.shape[1], third.shape[1]])
+    both = follow(sequence, start, np.concatenate([first, third], axis=1))
+    assert both.followed.all()
+    alone = follow(sequence, np.full(third.shape[1], 2), third)
+    np.testing.assert_array_equal(both.position[:, :, first.shape[1] :], alone.position)
+
+
+def test_points_of_a_scene_that_does_not_move_stay():
+    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
+    position, *_ = lifted(sequence, 0)
+    found = follow(sequence, np.zeros(position.shape[1], int), position)
+    assert np.abs(found.position - position).max() < 1e-3  # mm; the prior depth is float32 and sampled between pixels
+
+
+def test_a_moving_camera_does_not_move_the_points():
+    sequence = simulate(with_effects(SimulatorSettings(**SIZE), "camera_motion")).sequence
+    position, *_ = lifted(sequence, 0)
+    found = follow(sequence, np.zeros(position.shape[1], int), position)
+    travelled = max(np.linalg.norm(c.translation - sequence.cameras[0].translation) for c in sequence.cameras)
+    assert travelled > 2 and np.median(np.linalg.norm(found.position - position, axis=1)) < 0.1
+
+
+def covered_for_a_while(simulated):
+    """The same sequence with a part of the tissue excluded in the third to the fifth training frame."""
+    sequence = simulated.sequence
+    masks = sequence.masks.copy()
+    for frame in sequence.train_index[2:5]:
+        masks[frame, 24:56, 32:64] = False
+    return dataclasses.replace(sequence, masks=masks)
+
+
+def test_a_covered_point_moves_with_the_tissue_around_it_and_is_found_again(breathing):
+    sequence = covered_for_a_while(breathing)
+    position, column, row = lifted(sequence, 0, step=3)
+    found = follow(sequence, np.zeros(column.size, int), position)
+    true = truth(breathing, 0, column, row)
+    inside = (column > 36) & (column < 60) & (row > 28) & (row < 52)
+    assert not found.followed[2:5, inside].any() and found.followed[5, inside].mean() > 0.9
+    error = np.linalg.norm(found.position - true, axis=1)[2:5, inside].mean()
+    assert error < 0.2 * np.linalg.norm(true - true[0], axis=1)[2:5, inside].mean()
+
+
+def test_a_lost_point_without_points_around_it_stays(breathing):
+    sequence = covered_for_a_while(breathing)
+    position, column, row = lifted(sequence, 0)
+    inside = (column > 36) & (column < 60) & (row > 28) & (row < 52)
+    found = follow(sequence, np.zeros(inside.sum(), int), position[:, inside])
+    np.testing.assert_array_equal(found.position[4], found.position[1])
+
+
+def test_a_jump_of_the_depth_loses_a_point():
+    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
+    depth = sequence.depth.copy()
+    depth[sequence.train_index[1]] *= 1.5
+    position, *_ = lifted(sequence, 0)
+    found = follow(dataclasses.replace(sequence, depth=depth), np.zeros(position.shape[1], int), position)
+    assert not found.followed[1].any() and found.followed[2].all()
+    np.testing.assert_array_equal(found.position[1], found.position[0])
+
+
+def test_no_held_out_frame_is_read(breathing):
+    sequence = breathing.sequence
+    position, *_ = lifted(sequence, 0)
+    start = np.zeros(position.shape[1], int)
+    images, depth = sequence.images.copy(), sequence.depth.copy()
+    images[sequence.test_index], depth[sequence.test_index] = 0, 1
+    changed = dataclasses.replace(sequence, images=images, depth=depth)
+    np.testing.assert_array_equal(follow(changed, start, position).position, follow(sequence, start, position).position)
+
+
+def test_a_point_behind_a_camera_is_not_followed():
+    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
+    position, *_ = lifted(sequence, 0)
+    position[2, 0] = -position[2, 0]
+    found = follow(sequence, np.zeros(position.shape[1], int), position)
+    assert not found.followed[1:, 0].any() and np.isfinite(found.position).all()
+
+
+def test_one_training_frame_needs_no_flow(monkeypatch, breathing):
+    sequence = breathing.sequence
+    monkeypatch.setattr(tracks, "flows_between", lambda *a: pytest.fail("no pair of frames"))
+    only = dataclasses.replace(sequence, train_index=sequence.train_index[:1])
+    position, *_ = lifted(sequence, 0)
+    found = follow(only, np.zeros(position.shape[1], int), position)
+    np.testing.assert_array_equal(found.position, position[None].astype(np.float32))
+
+
+def test_flows_that_are_not_kept_are_made_again(breathing, monkeypatch):
+    position, *_ = lifted(breathing.sequence, 4)
+    start = np.full(position.shape[1], 4)
+    kept = follow(breathing.sequence, start, position)
+    monkeypatch.setattr(tracks, "KEPT_PAIRS", 1)
+    np.testing.assert_array_equal(follow(breathing.sequence, start, position).position, kept.position)

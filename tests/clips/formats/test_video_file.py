@@ -1,0 +1,95 @@
+"""Videos: what they hold, decoded or refused, and never another picture, time or orientation in silence."""
+
+import av
+import numpy as np
+import pytest
+from made_videos import CAMERA, HEIGHT, WIDTH, picture, pictures, turn, write
+
+from endotsr.cli.main import main
+from endotsr.clips.formats.video_file import video_facts, video_pictures
+from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences.read import read_sequence
+from endotsr.clips.sequences.sequence_file import read_sequence_file
+from endotsr.errors import InputError
+
+CLOSE = 8.0  # mean grey levels that a codec may cost; a moment later differs by more
+
+
+def apart(a, b):
+    return float(np.abs(a.astype(int) - b.astype(int)).mean())
+
+
+def test_progressive_video_is_not_touched(tmp_path):
+    frames = pictures()
+    write(tmp_path / "a.mkv", frames, "ffv1", layout="bgr0")
+    facts = video_facts(tmp_path / "a.mkv")
+    assert (facts.interlaced, facts.turn, facts.count, facts.codec) == (False, 0, 12, "ffv1")
+    for found, made in zip(video_pictures(tmp_path / "a.mkv", [0, 3, 11]), (frames[0], frames[3], frames[11])):
+        np.testing.assert_array_equal(found, made)
+
+
+def test_a_training_has_the_times_of_the_file(tmp_path):
+    """t = (s - s_0) / (s_last - s_0) (n - 1) / n, of the frames that were selected."""
+    from common_folder import written
+
+    from endotsr.config import SequenceConfig
+
+    written(tmp_path, times=[0.0, 0.1, 0.2, 0.9, 1.0])
+    sequence = read_sequence(tmp_path, SequenceConfig(), 0.2)
+    np.testing.assert_allclose(sequence.times, np.array([0.0, 0.1, 0.2, 0.9, 1.0]) * 4 / 5, rtol=1e-15)
+    assert any("uneven-times: the frames are 0.1 to 0.7 s apart" in note for note in sequence.notes)
+    part = read_sequence(tmp_path, SequenceConfig(frames="2:5"), 0.2)
+    np.testing.assert_allclose(part.times, np.array([0.0, 0.7, 0.8]) / 0.8 * 2 / 3, rtol=1e-14)
+    from endotsr.results.evaluation.baselines import neighbours
+
+    assert neighbours(sequence, 1).fraction == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("degrees", [90, 180, 270])
+def test_a_stated_rotation_is_not_applied_in_silence(degrees, tmp_path, capsys):
+    turn(write(tmp_path / "a.mp4", pictures(4)), degrees)
+    words = ["prepare", str(tmp_path / "a.mp4"), *CAMERA, "--out"]
+    assert main([*words, str(tmp_path / "no")]) == 2 and not (tmp_path / "no").exists()
+    assert "--orientation turned" in capsys.readouterr().err
+    for way, quarters in (("stored", 0), ("turned", -degrees // 90)):
+        assert main([*words, str(tmp_path / way), "--orientation", way]) == 0
+        assert "states a rotation" in capsys.readouterr().out
+        shown = np.rot90(picture(0), quarters)
+        found = read_sequence_file(tmp_path / way).camera
+        assert (found.width, found.height) == (shown.shape[1], shown.shape[0])
+        assert apart(read_png(tmp_path / way / "images/000000.png"), shown) < CLOSE
+
+
+def test_metadata_that_are_no_text_do_not_hide_the_pictures(tmp_path):
+    """A title in another encoding, as recorders write it, and as long as before: its element states the length."""
+    with av.open(str(tmp_path / "a.mkv"), "w") as container:
+        container.metadata["title"] = "OPERATION"
+        stream = container.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        for shown in pictures(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(shown, format="rgb24")))
+        container.mux(stream.encode())
+    data = (tmp_path / "a.mkv").read_bytes()
+    assert data.count(b"OPERATION") == 1
+    title = b"OP\xc4RATI\xffN"
+    assert len(title) == len(b"OPERATION")
+    (tmp_path / "a.mkv").write_bytes(data.replace(b"OPERATION", title))
+    assert video_facts(tmp_path / "a.mkv").count == 3
+
+
+def test_a_stream_that_states_no_length_ends_where_it_ends(tmp_path):
+    file = write(tmp_path / "a.mkv", pictures(40))
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    assert 0 < video_facts(file).count < 40
+
+
+def test_a_file_without_pictures_is_no_video(tmp_path):
+    with av.open(str(tmp_path / "a.mp4"), "w") as container:
+        stream = container.add_stream("aac", rate=44100)
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        frame.sample_rate = 44100
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with pytest.raises(InputError, match="holds no pictures"):
+        video_facts(tmp_path / "a.mp4")
