@@ -24,7 +24,7 @@ GROUPS = (
     (
         "Clips",
         "From a recording to the arrays that training reads.",
-        ("sequences", "simulator", "effects", "poses", "opencv", "untrusted"),
+        ("formats", "sequences", "flow", "masks", "prepare", "simulator", "effects", "poses", "opencv", "untrusted"),
     ),
     ("Training", "The model, its training, and the files of a run.", ("scene", "fitting", "runs")),
     ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
