@@ -254,7 +254,7 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # <!-- definition: endotsr.definition.smoothness.smoothness_forward -->
 # ```python
 # def smoothness_forward(rendered_depth, rendered, mask, edges, total_variation_factor):
-#     """Equation (B9): scene units squared; the depth (H, W) is not smoothed across `edges` (H, W)."""
+#     """Equation (B9): a squared depth, a depth and a colour; the depth (H, W) is not smoothed across `edges` (H, W)."""
 #     loss = squared_steps(rendered_depth, mask & ~edges)[0]
 #     if total_variation_factor:
 #         variation = total_variation(rendered_depth[None], mask)[0] + total_variation(rendered, mask)[0]

@@ -175,7 +175,7 @@ print(
 # ```
 #
 # `view_gradients`, printed in {doc}`00_why`, is steps 4 to 6. `controlled` is step 9: it calls `densify` and gives new
-# Gaussians the moments 0. Three names of the definition are not in the list. The argument `edges` gives the depth edges of
+# Gaussians the moments 0. Three names in the definition need a word. The argument `edges` gives the depth edges of
 # the smoothness loss. Its default is an image without edges, while the compiled training detects them in the rendered
 # depth. With `legacy_skip`, an option that is off in `paper`, an iteration with density control omits step 8. The
 # dictionary `exposures` is empty unless `model.exposure` is set ({doc}`11_base_losses`).
@@ -629,17 +629,20 @@ np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
 #
 # ## The gradient check
 #
-# The whole chain is checked as one scalar function of ten groups of raw parameters. Here each group is one block;
+# The whole chain is checked as one scalar function of twelve groups of parameters: the ten arrays of the Gaussians, and
+# gain and bias of an exposure {eq}`eq-b13`, which `paper` does not have. Here each group is one block;
 # `endotsr gradcheck` checks the same pair in finer blocks.
 
 # %%
 pair = all_pairs()["objective"]
 stream = pair_stream("objective", 0)
+groups = pair.inputs(stream)
+assert len(groups) == 12 and {"exposure_log_gain", "exposure_bias"} < set(groups)
 with one_thread():
     report = check_function(
         pair.forward,
         pair.reverse,
-        pair.inputs(stream),
+        groups,
         trace=pair.trace,
         rng=stream,
         label=(pair.name, pair.equation, pair.function),

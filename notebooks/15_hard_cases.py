@@ -92,8 +92,8 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 # ## The needle: digits lost in the inverse matrix
 #
 # A needle of $1000$ pixels, seen at an angle, has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
-# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are near $10^{12}$, and
-# $\det$ is about $3\cdot10^5$, while $q$ should be about 1. In float32 the difference of such products has lost its
+# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are $2.5\cdot10^{11}$,
+# $5\cdot10^{11}$ and $2.5\cdot10^{11}$, and $\det$ is about $3\cdot10^5$, while $q$ should be about 1. In float32 the difference of such products has lost its
 # digits. The specification writes a sum of squares:
 #
 # $$
@@ -121,12 +121,12 @@ def textbook(d_x, d_y, a, b, c, det, o):
 # %%
 # Its centre is 700 px off the image.
 wide = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, -700.0, -700.0, 300, 300)
-half_turn = (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))
+eighth_turn = (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))
 needle = dict(
     position=[[0.0], [0.0], [1.0]],
     log_scale=np.log([10.0, 1e-3, 1e-3]),
     logit=2.0,
-    quaternion=half_turn,
+    quaternion=eighth_turn,
 )
 double, saved = render(made(**needle), wide)
 single, saved_32 = render(made(**needle, dtype=np.float32), wide)
@@ -134,6 +134,8 @@ a, b, c = saved.projected.covariance2d[:, 0]
 det, o = saved.projected.determinant[0], 1 / (1 + np.exp(-2.0))
 along = np.arange(300)
 np.testing.assert_allclose((a, b, c, det), (5e5, 5e5, 5e5, 3e5), rtol=0.05)
+leg = 1000 / np.sqrt(2)  # of the distance along the diagonal
+np.testing.assert_allclose((c * leg**2, 2 * b * leg**2), (2.5e11, 5e11), rtol=0.05)
 # The pixels of the diagonal, which the needle covers.
 d = along + 0.5 - saved.projected.mean2d[:, :1]
 truth = double.opacity[along, along]

@@ -13,7 +13,7 @@
 # %% [markdown]
 # # 18. Targets between the frames
 #
-# Every loss so far compares a render with a training frame, and none reads a render between two training frames. In
+# Every loss on images so far is computed at the time of a training frame, and none reads a render between two of them. In
 # {doc}`00_why` a clip breathes four times. There the colour residual is right at the training times and several
 # decibels wrong between them. The preset `sharp` therefore also renders times between the frames. It compares these
 # renders with targets that are made from both frames, moved along their optical flow.

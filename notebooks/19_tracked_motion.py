@@ -118,8 +118,8 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # $\lVert f(x)+g(x')\rVert^2\le0.02\,\lVert f(x)\rVert^2+0.5$ px². At an occlusion the backward flow ends on another
 # piece of tissue, and the test fails.
 #
-# **(19.3) Is it the same surface?** The pixel $x'$ and its four neighbours must be tissue with a prior depth, and the
-# depth may change by at most 20 %<!--=tracks.depth-->. An instrument in front of the tissue fails the first test, and
+# **(19.3) Is it the same surface?** The four pixels around $x'$ must be tissue with a prior depth, and the depth may
+# change by at most 20 %<!--=tracks.depth-->. An instrument in front of the tissue fails the first test, and
 # a fold the second.
 #
 # **(19.4) A lost point** is carried by the tissue around it: it moves by the mean displacement of the 8 nearest

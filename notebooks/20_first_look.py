@@ -14,8 +14,8 @@
 # # 20. A first look: fewer pixels and a known number of Gaussians
 #
 # The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in training the
-# render is still far from the frame, so its finest detail says little about what to change. The number of Gaussians,
-# in turn, follows from a threshold that was not chosen for the clip. The preset `quick` therefore starts on frames of
+# render is still far from the frame, and we assume that fine detail then says little about what to change. The number
+# of Gaussians follows from a threshold that was not chosen for the clip. The preset `quick` therefore starts on frames of
 # half size and grows to a given number of Gaussians.
 #
 # The equation of the coarse start is {eq}`eq-b17` of {doc}`/specification/b17_coarse_start`; the growth to a budget is
@@ -47,7 +47,7 @@ rng = np.random.default_rng(20)
 # %% [markdown]
 # ## Growth to a budget, step by step
 #
-# The published rule clones or splits every Gaussian whose mean screen gradient exceeds a threshold ({eq}`eq-b11`,
+# The published rule clones or splits every Gaussian whose mean screen gradient reaches a threshold ({eq}`eq-b11`,
 # derived in {doc}`13_optimiser_and_density`). The number of new Gaussians therefore depends on everything that scales a
 # gradient: the weights of the losses, the size of the frames, the exposure. With a budget you choose how many; the
 # gradients choose which.

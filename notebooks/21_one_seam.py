@@ -181,7 +181,7 @@ assert values[2] > max(values[:2])
 # **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. For any $C$, the
 # subtraction of $C\,\phi(u^*)$ leaves the Gaussian in its place at the join: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
 #
-# **(21.6) The picture at the join** is therefore that of the neighbour.
+# **(21.6) The picture at the join** is therefore that of the neighbour, as far as no Gaussian is dropped or added.
 
 # %%
 shift, shared = second.first - first.first, first.end - second.first

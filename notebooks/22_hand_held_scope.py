@@ -306,12 +306,14 @@ assert report.passed
 #    rotations? Use $(u,v)$ of $W\mathbf x+\mathbf d$.
 # 2. Write `registration_forward` from {eq}`eq-b19` and let the golden cases judge it: `--only registration`
 #    ({doc}`index`).
-# 3. The cell below answers this one. The tissue is a plane at right angles to the axis, at distance $Z$. Which two of the
-#    six numbers of a small motion look alike in the middle of the picture, and how does (22.5) say so?
+# 3. The cell below answers this one. The tissue is a plane at right angles to the axis, at distance $Z$. Which pairs of
+#    the six numbers of a small motion look alike in the middle of the picture, and how does (22.5) say so?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. A turn about y and a shift along x: with Y = (0, 0, Z) the row has the entries
-# (Y x g)_2 = Z g_1 and g_1. They part only where X / Z, the angle off the axis, is not small.
+# Answer. A turn about y and a shift along x, and a turn about x and a shift along y: with
+# Y = (0, 0, Z) the row has the entries (Y x g)_2 = Z g_1 and g_1, and (Y x g)_1 = -Z g_2 and
+# g_2. They differ only where X / Z or Y / Z, the angle off the axis, is not small.
 column = np.array([0.0, 0.0, 50.0])
 slope = np.array([0.7, -0.2, 0.0])
-np.testing.assert_allclose(np.cross(column, slope)[1], 50.0 * slope[0])
+turns = np.cross(column, slope)
+np.testing.assert_allclose(turns, [-50.0 * slope[1], 50.0 * slope[0], 0.0])

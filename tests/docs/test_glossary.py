@@ -171,6 +171,15 @@ def test_no_identifier_uses_a_replaced_word(file):
     assert [name for name in found if out_of_place(name, room)] == []
 
 
+def test_letters_with_several_meanings_are_listed():
+    # The rows of one symbol; the rendered image stands in two sections with one meaning.
+    letters = [letter.strip() for row in rows() for letter in row["Symbol"].strip("$").split(",")]
+    several = {letter for letter in letters if letters.count(letter) > 1} - {"-", r"\hat I"}
+    text = GLOSSARY.read_text(encoding="utf-8")
+    said = text[text.index("The letters $A$") : text.index("In the code each meaning")]
+    assert several == set(re.findall(r"\$([^$]+)\$", said)) - {"T", "w"}, "$T_k$ and $w_{cji}$ have an index"
+
+
 def test_every_class_that_the_glossary_names_exists():
     """Among the rules of naming; the tables are looked up above."""
     rules = GLOSSARY.read_text(encoding="utf-8").partition("## Rules of naming")[2].partition("\n## ")[0]

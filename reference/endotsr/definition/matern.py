@@ -10,7 +10,7 @@ MaternSaved = namedtuple("MaternSaved", "motion_coefficients rho")
 def matern_weights(omega, length):
     """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) and the correlation length, as printed.
 
-    The kernel first divides by the largest frequency, which avoids overflow. Below a length of 1e-40, rho rounds to 1.
+    The kernel first divides by the largest frequency, which avoids overflow. At 1e-40 every rho rounds to 1 already.
     """
     rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3  # (5.2)
     return rho / rho.mean()  # (5.3)

@@ -39,6 +39,7 @@ def test_hard_M1_extreme_lengths_are_finite(dtype):
         assert np.all(np.isfinite(matern_weights(omega, length)))
     assert np.array_equal(matern_weights(omega, 0.0), np.ones(8, dtype))
     assert np.array_equal(matern_weights(omega, 1e-60), np.ones(8, dtype))
+    assert np.array_equal(matern_weights(omega, 1e-10), np.ones(8, dtype))  # the specification states this length
     limit = matern_weights(omega, np.inf)
     assert limit.dtype == dtype
     assert limit[0] == pytest.approx(4.3255108e-07, rel=3e-7) and limit[-1] == pytest.approx(7.2570029, rel=3e-7)

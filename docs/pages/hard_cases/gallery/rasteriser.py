@@ -130,7 +130,7 @@ def by_division(alphas, dtype):
 
 @case(
     "A4",
-    "Reverse pass behind an opaque Gaussian",
+    "Reverse pass through an opaque Gaussian",
     naive="`T = T / (1 - alpha)`, back to front",
     bound=8,
     why="The transmittance is not stored but recovered by division. Once an alpha is 1, this is 0/0. A clamp of alpha "

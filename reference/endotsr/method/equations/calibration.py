@@ -70,8 +70,8 @@ def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_rati
     views           name, g_rgb and g_lap (loss per display unit) of each view
     gradient_ratio  r > 0, the desired ratio of the Laplacian gradient to the photometric one
     returns         lambda_lap (linear in r), the ratios of the valid views, a printable table
-    Edges:          a view with g_rgb = 0 or a non-finite gradient is dropped. The median of an even number of ratios
-                    is the mean of the middle two.
+    Edges:          a view with g_rgb = 0, or with a non-finite gradient or ratio, is dropped. The median of an even
+                    number of ratios is the mean of the middle two.
     Raises:         CalibrationError with the table if no view is valid or the median is 0; ValueError for r <= 0.
     Oracle:         `endotsr.definition.calibration`
     """

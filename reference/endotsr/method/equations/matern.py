@@ -27,11 +27,11 @@ def matern_weights(omega: FloatArray, length: float) -> FloatArray:
     """Equation (4), upper line: rho_f proportional to (5/l^2 + (2 pi omega_f)^2)^3, scaled to mean 1.
 
     This is the reciprocal spectral density of the Matern-5/2 prior. It is evaluated relative to the largest frequency
-    and is therefore finite for every l >= 0; the printed formula overflows below l = 1e-51 (7e-7 in float32).
+    and is therefore finite for every l >= 0; the printed formula overflows below l = 9e-52 (8e-7 in float32).
 
     omega    (F,)  cycles per unit of normalised time, finite, > 0
     length   ()    l, normalised time, >= 0; 0 weights all frequencies equally, inf gives omega^6
-    returns  (F,)  rho, dimensionless, mean 1, increasing with omega; dtype of omega
+    returns  (F,)  rho, dimensionless, mean 1, not decreasing with omega; dtype of omega
     Reverse: none (constant in training).
     Raises:  ValueError if the length is negative or NaN, or a frequency is not finite and positive.
     Oracle:  1 / Student-t density with 5 degrees of freedom and scale 1/l; mpmath.

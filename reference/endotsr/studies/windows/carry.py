@@ -6,7 +6,8 @@ window. The neighbour's Gaussians, deformed to t*, become the canonical Gaussian
     mu = mu_n(t*) - C phi(u*)      q = q_n(t*)      s = s_n(t*)      h_0 = h_0,n + beta tanh(A_n phi_bar(t*)) / Y00
 
 C is fitted to the tracks of the tissue at the Gaussians, as in (B15); it is 0 where the settings start without motion.
-The FDM weights and A are 0. At the join both models render the same picture up to rounding.
+The FDM weights and A are 0. At the join both models render the same picture up to rounding, as far as no Gaussian is
+dropped or added.
 
 In: the neighbour's run folder and the sequence of this window. Out: a training state.
 """
@@ -93,8 +94,9 @@ def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "
     """The state of a window before its first iteration.
 
     Gaussians outside every training frame are dropped. If more than 0.8 `density.maximum` remain, the least opaque are
-    dropped too. At tissue pixels with rendered opacity below 0.5, points are drawn as at a cold start. Their number is
-    proportional to the uncovered fraction and bounded by `density.maximum`. Adam's moments are 0. Exposures and poses
+    dropped too. At tissue pixels with rendered opacity below 0.5, points are drawn as at a cold start. Their number in
+    the first training frame is proportional to the uncovered fraction, and all are bounded by `density.maximum`. Adam's
+    moments are 0. Exposures and poses
     are the neighbour's, constant beyond its last frame.
     """
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)

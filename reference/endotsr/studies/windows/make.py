@@ -58,7 +58,7 @@ def plan_recording(source: Path, config: Config, wanted: Wanted, out: Path) -> W
 def with_visits(config: Config) -> Config:
     """The settings with at least 36 iterations per training frame.
 
-    Preset `demo` trains a window of 48 frames with 36 per frame. With 15 per frame such a window is underfitted (B18).
+    Preset `demo` trains a window of 48 frames with 36 per frame. With 14 per frame such a window is underfitted (B18).
     """
     return with_settings(config, training={"visits_per_frame": max(VISITS, config.training.visits_per_frame)})
 

@@ -183,7 +183,7 @@ def calibrate_on(
     config: Config,
     frames: FrameParameters | None = None,
 ) -> Calibration:
-    """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
+    """Equation (7) on a trained scene: lambda_lap from the image gradients of up to `loss.calibration_views` views.
 
     The views are always rendered without the spectral components, because equation (7) is defined on the base model.
     The frame parameters `frames` belong to the base model.

@@ -114,7 +114,7 @@ def active_degree(iteration: int, config: Config) -> int:
 
 
 def statistics_active(iteration: int, config: Config) -> bool:
-    """Whether screen gradients are accumulated: until the last densification."""
+    """Whether screen gradients are accumulated: before `until`, also after the last densification."""
     return iteration < config.density.until
 
 

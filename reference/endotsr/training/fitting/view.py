@@ -1,4 +1,4 @@
-"""One training view, equation (6), composed only of documented pairs: the definition of one iteration.
+"""One training view, equation (6), composed only of documented pairs: the passes of one iteration.
 
     Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
                             camera --(B16)--^

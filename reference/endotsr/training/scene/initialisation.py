@@ -38,7 +38,7 @@ def initialise(
     rng: np.random.Generator,
     dtype: DTypeLike = np.float32,
 ) -> Gaussians:
-    """Gaussians at the start of training, spectral residuals not yet allocated.
+    """Gaussians at the start of training; of the residuals, only tracked motion is allocated.
 
     returns  positions on the pixels' rays at prior depth, colour of the pixel, opacity 0.1, unit quaternion,
              isotropic scale = root mean squared distance to the three nearest points; FDM weights 0;

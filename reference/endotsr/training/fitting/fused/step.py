@@ -33,7 +33,7 @@ def optimise(
 ) -> OffsetsAhead | None:
     """Update the Gaussians and their moments in place.
 
-    gaussians  the parameters, which are updated here and nowhere else in an iteration
+    gaussians  the parameters, updated in place
     saved      of `scene_at`, for the same Gaussians: times, atoms and slopes, which are only read
     grads      gradients with respect to the deformed scene
     back       of `scene_reverse(..., coefficients=False)`: gradients of the arrays without a fused sweep
