@@ -14,8 +14,9 @@
 # # 17. What a scene calls for
 #
 # A static scene needs no time bases, and constant light needs no colour residual. `endotsr inspect` tests the training
-# frames of a clip for each effect and plans the components that model it. This chapter repeats four of the tests by
-# hand, on clips in which every effect is known.
+# frames of a clip for each effect and plans the components that model it. This chapter computes four of
+# their quantities by hand, on clips in which every effect is known: the noise, the flow of a rigid scene, rank and
+# condition of the dictionary, and the memory of a plan.
 #
 # The equation is {eq}`eq-1` of {doc}`/specification/01_dictionary`: the dictionary that the time stamps must resolve.
 # The page {doc}`/effects` shows how often the tests are right and how much a plan saves.
