@@ -18,5 +18,6 @@ functions accept complex input: branches compare real parts.
 (B14) and (B15) start from an optical flow, (B17) and (B18) plan runs, and LPIPS (M3) needs a trained network; they are
 not in this room.
 
-`view` is the forward and reverse pass of one iteration, `train` a whole training. `python -m endotsr.definition` trains a small scene.
+`view` is the forward and reverse pass of one iteration, and `train` is a whole training. `python -m endotsr.definition`
+trains a small scene.
 """

@@ -1,7 +1,7 @@
 """Equation (B16): a correction of the camera pose of one frame, a rotation and a translation in camera axes.
 
 In: the pose from the sequence and the parameters of its frame. Out: the pose used to render the frame. Poses from
-robots and trackers can be wrong by some pixels, and without this correction the model can fit the error as scene motion.
+robots and trackers can be wrong by some pixels; without this correction the model can fit the error as scene motion.
 The six numbers per frame are processed in float64. This module depends on neither frame number nor time.
 """
 
