@@ -281,7 +281,7 @@ for factor in (1.0, 10.0):
 # %% [markdown]
 # ## When A harms
 #
-# Colour that imitates motion is fitted at the training times, and no loss constrains it between them. The figure shows
+# Colour that imitates motion is fitted at the training times, and no loss on images reads it between them. The figure shows
 # one pixel over the whole clip. The simulator also provides its true colour between the frames.
 
 # %% tags=["hide-input"]
