@@ -1,5 +1,6 @@
 """Everything a person can hand over that cannot be used: one line, exit code 2, and no run folder."""
 
+import json
 import shutil
 
 import numpy as np
@@ -135,3 +136,11 @@ def test_render_refuses_times_and_existing_output(tmp_path, capsys):
     assert_refused(capsys, words, "no checkpoint yet", f"`endotsr train --out {tmp_path / 'run'} --resume`")
     (tmp_path / "out").mkdir()
     assert_refused(capsys, words, "out", "exists already")
+
+
+def test_a_run_whose_clip_was_moved_is_told_how_to_name_its_place(run_copy, tmp_path, capsys):
+    about = json.loads((run_copy / "run.json").read_text())
+    about["input"]["source"] = str(tmp_path / "gone")
+    (run_copy / "run.json").write_text(json.dumps(about))
+    for words in (["evaluate", str(run_copy)], ["train", "--out", str(run_copy), "--resume"]):
+        assert_refused(capsys, words, f"gone: the clip of the run {run_copy} is no longer there", "--sequence SEQUENCE")

@@ -37,6 +37,27 @@ def test_a_log_file_that_cannot_be_written_is_refused(tmp_path, capsys):
     assert_refused(capsys, ["render", "--log-file"], "--log-file: missing value FILE")
 
 
+def test_no_output_replaces_a_recording_a_clip_or_a_run(run_copy, tmp_path, capsys):
+    recording, clip = tmp_path / "a.mp4", tmp_path / "sequence.toml"
+    recording.write_bytes(b"\0\0\0 ftypisom")
+    clip.write_text("frames = 3")
+    for words in (["prepare", "--log-file", str(recording)], ["check", "clip", "--json", str(recording)]):
+        assert_refused(capsys, words, "a.mp4: would be replaced, but is no text file")
+    for words in (["prepare", "--log-file", str(clip)], ["check", "clip", "--html", str(clip)]):
+        assert_refused(capsys, words, "sequence.toml: would be replaced, but other commands read it")
+    checkpoint = run_copy / "checkpoint.npz"
+    before = recording.read_bytes(), clip.read_bytes(), checkpoint.read_bytes()
+    assert_refused(capsys, ["export", str(run_copy), "--out", str(checkpoint)], "checkpoint.npz: would be replaced")
+    assert_refused(capsys, ["evaluate", str(run_copy), "--json", str(run_copy / "run.json")], "run.json: would be")
+    assert (recording.read_bytes(), clip.read_bytes(), checkpoint.read_bytes()) == before
+    assert main(["evaluate", str(run_copy), "--no-view", "--json", str(tmp_path / "run.json")]) == 0, "of no run"
+
+
+def test_two_options_do_not_name_one_file(tmp_path, capsys):
+    words = ["check", "clip", "--json", f"{tmp_path}/a", "--html", f"{tmp_path}/../{tmp_path.name}/a"]
+    assert_refused(capsys, words, "--html ", "a: is also the file of --json")
+
+
 def test_other_words_keep_their_order():
     output, words = split_output(["train", "x", "-q", "--out", "y", "--log-file=z", "--seed", "-1"])
     assert words == ["train", "x", "--out", "y", "--seed", "-1"] and output.quiet and output.log_file.name == "z"

@@ -214,17 +214,16 @@ def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Confi
 def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence", Progress]:
     """Check the settings, and train a run from its last checkpoint to the end."""
     from endotsr.method.kernels.threads import use_threads
-    from endotsr.training.runs.sources import check_same_input, load_sequence, run_source
+    from endotsr.training.runs.sources import check_same_input, current_source, load_sequence
     from endotsr.training.runs.training import extend_run, resume_run
 
     assert options.out is not None
     folder = open_run(options.out)
     kept = folder.config()
-    remembered, simulator = run_source(folder)
+    source, simulator = current_source(folder, options.sequence)
     if options.workers is not None or options.scheduler is not None:
         raise InputError(f"{options.out}: --workers and --scheduler have no effect: it is no run of windows; omit them")
     asked = _accepted_settings(options.out, words, kept, len(folder.sequence_record().train_index))
-    source = options.sequence or remembered
     sequence = load_sequence(source, kept, simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.training.runs.files import refuse_no_text
 
 QUIET, LOG_FILE = ("-q", "--quiet"), "--log-file"
 
@@ -47,7 +48,7 @@ def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
 def redirected(output: OutputOptions) -> Iterator[None]:
     """Redirect standard output and standard error for the block; an existing log file is overwritten.
 
-    Raises: InputError if the log file cannot be written.
+    Raises: InputError if the log file cannot be written, or would replace another kind of file.
     """
     with contextlib.ExitStack() as stack:
         log = stack.enter_context(_opened(output.log_file)) if output.log_file else None
@@ -60,6 +61,7 @@ def redirected(output: OutputOptions) -> Iterator[None]:
 
 def _opened(file: Path) -> IO[str]:
     try:
+        refuse_no_text(file)
         return file.open("w", encoding="utf-8", newline="\n", buffering=1)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None

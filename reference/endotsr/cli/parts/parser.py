@@ -25,7 +25,7 @@ from endotsr.cli.parts.related_options import FACTS, RELATIONS
 from endotsr.cli.parts.relations import check_relations
 from endotsr.config import merged
 from endotsr.errors import InputError
-from endotsr.training.runs.files import refuse_unwritable
+from endotsr.training.runs.files import refuse_texts
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.sections import allowed_values, checked
 
@@ -60,7 +60,7 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
     found = _built(options, fields, given, default)
     if command not in FACTS:
         check_relations(command, RELATIONS.get(command, ()), found, _names(fields, given))
-    refuse_unwritable(*(getattr(found, field.path[0]) for field in fields if field.written))
+    refuse_texts({field.name: getattr(found, field.path[0]) for field in fields if field.written})
     return found
 
 

@@ -15,6 +15,19 @@ from endotsr.untrusted.json import Keys
 from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.writing import replace_text
 
+OF_A_RUN = frozenset(
+    (
+        "checkpoint.npz",
+        "checkpoint.previous.npz",
+        "config.toml",
+        "log.jsonl",
+        "metrics.json",
+        "run.json",
+        "sequence.json",
+    )
+)  # files that commands read again
+HEAD = 4096  # bytes; every format of pictures, video and arrays has a zero byte there, and no text has one
+
 
 def refuse_folder(path: Path) -> None:
     """Raises InputError if `path` is no folder and cannot be created; leaves nothing behind."""
@@ -59,6 +72,36 @@ def refuse_unwritable(*files: Path | None) -> None:
         # A file is written beside its place and renamed, so its folder has to be writable too.
         if not all(os.access(path, os.W_OK) for path in (above, file) if path.exists()):
             raise InputError(f"{file}: cannot be written: no permission")
+        _refuse_input(file)
+
+
+def refuse_no_text(file: Path) -> None:
+    """Raises InputError if a file that will contain text exists and is read by commands, or is of another kind."""
+    _refuse_input(file)
+    if file.is_file():
+        with file.open("rb") as stream:
+            if b"\0" in stream.read(HEAD):
+                raise InputError(f"{file}: would be replaced, but is no text file; allowed: another name")
+
+
+def refuse_texts(files: dict[str, Path | None]) -> None:
+    """Raises InputError if a file of text cannot be written, or two options (the keys) name one file."""
+    options: dict[Path, str] = {}
+    for option, file in files.items():
+        if file is not None:
+            refuse_unwritable(file)
+            refuse_no_text(file)
+            if options.setdefault(file.resolve(), option) != option:
+                raise InputError(
+                    f"{option} {file}: is also the file of {options[file.resolve()]}; allowed: another name"
+                )
+
+
+def _refuse_input(file: Path) -> None:
+    """Raises InputError if this file exists and makes its folder a clip or a run."""
+    of_a_run = all((file.parent / name).is_file() for name in ("run.json", "config.toml"))
+    if file.is_file() and (file.name == "sequence.toml" or (of_a_run and file.name in OF_A_RUN)):
+        raise InputError(f"{file}: would be replaced, but other commands read it; allowed: another name")
 
 
 def refuse_read_only(folder: Path) -> None:

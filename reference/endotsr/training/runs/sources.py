@@ -135,7 +135,7 @@ def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
         if remembered.get(name) != found[name]:
             raise InputError(
                 f"{source}: {name} differ from those the run {run.path} was trained on (sha256 in run.json); "
-                "a run continues only on its original input"
+                "allowed: the clip as it was then, or a new training"
             )
 
 
@@ -145,6 +145,20 @@ def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
     where = str(folder.path / "run.json")
     simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
     return str(record.get("source")), simulator
+
+
+def current_source(folder: RunFolder, source: str | None = None) -> tuple[str, SimulatorSettings]:
+    """`source`, or without it the recorded location of a run's sequence; and the simulator's settings.
+
+    Raises: InputError if run.json lacks the source, or if nothing is at the recorded location.
+    """
+    recorded, simulator = run_source(folder)
+    if not source and recorded not in (SIMULATED, IN_MEMORY) and not Path(recorded).exists():
+        raise InputError(
+            f"{recorded}: the clip of the run {folder.path} is no longer there; state its current place: "
+            "--sequence SEQUENCE, to continue a training `endotsr train SEQUENCE`"
+        )
+    return source or recorded, simulator
 
 
 def refuse_inside_data(out: Path, folder: RunFolder) -> None:
@@ -159,8 +173,7 @@ def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
 
     Raises: InputError if it cannot be read, or differs from the one the run was trained on.
     """
-    remembered, simulator = run_source(folder)
-    source = source or remembered
+    source, simulator = current_source(folder, source)
     sequence = load_sequence(source, folder.config(), simulator)
     check_same_input(folder, sequence, source)
     return sequence
