@@ -207,6 +207,9 @@ def test_the_first_line_of_a_resumed_training_tells_what_is_left():
     assert rest.start == 0 and rest.evaluation == whole.evaluation
     assert rest.iterations == pytest.approx(100 * 0.05, rel=0.2) and 0 < rest.targets < whole.targets
     assert ": 100 iterations " in waiting_line(plan, 0.05, True, at)
+    assert waiting_line(plan, 1e-12, True, at).endswith(" (at the speed of the last training)"), (
+        "no part takes a second"
+    )
     assert "iterations" not in waiting_line(plan, 0.05, True, at._replace(iteration=plan.config.training.iterations))
     assert "initial motion" in waiting_line(plan, 0.05, True, at._replace(iteration=0)), "no checkpoint was written"
     without = plan._replace(config=with_settings(plan.config, model={"spectral_motion": False}))
