@@ -28,7 +28,13 @@ import numpy as np
 
 import endotsr
 from endotsr.clips.flow import between as definition
-from endotsr.clips.flow.between import Flows, flows_between, frame_between, motion_between
+from endotsr.clips.flow.between import (
+    Flows,
+    flows_between,
+    frame_between,
+    gap_between,
+    motion_between,
+)
 from endotsr.clips.opencv import warp_cubic
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.scenes import named_scene
@@ -204,26 +210,33 @@ assert swing[both] < swing[alone] - 2
 #     return motion_field(flows.forward, flows.backward, fraction)
 # ```
 #
+# <!-- definition: endotsr.clips.flow.between.gap_between -->
+# ```python
+# def gap_between(sequence: Sequence, earlier: int, later: int, flows: Flows) -> Gap:
+#     """The gap between two frames; flows from `flows_between` for these frames."""
+#     colours = np.stack([tissue_colours(sequence, index) for index in (earlier, later)])
+#     return Gap(earlier, later, flows, colours.astype(np.float32) / np.float32(255))
+# ```
+#
 # <!-- definition: endotsr.clips.flow.between.frame_between -->
 # ```python
-# def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
+# def frame_between(sequence: Sequence, gap: Gap, fraction: float) -> Frame:
 #     """The picture, tissue mask and prior depth at a time between two frames, as a `Frame` (B14).
 #
-#     earlier, later  frame indices, any distance apart
-#     fraction        a in [0, 1]
-#     flows           from `flows_between` for these frames
-#     returns         Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior;
-#                     time and camera interpolated
+#     gap       from `gap_between`, once for all times between these frames
+#     fraction  a in [0, 1]
+#     returns   Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior; time and
+#               camera interpolated
 #
 #     Reverse: none; the result is held fixed during training.
 #     """
 #     from endotsr.clips.opencv import warp_cubic
 #
+#     earlier, later, flows, images = gap
 #     pair, a = [earlier, later], np.float32(fraction)
 #     weights = np.array([1.0 - fraction, fraction], np.float32)
 #     field = motion_between(flows, fraction)
 #     factors = np.array([-a, 1 - a], np.float32)  # (18.1)
-#     images = np.stack([tissue_colours(sequence, k) for k in pair]).astype(np.float32) / np.float32(255)
 #     tissue = sequence.masks[pair]
 #     seen, known, depth = moved_priors(tissue, sequence.depth[pair].astype(np.float32, copy=False), field, factors)
 #     both = seen[0] & seen[1] & tissue[0] & tissue[1]
@@ -303,8 +316,9 @@ still = simulate(with_effects(SimulatorSettings(width=96, height=76, frames=3), 
 calm = simulate(with_effects(SimulatorSettings(width=96, height=76, frames=3))).sequence
 rest = Flows(*np.zeros((2, 2, 76, 96), np.float32))
 of_frame = np.var((still.sequence.images[0] - calm.images[0].astype(float)) / 255)
+steady = gap_between(still.sequence, 0, 1, rest)
 for a in (0.25, 0.5):
-    made = frame_between(still.sequence, 0, 1, a, rest).image
+    made = frame_between(still.sequence, steady, a).image
     of_blend = np.var(made - calm.images[0] / 255)
     print(f"a = {a}: variance {of_blend / of_frame:.2f} times the variance of a frame")
     np.testing.assert_allclose(of_blend / of_frame, (1 - a) ** 2 + a**2, rtol=0.05)
@@ -357,7 +371,7 @@ hard = simulate(replace(scene, stereo=replace(scene.stereo, on=False))).sequence
 before, shown, after = 6, 8, 10
 flows = flows_between(hard, before, after)
 field = motion_between(flows, 0.5)
-target = frame_between(hard, before, after, 0.5, flows)
+target = frame_between(hard, gap_between(hard, before, after, flows), 0.5)
 pair = hard.images[[before, after]].astype(np.float32) / 255
 moved = np.stack([warp_cubic(p, s * field) for p, s in zip(pair, (-0.5, 0.5))]).clip(0, 1)
 of_moved, of_still = definition._difference(moved), definition._difference(pair)

@@ -14,7 +14,7 @@ from pages.full_size import page as full_size
 from pages.hard_cases.page import rounded_up
 from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
 
-from endotsr.clips.flow.between import flows_between, frame_between
+from endotsr.clips.flow.between import flows_between, frame_between, gap_between
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, PRESETS, with_iterations
@@ -59,7 +59,7 @@ def test_paper_reads_no_colour_that_a_mask_excludes(sequence):
 
 
 def test_the_targets_of_sharp_depend_on_excluded_pixels_through_the_flow(sequence):
-    found, again = (frame_between(one, 0, 2, 0.5, flows_between(one, 0, 2)) for one in sequence)
+    found, again = (frame_between(one, gap_between(one, 0, 2, flows_between(one, 0, 2)), 0.5) for one in sequence)
     both = found.mask & again.mask
     assert np.abs(found.image - again.image)[:, both].max() > 1 / 255
 

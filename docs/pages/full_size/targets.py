@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import endotsr
-from endotsr.clips.flow.between import Flows, flows_between, frame_between, motion_between
+from endotsr.clips.flow.between import Flows, Gap, flows_between, frame_between, gap_between, motion_between
 from endotsr.clips.flow.tissue_colours import tissue_colours
 from endotsr.clips.opencv import warp_cubic
 from endotsr.clips.sequences.sequence import Sequence
@@ -33,7 +33,7 @@ KINDS = {
 
 def of_sequence(sequence: Sequence) -> dict[str, float]:
     """PSNR in dB over the tissue with a target, for every kind; `covered` is the fraction of such tissue."""
-    flows: dict[tuple[int, int], tuple[Flows, Flows]] = {}
+    gaps: dict[tuple[int, int], tuple[Gap, Gap]] = {}
     whole, filled = sequence, replace(sequence, images=_filled(sequence))
     error, covered, tissue = dict.fromkeys(KINDS, 0.0), 0, 0
     for index in (int(i) for i in sequence.test_index):
@@ -41,11 +41,12 @@ def of_sequence(sequence: Sequence) -> dict[str, float]:
         if near.before == near.after:
             continue
         pair = (near.before, near.after)
-        if pair not in flows:
-            flows[pair] = flows_between(whole, *pair), flows_between(filled, *pair)
-        frame, of_tissue = (frame_between(sequence, *pair, near.fraction, each) for each in flows[pair])
+        if pair not in gaps:
+            first = gap_between(sequence, *pair, flows_between(whole, *pair))
+            gaps[pair] = first, first._replace(flows=flows_between(filled, *pair))
+        frame, of_tissue = (frame_between(sequence, gap, near.fraction) for gap in gaps[pair])
         pictures = {"still": two_neighbours(sequence, index), "target": frame.image, "tissue": of_tissue.image}
-        pictures["moved"] = _moved(sequence, pair, near.fraction, flows[pair][0])
+        pictures["moved"] = _moved(sequence, pair, near.fraction, gaps[pair][0].flows)
         mask = sequence.masks[index] & frame.mask & of_tissue.mask
         covered, tissue = covered + int(mask.sum()), tissue + int(sequence.masks[index].sum())
         for kind in KINDS:

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from endotsr.clips.flow.between import Flows, camera_between, flows_between, frame_between, motion_between
+from endotsr.clips.flow.between import (
+    Flows,
+    camera_between,
+    flows_between,
+    frame_between,
+    gap_between,
+    motion_between,
+)
 from endotsr.clips.flow.between_kernels import STEPS, WHOLE, moved_priors
 from endotsr.clips.opencv import warp_bilinear
 from endotsr.clips.sequences.sequence import Sequence
@@ -44,10 +51,15 @@ def constant(shift):
     return Flows(field, -field)
 
 
+def between(sequence, fraction, flows):
+    """The target between the first two frames."""
+    return frame_between(sequence, gap_between(sequence, 0, 1, flows), fraction)
+
+
 @pytest.mark.parametrize("fraction", [0.25, 0.5, 0.75])
 def test_a_translation_is_met_half_way(fraction):
     sequence = two_frames(4.0)
-    frame = frame_between(sequence, 0, 1, fraction, flows_between(sequence, 0, 1))
+    frame = between(sequence, fraction, flows_between(sequence, 0, 1))
     inner = np.s_[:, 12:-12, 12:-12]
     error = np.abs(frame.image - picture(4.0 * fraction) / 255)[inner]
     blend = (1 - fraction) * sequence.images[0] / 255 + fraction * sequence.images[1] / 255
@@ -62,7 +74,7 @@ def test_both_ends_are_the_frames_themselves():
     sequence = two_frames(4.0)
     flows = flows_between(sequence, 0, 1)
     for fraction, index in ((0.0, 0), (1.0, 1)):
-        frame = frame_between(sequence, 0, 1, fraction, flows)
+        frame = between(sequence, fraction, flows)
         np.testing.assert_allclose(frame.image, sequence.images[index] / 255, atol=1e-6)
 
 
@@ -70,7 +82,7 @@ def test_exchanged_frames_give_the_same_picture():
     sequence = two_frames(3.0)
     there = flows_between(sequence, 0, 1)
     back = Flows(there.backward, there.forward)
-    a, b = frame_between(sequence, 0, 1, 0.25, there), frame_between(sequence, 1, 0, 0.75, back)
+    a, b = between(sequence, 0.25, there), frame_between(sequence, gap_between(sequence, 1, 0, back), 0.75)
     np.testing.assert_allclose(a.image, b.image, atol=1e-5)
     assert np.array_equal(a.mask, b.mask)
     np.testing.assert_allclose(motion_between(there, 0.25), -motion_between(back, 0.75), atol=1e-5)
@@ -90,7 +102,7 @@ def test_the_field_is_that_of_the_point_at_the_moment():
 def test_a_flow_that_the_pictures_contradict_gives_way_to_the_still_blend():
     sequence = two_frames(0.0)
     sequence.images[1, :, :48] = picture(8.0)[:, :48].round().astype(np.uint8)  # the upper half moves
-    frame = frame_between(sequence, 0, 1, 0.5, constant(8.0))
+    frame = between(sequence, 0.5, constant(8.0))
     upper, lower = np.s_[:, 12:40, 16:-16], np.s_[:, 60:-12, 16:-16]
     assert np.abs(frame.image - picture(4.0) / 255)[upper].mean() < 0.01
     assert np.abs(frame.image - picture(0.0) / 255)[lower].mean() < 0.01
@@ -105,7 +117,7 @@ def test_pairs_that_differ_equally_count_equally():
     sequence.images[0], sequence.images[1] = np.where(stripe, 255, 0), np.where(stripe, 153, 102)
     still = 0.5 * np.where(stripe, 1.0 + 0.6, 0.0 + 0.4)
     moved = 0.5 * np.where(np.roll(stripe, 8), 1.0 + 0.4, 0.0 + 0.6)
-    frame = frame_between(sequence, 0, 1, 0.5, constant(16.0))
+    frame = between(sequence, 0.5, constant(16.0))
     one_step = 1 / 255**2
     of_still, of_moved = 0.4**2 + one_step, 0.6**2 + one_step  # at rest white meets 0.6, moved it meets 0.4
     expected = (of_moved * still + of_still * moved) / (of_moved + of_still)
@@ -118,7 +130,7 @@ def test_what_one_frame_excludes_is_made_of_the_other(covered):
     mask[covered, 30:50, 40:60] = False
     sequence = two_frames(4.0, mask)
     sequence.images[covered, :, 30:50, 40:60] = 255  # an instrument
-    frame = frame_between(sequence, 0, 1, 0.5, constant(4.0))
+    frame = between(sequence, 0.5, constant(4.0))
     assert frame.mask[:, 8:-8].all()
     left = 42 if covered == 0 else 38
     hidden = np.s_[:, 32:48, left + 2 : left + 18]
@@ -128,7 +140,7 @@ def test_what_one_frame_excludes_is_made_of_the_other(covered):
 def test_what_both_frames_exclude_is_no_target():
     mask = np.ones((2, HEIGHT, WIDTH), bool)
     mask[:, 30:50, 40:60] = False
-    frame = frame_between(two_frames(0.0, mask), 0, 1, 0.5, constant(0.0))
+    frame = between(two_frames(0.0, mask), 0.5, constant(0.0))
     assert np.array_equal(frame.mask, mask[0])
 
 
@@ -141,7 +153,7 @@ def test_no_colour_that_a_mask_excludes_enters_a_target():
     one, other = (two_frames(4.0, mask) for _ in range(2))
     other.images[...] = np.where(mask[:, None], other.images, rng.integers(0, 256, other.images.shape))
     for fraction in (0.25, 0.5):
-        a, b = (frame_between(sequence, 0, 1, fraction, flow) for sequence in (one, other))
+        a, b = (between(sequence, fraction, flow) for sequence in (one, other))
         assert a.mask.sum() > 0.8 * a.mask.size
         for found, again in zip(a[:3], b[:3], strict=True):
             np.testing.assert_array_equal(found, again)
@@ -151,7 +163,7 @@ def test_depth_is_that_of_the_frame_that_has_one():
     sequence = two_frames(4.0)
     sequence.depth[0, :, :20], sequence.depth[1, :, 20:] = 0, 6.0
     sequence.depth[1, 10:20, 60:80], sequence.depth[0, 10:20, 60:80] = 0, 0
-    frame = frame_between(sequence, 0, 1, 0.5, constant(4.0))
+    frame = between(sequence, 0.5, constant(4.0))
     assert (frame.depth[:, 4:17] == 5).all() and np.allclose(frame.depth[30:, 24:-8], 5.5)
     assert not frame.depth[11:19, 64:76].any()
 
@@ -164,8 +176,8 @@ def test_held_out_pictures_are_not_read():
         cameras=[CAMERA] * 3, names=list("axb"), unit="", static_camera=True,
         train_index=np.array([0, 2]), test_index=np.array([1]),
     )  # fmt: skip
-    a = frame_between(sequence, 0, 1, 0.5, flows_between(sequence, 0, 1))
-    b = frame_between(three, 0, 2, 0.5, flows_between(three, 0, 2))
+    a = between(sequence, 0.5, flows_between(sequence, 0, 1))
+    b = frame_between(three, gap_between(three, 0, 2, flows_between(three, 0, 2)), 0.5)
     assert all(np.array_equal(x, y) for x, y in zip(a[:3], b[:3]))
 
 

@@ -9,7 +9,8 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.clips.flow.between import flows_between, frame_between
+from endotsr.clips.flow import between
+from endotsr.clips.flow.between import flows_between, frame_between, gap_between
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import DEMO, TrainingConfig
@@ -48,7 +49,7 @@ def test_every_time_of_every_gap_is_drawn_alike(sequence):
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_the_targets_of_a_bridged_time_are_those_of_the_equation(sequence, precision):
     config = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, precision=precision))
-    made = frame_between(sequence, 0, 2, 0.75, flows_between(sequence, 0, 2))
+    made = frame_between(sequence, gap_between(sequence, 0, 2, flows_between(sequence, 0, 2)), 0.75)
     stored = np.divide(np.rint(made.image * STEPS), STEPS, dtype=precision)
     wanted = frame_targets(made._replace(image=stored, depth=made.depth.astype(precision)), config)
     found, camera = BridgedTargets(sequence, config).observed(BridgedTime(0, 2, 0.75))
@@ -79,14 +80,15 @@ def flat(value):
     return [leaf for part in value for leaf in flat(part)] if isinstance(value, tuple) else [value]
 
 
-def test_the_flows_of_a_gap_are_computed_once(sequence, monkeypatch):
-    asked = []
-    real = module.flows_between
+def test_the_flows_and_the_pictures_of_a_gap_are_computed_once(sequence, monkeypatch):
+    asked, filled = [], []
+    real, fill = module.flows_between, between.tissue_colours
     monkeypatch.setattr(module, "flows_between", lambda *rest: asked.append(rest[1:]) or real(*rest))
+    monkeypatch.setattr(between, "tissue_colours", lambda *rest: filled.append(rest[1]) or fill(*rest))
     kept = BridgedTargets(sequence, DEMO)
     for fraction in (0.25, 0.5, 0.75, 0.5):
         kept.observed(BridgedTime(0, 2, fraction))
-    assert asked == [(0, 2)]
+    assert asked == [(0, 2)] and filled == [0, 2]
 
 
 def test_a_training_compares_with_bridged_times(sequence):

@@ -11,7 +11,8 @@ the flow is wrong, the warped pictures disagree. A pixel is tissue if at least o
 position, and is blended from those frames only. No colour that a mask excludes enters a target: the warps and the
 differences read `tissue_colours`. The flow alone is computed from whole pictures.
 
-In: a sequence and the indices of two training frames. Out: a `Frame`. No held-out picture is read.
+In: a sequence and the indices of two training frames. Out: a `Frame`. No held-out picture is read. A `Gap` has what all
+times between the two frames share.
 """
 
 from typing import NamedTuple
@@ -36,12 +37,27 @@ class Flows(NamedTuple):
     backward: FloatArray  # (2, H, W) px: later -> earlier
 
 
+class Gap(NamedTuple):
+    """Two frames, and what all times between them share."""
+
+    earlier: int  # frame indices, any distance apart
+    later: int
+    flows: Flows
+    images: FloatArray  # (2, 3, H, W) in [0, 1]: `tissue_colours` of both frames, 24 bytes per pixel
+
+
 def flows_between(sequence: Sequence, earlier: int, later: int) -> Flows:
     """Dense flow between two frames of a sequence, in both directions."""
     from endotsr.clips.opencv import dense_flow
 
     a, b = sequence.images[earlier], sequence.images[later]
     return Flows(dense_flow(a, b), dense_flow(b, a))
+
+
+def gap_between(sequence: Sequence, earlier: int, later: int, flows: Flows) -> Gap:
+    """The gap between two frames; flows from `flows_between` for these frames."""
+    colours = np.stack([tissue_colours(sequence, index) for index in (earlier, later)])
+    return Gap(earlier, later, flows, colours.astype(np.float32) / np.float32(255))
 
 
 def motion_between(flows: Flows, fraction: float) -> FloatArray:
@@ -56,24 +72,23 @@ def motion_between(flows: Flows, fraction: float) -> FloatArray:
     return motion_field(flows.forward, flows.backward, fraction)
 
 
-def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
+def frame_between(sequence: Sequence, gap: Gap, fraction: float) -> Frame:
     """The picture, tissue mask and prior depth at a time between two frames, as a `Frame` (B14).
 
-    earlier, later  frame indices, any distance apart
-    fraction        a in [0, 1]
-    flows           from `flows_between` for these frames
-    returns         Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior;
-                    time and camera interpolated
+    gap       from `gap_between`, once for all times between these frames
+    fraction  a in [0, 1]
+    returns   Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior; time and
+              camera interpolated
 
     Reverse: none; the result is held fixed during training.
     """
     from endotsr.clips.opencv import warp_cubic
 
+    earlier, later, flows, images = gap
     pair, a = [earlier, later], np.float32(fraction)
     weights = np.array([1.0 - fraction, fraction], np.float32)
     field = motion_between(flows, fraction)
     factors = np.array([-a, 1 - a], np.float32)  # (18.1)
-    images = np.stack([tissue_colours(sequence, k) for k in pair]).astype(np.float32) / np.float32(255)
     tissue = sequence.masks[pair]
     seen, known, depth = moved_priors(tissue, sequence.depth[pair].astype(np.float32, copy=False), field, factors)
     both = seen[0] & seen[1] & tissue[0] & tissue[1]

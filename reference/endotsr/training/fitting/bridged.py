@@ -1,8 +1,8 @@
 """Targets of the renders at times between training frames (B14), computed once and cached.
 
 In: a sequence and a time between two of its training frames. Out: the targets of its losses and its camera. The first
-visit of a gap computes the targets of all its times, which need the same two flows. `TargetsAhead` computes them in a
-second thread before they are needed. This module computes no loss.
+visit of a gap computes the targets of all its times, which share its flows and pictures. `TargetsAhead` computes them
+in a second thread before they are needed. This module computes no loss.
 """
 
 import itertools
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from endotsr.clips.flow.between import flows_between, frame_between
+from endotsr.clips.flow.between import flows_between, frame_between, gap_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config
 from endotsr.method.kernels.arrays import Array
@@ -89,9 +89,10 @@ class BridgedTargets:
     def _made(self, earlier: int, later: int) -> dict[BridgedTime, Stored]:
         """The targets of all times of a gap."""
         config, precision, found = self.config, self.config.training.precision, {}
-        flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)
+        gap = gap_between(self.sequence, earlier, later, flows_between(self.sequence, earlier, later))
+        count = 2 * (later - earlier)
         for place in range(1, count):
-            made = frame_between(self.sequence, earlier, later, place / count, flows)
+            made = frame_between(self.sequence, gap, place / count)
             depth = optional_depth_target(made.depth.astype(precision), made.mask, config)
             found[BridgedTime(earlier, later, place / count)] = Stored(
                 np.rint(made.image * STEPS).astype(np.uint16),
