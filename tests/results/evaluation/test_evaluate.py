@@ -68,8 +68,20 @@ def test_a_frame_without_a_value_is_null_and_left_out_of_the_mean(odd, sequence)
     else:
         renders[9][1, 4, 8] = np.nan
     result = strict(evaluate.evaluate_frames(sequence, [1, 9], renders.__getitem__))
-    assert result["per_frame"][1]["psnr_tissue"] is None and result["not_finite"] > 0
+    assert result["per_frame"][1]["psnr_tissue"] is None and result["excluded"]["psnr_tissue"] == 1
+    assert (result["not_finite"] > 0) == (odd == "a render that is not finite")
     assert result["mean"]["psnr_tissue"] == pytest.approx(20.0, abs=1e-4)
+
+
+def test_a_frame_without_tissue_has_no_lpips(sequence, monkeypatch):
+    """Two black pictures have the distance 0."""
+    monkeypatch.setattr(evaluate, "lpips_obstacle", lambda *of: None)
+    monkeypatch.setattr(evaluate, "feature_maps", lambda image, *of: [image])
+    monkeypatch.setattr(evaluate, "map_distances", lambda a, b, weights: [np.abs(a[0] - b[0]).mean()])
+    sequence.masks[9] = False
+    found = evaluate.evaluate_frames(sequence, [1, 9], lambda i: unit_image(sequence, i) + np.float32(0.1), object())
+    first, second = (row["lpips"] for row in found["per_frame"])
+    assert second is None and found["mean"]["lpips"] == first > 0
 
 
 def test_render_of_a_wrong_size_is_refused(sequence):

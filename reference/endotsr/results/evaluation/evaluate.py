@@ -5,6 +5,7 @@ of another program.
 
 A metric without a finite value (LPIPS without weights, infinite PSNR of two equal pictures, tissue PSNR of an empty
 mask, a render that is not finite) is None, never NaN, because the result is JSON. Means exclude and count such values.
+A frame without tissue has no metrics.
 """
 
 import math
@@ -78,13 +79,14 @@ def evaluate_methods(
             if seen is not None:
                 found |= seen_metrics(render, truth, mask, seen)
             values = {key: _finite(value) for key, value in found.items()}
-            bad[name] += sum(values[key] is None and found[key] is not None for key in found)
+            if mask.any():
+                bad[name] += sum(values[key] is None and found[key] is not None for key in found)
             rows[name].append(cast(FrameMetrics, about | values))
     return {name: measured_rows(rows[name], bad[name]) for name in methods}
 
 
 def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
-    """Frames with the means of their metrics; `not_finite` is the number of computed values that are not finite."""
+    """Frames with the means of their metrics; `not_finite` counts the values on tissue that are not finite."""
     keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]
     summary = mean_metrics([{key: row.get(key) for key in keys} for row in rows])
     excluded = {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])}
@@ -189,12 +191,12 @@ class _Distance:
     """LPIPS from one true frame, with excluded pixels 0; the feature maps of the frame are computed once."""
 
     def __init__(self, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> None:
-        usable = weights is not None and lpips_obstacle(weights, *mask.shape) is None
+        usable = weights is not None and lpips_obstacle(weights, *mask.shape) is None and bool(mask.any())
         self._mask, self._weights = mask, weights if usable else None
         self._truth = {key: self._maps(truth, how) for key, how in LPIPS_KEYS.items()} if usable else {}
 
     def of(self, render: FloatArray) -> Means:
-        """Both LPIPS values of a render, clipped; None without weights or for a small picture."""
+        """Both LPIPS values of a render, clipped; None without weights or tissue, or for a small picture."""
         if self._weights is None:
             return dict.fromkeys(LPIPS_KEYS)
         shown = np.clip(render, 0, 1)

@@ -47,7 +47,7 @@ class FramesMeasured(TypedDict):
     mean: Means  # over the frames with a value
     per_frame: list[FrameMetrics]
     excluded: dict[str, int]  # metric -> number of frames without a value, if any
-    not_finite: int  # number of computed values that are not finite
+    not_finite: int  # number of values that are not finite, of frames with tissue
 
 
 class LabelledFrames(FramesMeasured):
@@ -127,6 +127,7 @@ class Measured(TypedDict, total=False):
     rows: list[MeasureRow]
     unit: str  # of lengths
     pixels: int  # of `flicker`: static pixels
+    left_out: list[str]  # of `flicker`: names of the frames without tissue, if any
     baseline: float  # of `right_view`: distance of both cameras
     spread: float  # of `right_view`: relative spread of the baseline
 
