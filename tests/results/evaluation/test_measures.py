@@ -110,6 +110,28 @@ def test_a_steady_change_of_light_is_no_flicker():
     assert found["this model"]["all_frames"] < 1e-4
 
 
+def test_frames_without_tissue_are_left_out_of_the_flicker():
+    """The scope leaves the body in frame 4: neither its picture nor its mask counts."""
+    sequence = sequence_of(textured(3.0))
+    sequence.images[4], sequence.masks[4] = 0, False
+    asked, still = [], textured(0.0)[0] * LEVEL
+    render = lambda i, camera: asked.append(i) or render_of(still + LEVEL * (i == 1))
+    found = flicker(sequence, render)
+    rows = rows_of(found)
+    assert found["left_out"] == ["f4"] and asked == [0, 1, 2, 3, 5, 6, 7, 8] and found["pixels"] > 4000
+    assert rows["the recorded frames"]["all_frames"] == pytest.approx(3.0, rel=0.05)
+    assert rows["this model"]["all_frames"] == pytest.approx(np.sqrt((4 + 1) / 6 / 4), rel=1e-4)  # at 1, 2, 6 and 7
+    assert rows["this model"]["held_out"] == pytest.approx(np.sqrt(4 / 6), rel=1e-4)  # frame 5 follows frame 4
+    assert measure_lines({"flicker": found})[-1] == "flicker: without tissue and left out: f4"
+
+
+def test_without_three_successive_frames_of_tissue_flicker_has_a_reason():
+    sequence = sequence_of(textured(3.0))
+    sequence.masks[2::3] = False
+    found = flicker(sequence, lambda i, camera: pytest.fail("rendered"))
+    assert found == {"reason": "no three successive frames show tissue"}
+
+
 def test_flicker_of_a_long_clip_holds_few_frames_at_a_time(monkeypatch):
     """All static pixels of all frames at once were 4 GB for 156 frames of 640x512."""
     sequence, static = sequence_of(textured(3.0, n=200)), np.ones((64, 64), bool)

@@ -12,8 +12,9 @@ Flicker at a pixel is the second difference of its colour over three successive 
     d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6).
 
 If the noise is independent from frame to frame, d has the standard deviation of the noise. A linear change of the light
-cancels. A static pixel is tissue in every frame, with small optical flow between successive frames. The recorded
-frames flicker at least by the noise of the camera; a value above theirs means that the model itself flickers.
+cancels. A static pixel is tissue in every frame, with small optical flow between successive frames. Frames without
+tissue are left out. The recorded frames flicker at least by the noise of the camera; a value above theirs means that
+the model itself flickers.
 """
 
 from collections.abc import Callable, Iterable
@@ -80,19 +81,24 @@ def measure_lines(found: dict[str, Measured]) -> list[str]:
         for row in entry.get("rows", ()):
             values = ", ".join(f"{key} {value:.4g}" for key, value in row.items() if isinstance(value, float))
             lines.append(f"{name}: {row['label']}: {values}")
+        if left_out := entry.get("left_out"):
+            lines.append(f"{name}: without tissue and left out: {', '.join(left_out)}")
     return lines
 
 
 def flicker(sequence: Sequence, render: RenderView) -> Measured:
     """Root mean square of d over the static pixels and all inner frames, or the held-out ones; grey levels.
 
-    render   frame number and camera -> render; called once per frame
+    render   frame number and camera -> render; called once per frame that shows tissue
     returns  {"pixels", "rows": [{"label", "all_frames", "held_out"}]} for the model and the recorded frames, or
              {"reason"}. `held_out` uses d(t) at held-out t only: it is large if the model jumps between training and
-             held-out times
+             held-out times. Frames without tissue are named by `left_out`, and no d(t) reads them
     """
     if not sequence.static_camera:
         return {"reason": "the camera moves: pixels do not show the same tissue in all frames"}
+    shown = sequence.masks.any(axis=(1, 2))
+    if not (shown[:-2] & shown[1:-1] & shown[2:]).any():
+        return {"reason": "no three successive frames show tissue"}
     static = static_pixels(sequence)
     if np.count_nonzero(static) < LEAST_PIXELS:
         return {"reason": f"{np.count_nonzero(static)} static pixels; needed: {LEAST_PIXELS}"}
@@ -102,26 +108,31 @@ def flicker(sequence: Sequence, render: RenderView) -> Measured:
 
     frames = {"this model": rendered, "the recorded frames": lambda index: unit_image(sequence, index)}
     rows = [_row(label, sequence, static, frame) for label, frame in frames.items()]
-    return {"pixels": int(np.count_nonzero(static)), "rows": rows}
+    found: Measured = {"pixels": int(np.count_nonzero(static)), "rows": rows}
+    return found if shown.all() else {**found, "left_out": [sequence.names[i] for i in np.flatnonzero(~shown)]}
 
 
 def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int], FloatArray]) -> MeasureRow:
-    values = (frame(i)[:, static].astype(np.float64) for i in range(sequence.count))
-    last, now, found = next(values), next(values), []
-    for after in values:  # three frames at a time: a long clip does not fit in memory
-        found.append(np.square(last - 2 * now + after).mean() / 6)
-        last, now = now, after
-    squares = np.array(found)  # of frames 1 .. n - 2
-    held_out = [int(i) - 1 for i in sequence.test_index if 0 < i < sequence.count - 1]
-    inside = float(np.sqrt(squares[held_out].mean()) * LEVELS) if held_out else None
-    return {"label": label, "all_frames": float(np.sqrt(squares.mean()) * LEVELS), "held_out": inside}
+    squares: dict[int, float] = {}  # of the frames between two others that show tissue
+    last: list[FloatArray] = []  # at most three frames at a time: a long clip does not fit in memory
+    for i in range(sequence.count):
+        if not sequence.masks[i].any():
+            last = []
+            continue
+        last = [*last[-2:], frame(i)[:, static].astype(np.float64)]
+        if len(last) == 3:
+            squares[i - 1] = float(np.square(last[0] - 2 * last[1] + last[2]).mean() / 6)
+    held_out = [squares[int(i)] for i in sequence.test_index if int(i) in squares]
+    inside = float(np.sqrt(np.mean(held_out)) * LEVELS) if held_out else None
+    return {"label": label, "all_frames": float(np.sqrt(np.mean(list(squares.values()))) * LEVELS), "held_out": inside}
 
 
 def static_pixels(sequence: Sequence) -> BoolArray:
-    """(H, W) bool: tissue in every frame, with small optical flow between successive recorded frames."""
+    """(H, W) bool: tissue in every frame that shows any, with small optical flow between successive ones of them."""
     from endotsr.clips.opencv import dense_flow
 
-    flows = [dense_flow(sequence.images[i], sequence.images[i + 1]) for i in range(sequence.count - 1)]
-    lengths = np.stack([np.hypot(*flow) for flow in flows])
+    shown = sequence.masks.any(axis=(1, 2))
+    pairs = np.flatnonzero(shown[:-1] & shown[1:])
+    lengths = np.stack([np.hypot(*dense_flow(sequence.images[i], sequence.images[i + 1])) for i in pairs])
     middle, high = np.quantile(lengths, (0.5, 0.9), axis=0)
-    return sequence.masks.all(axis=0) & (middle <= STATIC) & (high <= STATIC_HIGH)
+    return sequence.masks[shown].all(axis=0) & (middle <= STATIC) & (high <= STATIC_HIGH)
