@@ -1,13 +1,18 @@
 """Views of other moments or other rows are named by `check` and `depth`, and views of a rectified pair are not."""
 
+from collections import Counter
+
 import msgspec
 import numpy as np
 import pytest
 from stereo_views import FRAMES, pairs, stereo_clip
 
+import endotsr
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png
+from endotsr.clips.sequences import folder_reader
+from endotsr.clips.sequences.checks import check
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.stereo import frozen_finding, late_finding, pair_findings, row_finding, row_matches
 from endotsr.clips.sequences.layouts import describe_for_training
@@ -93,6 +98,27 @@ def test_a_right_view_that_cannot_be_read_is_left_to_the_command_that_needs_it(t
     clip = stereo_clip(tmp_path / "clip", pairs(rows=2.0))
     (clip / "images_right/000007.png").write_bytes(b"")
     assert pair_findings(describe_prepared(clip)) == []
+
+
+@pytest.fixture
+def with_depth(tmp_path):
+    """A simulated stereo clip with depth."""
+    write_sequence(tmp_path, msgspec.structs.replace(named_scene("still"), width=192, height=160, frames=6))
+    return tmp_path
+
+
+def test_check_reads_every_picture_of_a_pair_once(with_depth, monkeypatch):
+    read, real = Counter(), check.read_picture
+    for module in (check, folder_reader):
+        monkeypatch.setattr(module, "read_picture", lambda file: read.update([file.parent.name]) or real(file))
+    check_sequence(with_depth, PAPER)
+    assert read["images"] == read["images_right"] == 6
+
+
+def test_a_damaged_right_picture_is_no_refusal_as_training_does_not_read_it(with_depth):
+    (with_depth / "images_right/000000.png").write_bytes(b"")
+    endotsr.load_sequence(with_depth)
+    assert not check_sequence(with_depth, PAPER).refused
 
 
 @pytest.mark.parametrize("name", ["still", "pulling", "moving-camera"])

@@ -14,7 +14,11 @@ def view_frame(clip: Clip, k: int) -> ViewFrame:
 
     Raises:  InputError for a file that cannot be read, or of another size.
     """
-    picture = next(clip.pictures([k])).left
+    return with_planes(clip, k, next(clip.pictures([k])).left)
+
+
+def with_planes(clip: Clip, k: int, picture: Picture) -> ViewFrame:
+    """As `view_frame`, with the picture given."""
     size = picture.shape[:2]
     tissue, depth = clip.masks(k) if clip.masks else None, clip.depth(k) if clip.depth else None
     for what, plane in (("mask", tissue), ("depth", depth)):

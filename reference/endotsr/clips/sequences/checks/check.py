@@ -5,6 +5,7 @@ time. An unreadable file becomes a finding, and the pass continues.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -25,7 +26,7 @@ from endotsr.clips.sequences.checks.depth import (
     light_finding,
     usual_depth,
 )
-from endotsr.clips.sequences.checks.depth_pair import depth_pair_findings
+from endotsr.clips.sequences.checks.depth_pair import DepthPairs
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps, scale_finding
 from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
 from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
@@ -42,9 +43,9 @@ from endotsr.clips.sequences.checks.frames import (
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
-from endotsr.clips.sequences.checks.stereo import pair_findings
+from endotsr.clips.sequences.checks.stereo import PairViews
 from endotsr.clips.sequences.checks.still_parts import StillParts
-from endotsr.clips.sequences.clip import Clip, colour_picture, grey_plane
+from endotsr.clips.sequences.clip import Clip, Picture, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import depth_plane, read_plane
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.frame_store import FrameStore
@@ -54,6 +55,7 @@ from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.pairing import matching_files
 from endotsr.clips.sequences.splits import even_frames, parse_frame_range, split_frames
+from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.config import Config, lengthened, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.method.kernels.machine import memory_of_machine
@@ -82,7 +84,8 @@ class Checked(NamedTuple):
 class _Pass:
     """Findings, and facts kept from the frames."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, clip: Clip) -> None:
+        count = len(clip.images)
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
         self.masks = MaskSteps()
@@ -90,6 +93,7 @@ class _Pass:
         self.still = StillParts(count)
         self.depth: list[DepthFacts] = []
         self.steps = DepthSteps(count)
+        self.views, self.against = PairViews(count), DepthPairs(clip)
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
         self.light: list[float] = []  # rank correlation of brightness with depth, for the sampled frames
@@ -123,7 +127,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     if not Path(path).exists():
         raise InputError(f"{path}: sequence folder not found")
     clip = describe_for_training(path, config.sequence)
-    run = _Pass(len(clip.images))
+    run = _Pass(clip)
     run.findings += clip.faults + _stated(clip)
     if not clip.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
@@ -142,7 +146,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
         run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
-    run.findings += pair_findings(clip) + depth_pair_findings(clip)
+    run.findings += run.views.findings(clip.right) + run.against.findings()
     run.findings += baseline_findings(clip.baseline if clip.right else None, clip.arbitrary, str(clip.stated_in))
     if run.samples:
         _check_masks(clip, run, config)
@@ -223,8 +227,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
                 run.light.append(light_correlation(picture, found, tissue))
                 run.shading += filter(None, [shading_fit(picture, found, tissue)])
             _sample(run, file, picture, tissue, found)
-            if i == 0 and clip.right and found is not None:
-                _against_stereo(clip, run, picture, found, depth[i])
+        _pair(clip, run, i, picture, tissue, found)
     return size
 
 
@@ -285,14 +288,22 @@ def _sample(run: _Pass, file: Path, picture: NDArray, tissue: NDArray | None, de
         run.samples.append((file.name, small, tissue[::STEP, ::STEP], sparse))
 
 
-def _against_stereo(clip: Clip, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:
-    """The depth of the first frame against the disparity of its stereo pair."""
-    right = run.tried(lambda: read_picture(clip.right[0]), "picture", clip.right[0], 0)
-    if right is None or right.shape != picture.shape:
+def _pair(clip: Clip, run: _Pass, i: int, picture: Picture, tissue: NDArray | None, depth: NDArray | None) -> None:
+    """The right view of a frame, against the left one and against the depth. Training does not read it."""
+    if len(clip.right) != len(clip.images):
+        return  # reported by the check of the pairing
+    try:
+        right = colour_picture(read_picture(clip.right[i]), clip.right[i])
+    except InputError:
+        return  # `depth` names the file
+    run.views.add(i, picture, right)
+    if depth is None or clip.depth is None or right.shape != picture.shape:
         return
-    disparity = agreed_disparity(picture, right)
-    if disparity is not None:
-        run.findings += stereo_finding(depth, disparity, str(file), 0)
+    if i == 0 and (disparity := agreed_disparity(picture, right)) is not None:
+        run.findings += stereo_finding(depth, disparity, str(clip.depth.files[0]), 0)
+    if tissue is not None or not clip.masks:
+        with suppress(InputError):  # the check of the cameras reports it
+            run.against.add(i, frame_of(picture, tissue, depth), right)
 
 
 def _check_masks(clip: Clip, run: _Pass, config: Config) -> None:

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.opencv import area_resize
-from endotsr.clips.poses.views import reduced_camera, side_of
+from endotsr.clips.poses.views import ViewFrame, reduced_camera, side_of
 from endotsr.clips.sequences.checks.flips import NARROW, agreed_disparity
 from endotsr.clips.sequences.checks.kinds import Finding, finding
-from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.splits import even_frames
-from endotsr.clips.sequences.view_frames import view_frame
+from endotsr.clips.sequences.view_frames import with_planes
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -51,28 +51,53 @@ class DepthAgainstPair(NamedTuple):
     spread: float  # of the depth, 5th to 95th percentile
 
 
+class DepthPairs:
+    """The compared pixels of the sampled frames of a clip; no frame without right views and depth of known scale."""
+
+    def __init__(self, clip: Clip) -> None:
+        compared = clip.right and clip.depth is not None and not clip.depth.assumed
+        self.clip, self.sampled = clip, set(even_frames(clip.count, SAMPLED)) if compared else set()
+        self.found: list[Compared | None] = []
+
+    def add(self, i: int, frame: ViewFrame, right: Picture) -> None:
+        """Frame i, if it is sampled. Raises InputError without a camera."""
+        if i in self.sampled:
+            self.found.append(_compared(self.clip, i, frame, right))
+
+    def findings(self) -> list[Finding]:
+        """A warning where the depth contradicts the pairs; none if a sampled frame was left out."""
+        if self.clip.depth is None or not self.sampled or len(self.found) < len(self.sampled):
+            return []
+        fit = pair_fit([one for one in self.found if one is not None])
+        files = self.clip.depth.files
+        where = str(files[0].parent) if files else str(self.clip.where)
+        return [] if fit is None else fit_findings(fit, bool(self.clip.baseline), self.clip.unit_in_words, where)
+
+
 def depth_pair_findings(clip: Clip) -> list[Finding]:
     """A warning where the depth of a clip contradicts its pairs; none without both, or with an assumed scale."""
-    if not clip.right or clip.depth is None or clip.depth.assumed:
-        return []
+    pairs = DepthPairs(clip)
     try:
-        found = [_compared(clip, i) for i in sorted(even_frames(clip.count, SAMPLED))]
+        for i in sorted(pairs.sampled):
+            left, right = next(clip.pictures([i]))
+            if right is not None:
+                pairs.add(i, with_planes(clip, i, left), right)
     except InputError:
         return []  # another finding names the file
-    fit = pair_fit([one for one in found if one is not None])
-    where = str(clip.depth.files[0].parent) if clip.depth.files else str(clip.where)
-    return [] if fit is None else fit_findings(fit, bool(clip.baseline), clip.unit_in_words, where)
+    return pairs.findings()
 
 
-def _compared(clip: Clip, i: int) -> Compared | None:
-    """The pixels of one frame; None for a narrow picture, or views of unlike size."""
-    pair = next(clip.pictures([i]))
-    if pair.right is None or pair.right.shape != pair.left.shape or pair.left.shape[1] <= NARROW:
+def _compared(clip: Clip, i: int, frame: ViewFrame, right: Picture) -> Compared | None:
+    """The pixels of one frame; None for a narrow picture, or views or a camera of another size."""
+    whole = frame.image.shape[1:]
+    if right.shape[:2] != whole or whole[1] <= NARROW:
         return None
-    side = side_of(pair.left.shape[1], WIDEST)
-    frame, camera = view_frame(clip, i).reduced(side), reduced_camera(clip.cameras(range(i, i + 1))[0], side)
+    side, camera = side_of(whole[1], WIDEST), clip.cameras(range(i, i + 1))[0]
+    if (camera.height, camera.width) != whole:
+        return None
+    frame, camera = frame.reduced(side), reduced_camera(camera, side)
     height, width = frame.tissue.shape
-    right = area_resize(np.ascontiguousarray(pair.right[: height * side, : width * side]), width, height)
+    right = area_resize(np.ascontiguousarray(right[: height * side, : width * side]), width, height)
     disparity = agreed_disparity(np.ascontiguousarray(frame.image.transpose(1, 2, 0)), right)
     if disparity is None:
         return None

@@ -5,6 +5,7 @@ Features that both views share show the rows: in a rectified pair, a point lies 
 that is late shows a point where it was some frames before, and its rows differ by the motion in between.
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -42,29 +43,46 @@ class RowMatches(NamedTuple):
     motion: FloatArray  # (M,) downwards since the frame before, pixels; NaN where it is unknown
 
 
+class PairViews:
+    """What is kept of the pairs of a clip of `count` frames, which are added in order."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.sampled = {max(1, i) for i in even_frames(count, SAMPLED)}
+        self.small: tuple[list[NDArray], list[NDArray]] = ([], [])
+        self.rows: list[RowMatches] = []
+        self.before: Picture | None = None
+
+    def add(self, i: int, left: Picture, right: Picture | None) -> None:
+        """Frame i; a frame without a right view of the size of the left one is left out."""
+        if right is None or right.shape != left.shape:
+            return
+        for kept, picture in zip(self.small, (left, right)):
+            kept.append(small_picture(picture))
+        if i in self.sampled and self.before is not None:
+            self.rows.append(row_matches(left, right, self.before))
+        self.before = left
+
+    def findings(self, files: list[Path]) -> list[Finding]:
+        """Findings on the pairs with these right pictures; none if a frame was left out."""
+        if len(self.small[0]) < max(2, self.count):
+            return []
+        where, names = str(files[0].parent), [file.name for file in files]
+        frozen = frozen_finding(steps_between(self.small[0]), steps_between(self.small[1]), names, where)
+        return frozen or late_finding(self.rows, where) + row_finding(self.rows, where)
+
+
 def pair_findings(clip: Clip) -> list[Finding]:
     """Findings on the pairs of a clip; none without right pictures, or if one of them cannot be read."""
-    if not clip.right or clip.count < 2:
+    if not clip.right:
         return []
-    sampled = {max(1, i) for i in even_frames(clip.count, SAMPLED)}
-    small: tuple[list[NDArray], list[NDArray]] = ([], [])
-    rows: list[RowMatches] = []
-    before: Picture | None = None
+    views = PairViews(clip.count)
     try:
         for i, (left, right) in enumerate(clip.pictures(list(range(clip.count)))):
-            if right is None or right.shape != left.shape:
-                return []
-            for kept, picture in zip(small, (left, right)):
-                kept.append(small_picture(picture))
-            if i in sampled and before is not None:
-                rows.append(row_matches(left, right, before))
-            before = left
+            views.add(i, left, right)
     except InputError:
         return []  # `depth` names the file; training reads no right picture
-    where = str(clip.right[0].parent)
-    names = [file.name for file in clip.right]
-    frozen = frozen_finding(steps_between(small[0]), steps_between(small[1]), names, where)
-    return frozen or late_finding(rows, where) + row_finding(rows, where)
+    return views.findings(clip.right)
 
 
 def frozen_finding(left: FloatArray, right: FloatArray, names: list[str], where: str) -> list[Finding]:
