@@ -96,7 +96,7 @@ def flicker(sequence: Sequence, render: RenderView) -> Measured:
     """
     if not sequence.static_camera:
         return {"reason": "the camera moves: pixels do not show the same tissue in all frames"}
-    shown = sequence.masks.any(axis=(1, 2))
+    shown = np.asarray(sequence.masks.any(axis=(1, 2)))
     if not (shown[:-2] & shown[1:-1] & shown[2:]).any():
         return {"reason": "no three successive frames show tissue"}
     static = static_pixels(sequence)
@@ -131,7 +131,7 @@ def static_pixels(sequence: Sequence) -> BoolArray:
     """(H, W) bool: tissue in every frame that shows any, with small optical flow between successive ones of them."""
     from endotsr.clips.opencv import dense_flow
 
-    shown = sequence.masks.any(axis=(1, 2))
+    shown = np.asarray(sequence.masks.any(axis=(1, 2)))
     pairs = np.flatnonzero(shown[:-1] & shown[1:])
     lengths = np.stack([np.hypot(*dense_flow(sequence.images[i], sequence.images[i + 1])) for i in pairs])
     middle, high = np.quantile(lengths, (0.5, 0.9), axis=0)
