@@ -49,7 +49,7 @@ def test_the_page_holds_no_gaussian_and_each_window_stands_in_a_file(written, co
     )
     found = about(file)
     assert [(span["begin"], span["end"]) for span in found["windows"]] == [(0, 32 / FRAMES), (24 / FRAMES, 1)]
-    assert len(found["frames"]["names"]) == FRAMES
+    assert len(found["frames"]["names"]) == FRAMES and found["frames"]["numbers"] == scene.frames
     assert [frame["window"] for frame in found["held_out"]] == [0, 0, 0, 0, 1, 1, 1]
     for k, name in enumerate(("000.js", "001.js")):
         number, numbers, data = script(file, name)

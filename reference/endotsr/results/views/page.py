@@ -8,6 +8,7 @@ import base64
 import html
 import json
 import re
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
@@ -65,7 +66,8 @@ def page(scene: MovingScene, title: str, keys: int, sequence: Sequence | None = 
     """
     found = trajectories(scene, key_times(scene, keys))
     low, high, pivot = depths_shown(scene)
-    about = header(found) | about_frames(scene.record) | about_pictures(scene, pivot) | {"depth_range": [low, high]}
+    frames = about_frames(scene.record, range(scene.record.count))
+    about = header(found) | frames | about_pictures(scene, pivot) | {"depth_range": [low, high]}
     about |= {"cameras": camera_numbers(scene), "seconds": SECONDS}
     held_out = [frame._asdict() for frame in held_out_frames(sequence)] if sequence else []
     return page_text(title, about | {"held_out": held_out}, encoded(found))
@@ -89,9 +91,9 @@ def page_text(title: str, about: dict[str, object], data: str) -> str:
     return re.sub("|".join(parts), lambda mark: parts[mark[0]], text)
 
 
-def about_frames(record: SequenceRecord) -> dict[str, object]:
-    """Names and times of the frames, the unit of length, and the seconds from time 0 to time 1 (0 = unknown)."""
-    frames = {"names": record.names, "times": record.times}
+def about_frames(record: SequenceRecord, numbers: Iterable[int]) -> dict[str, object]:
+    """Names, times and numbers of the frames, the unit of length, and the seconds from time 0 to 1 (0 = unknown)."""
+    frames = {"names": record.names, "times": record.times, "numbers": list(numbers)}
     return {"unit": record.unit, "duration": record.duration, "frames": frames}
 
 

@@ -141,7 +141,7 @@ def _page(scene: WindowedScene, title: str, parts: list[PagePart]) -> str:
         {"begin": gap.first / scene.plan.frames, "end": gap.end / scene.plan.frames, "reason": gap.reason}
         for gap in scene.plan.left_out
     ]
-    about = about_frames(scene.record) | about_pictures(scene.window(0), float(np.median(pivot)))
+    about = about_frames(scene.record, scene.frames) | about_pictures(scene.window(0), float(np.median(pivot)))
     about |= {
         "count": max(part.span.count for part in parts),
         "depth_range": [float(low.min()), float(high.max())],
