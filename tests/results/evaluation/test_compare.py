@@ -104,6 +104,28 @@ def test_a_single_frame_has_no_interval():
     assert (cells["difference"], cells["low"], cells["high"]) == ("1.0", "", "")
 
 
+def test_extrapolated_frames_have_means_and_differences_of_their_own():
+    """As in the report: behind the last training frame a model predicts, and between two it interpolates."""
+    a, b = method("a", [30.0, 32.0, 20.0]), method("b", [31.0, 33.0, 16.0])
+    rows = compare([a._replace(outside=(2,)), b._replace(outside=(2,))], ("psnr_tissue",))
+    found = {(row.label, row.extrapolated): row for row in rows}
+    assert [found["a", which].mean for which in (False, True)] == [31, 20]
+    assert [found["b", which].difference.mean for which in (False, True)] == [1, -4]
+    table = comparison_table(rows)
+    assert table.index("held-out frames between training frames") < table.index("mean over the extrapolated frames")
+    cells = list(csv.DictReader(io.StringIO(comparison_csv(rows))))
+    assert [row["extrapolated"] for row in cells] == ["0", "0", "1", "1"]
+    (alone,) = compare([a._replace(outside=(0, 1, 2))], ("psnr_tissue",))
+    assert alone.extrapolated and comparison_table([alone]).startswith("mean over the extrapolated frames")
+
+
+def test_the_extrapolated_frames_of_a_file_are_read():
+    rows = [{"frame": k, "name": f"f{k}", "time": k / 2, "psnr_tissue": 30.0} for k in (0, 1)]
+    metrics = {"pictures": {"arrays_sha256": DIGESTS}, "held_out": {"per_frame": rows}, "frames": {"extrapolated": [1]}}
+    (found,) = methods_of(metrics, "a", "found.json")
+    assert found.outside == (1,)
+
+
 def test_tables_hold_every_method_and_every_digit():
     rows = compare([method("a", [10.0, 30.0]), method("b", [11.0, 31.1])], ("psnr_tissue",))
     table = comparison_table(rows)

@@ -26,6 +26,7 @@ class Method(NamedTuple):
     label: str
     per_frame: list[FrameMetrics]  # entries of metrics.json: frame, name, time, metrics
     digests: dict[str, str]  # SHA-256 of `images` and `masks` of the sequence
+    outside: tuple[int, ...] = ()  # numbers of the frames before the first or after the last training frame
 
 
 class PairedDifference(NamedTuple):
@@ -45,6 +46,7 @@ class Row(NamedTuple):
     metric: str
     mean: float | None
     difference: PairedDifference | None  # None for the first method, and without a common frame
+    extrapolated: bool = False  # over the frames before the first or after the last training frame; else the others
 
 
 def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: bool = False) -> list[Method]:
@@ -59,7 +61,8 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
         rows = [(label, metrics["held_out"]["per_frame"])]  # no dictionary: a baseline may have the label
         if baselines:
             rows += [(entry["label"], entry["per_frame"]) for entry in metrics["baselines"].values()]
-        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows]
+        outside = tuple(int(i) for i in (metrics.get("frames") or {}).get("extrapolated") or ())
+        methods = [Method(name, list(per_frame), digests, outside) for name, per_frame in rows]
         for method in methods:
             _frames(method)
             _about(method)
@@ -78,13 +81,28 @@ def _hashes(metrics: EvaluationRecord) -> Any:
 
 
 def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:
-    """Means and paired differences to the first method for each metric.
+    """Means and paired differences to the first method for each metric; apart for extrapolated frames, at the end.
 
     metric_names   keys of the entries; a metric without any value is left out
     seed           of the resampling
     Raises: InputError if two methods have the same label, or were measured on different frames or masks.
     """
     _refuse_other_frames(methods)
+    outside = {frame for method in methods for frame in method.outside}
+    rows = []
+    for extrapolated in (False, True):
+        part = [_of_frames(method, outside, extrapolated) for method in methods]
+        if part[0].per_frame:
+            rows += _compared(part, metric_names, seed, extrapolated)
+    return rows
+
+
+def _of_frames(method: Method, outside: set[int], extrapolated: bool) -> Method:
+    """The method on the frames that are in `outside`, or on the others."""
+    return method._replace(per_frame=[row for row in method.per_frame if (row["frame"] in outside) is extrapolated])
+
+
+def _compared(methods: list[Method], metric_names: tuple[str, ...], seed: int, extrapolated: bool) -> list[Row]:
     rows = []
     for metric in metric_names:
         columns = [_column(method, metric) for method in methods]
@@ -93,7 +111,7 @@ def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0)
         for k, (method, column) in enumerate(zip(methods, columns)):
             difference = None if k == 0 else _paired(column - columns[0], metric, seed)
             mean = None if np.isnan(column).all() else float(np.nanmean(column))
-            rows.append(Row(method.label, metric, mean, difference))
+            rows.append(Row(method.label, metric, mean, difference, extrapolated))
     return rows
 
 

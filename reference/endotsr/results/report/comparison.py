@@ -17,16 +17,26 @@ from endotsr.results.report.tables import fixed, plain
 
 METRICS = {key: (label, digits) for key, label, digits in TABLE}
 FRAME = ("frame", "name", "time")
-COMPARED = ("method", "metric", "mean", "difference", "low", "high", "frames_better", "frames")
+COMPARED = ("method", "metric", "mean", "difference", "low", "high", "frames_better", "frames", "extrapolated")
 
 
 def comparison_table(rows: list[Row]) -> str:
-    """A line of means per method, then a line per method and metric with the difference to the first method."""
+    """A line of means per method, then a line per method and metric with the difference to the first method.
+
+    Extrapolated frames have tables of their own.
+    """
+    parts = [[row for row in rows if row.extrapolated is which] for which in (False, True)]
+    beside = " between training frames" if all(parts) else ""
+    heads = (f"mean over the held-out frames{beside}", "mean over the extrapolated frames")
+    return "\n\n".join(_part_table(part, head) for part, head in zip(parts, heads) if part)
+
+
+def _part_table(rows: list[Row], head: str) -> str:
     labels = list(dict.fromkeys(row.label for row in rows))
     metrics = list(dict.fromkeys(row.metric for row in rows))
     found = {(row.label, row.metric): row for row in rows}
     means = plain(
-        ["mean over the held-out frames", *(METRICS[m][0] for m in metrics)],
+        [head, *(METRICS[m][0] for m in metrics)],
         [[label, *(fixed(found[label, m].mean, METRICS[m][1]) for m in metrics)] for label in labels],
     )
     lines = []
@@ -61,7 +71,7 @@ def comparison_csv(rows: Iterable[Row]) -> str:
     for row in rows:
         d = row.difference
         rest = (None,) * 5 if d is None else (d.mean, d.low, d.high, d.better, d.frames)
-        body.append([row.label, row.metric, row.mean, *rest])
+        body.append([row.label, row.metric, row.mean, *rest, int(row.extrapolated)])
     return csv_text(COMPARED, body)
 
 
