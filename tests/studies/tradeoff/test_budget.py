@@ -7,7 +7,7 @@ from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
 from endotsr.errors import InputError
-from endotsr.studies.tradeoff.budget import frame_advice, parse_budget, settings_words
+from endotsr.studies.tradeoff.budget import _clamp_note, frame_advice, parse_budget, settings_words
 from endotsr.studies.tradeoff.study import run_study
 from endotsr.training.fitting.model import raster_settings
 
@@ -73,6 +73,23 @@ def test_refusal_with_the_reason(result):
     without = result | {"fronts": {"forward": [n for n in result["fronts"]["forward"] if n != "exact"]}}
     with pytest.raises(InputError, match="no measured setting reaches this error"):
         frame_advice(without, parse_budget("1e-30"))
+
+
+def test_no_option_of_an_answer_is_the_default(result):
+    by_name = {p["name"]: p for p in result["points"]}
+    words = {name: settings_words(p["setting"]) for name, p in by_name.items()}
+    assert (words["paper"], words["legacy"]) == ("--raster.preset paper", "--raster.preset legacy")
+    assert words["exact"] == "--raster.preset exact --training.precision float64"
+    assert "precision" not in words["float32, cutoff 1e-4, stop 1e-6"]
+    assert "transmittance-stop" not in words["float64, cutoff 1/1024, stop 1e-4"]
+
+
+def test_an_answer_says_that_its_options_keep_the_clamp_of_the_preset(result):
+    """The swept settings have no Jacobian clamp, which no option switches off; `paper` and `exact` are as measured."""
+    notes = {p["name"]: _clamp_note(p["setting"]) for p in result["points"]}
+    assert notes["paper"] == notes["exact"] == notes["legacy"] == ""
+    assert "keep the Jacobian clamp 1.3 of paper" in notes["float32, cutoff 1e-4, stop 1e-6"]
+    assert "keep the Jacobian clamp" in frame_advice(result, parse_budget("0.5/255")).lines[3]
 
 
 def test_the_options_of_an_answer_ask_for_its_setting(result):

@@ -63,7 +63,7 @@ def test_an_option_and_its_value_stay_on_one_line():
 
 def test_the_options_of_legacy_name_the_preset():
     """Its support and its gradients have no options of their own."""
-    assert settings_words(POINTS["legacy"]["setting"]).startswith("--raster.preset legacy ")
+    assert settings_words(POINTS["legacy"]["setting"]) == "--raster.preset legacy"
 
 
 def test_a_budget_that_nothing_keeps_has_its_reason_and_names_are_escaped():

@@ -7,7 +7,9 @@ import math
 import re
 from typing import Literal, NamedTuple
 
+from endotsr.config import PAPER
 from endotsr.errors import InputError
+from endotsr.method.splatting.settings import PRESETS
 from endotsr.studies.tradeoff.results import Measurement, Point, SettingPart
 from endotsr.studies.tradeoff.text import levels, milliseconds
 
@@ -106,27 +108,32 @@ def _expectation(point: Point) -> list[str]:
         f"worst gradient block {error['gradient']:.2g} (relative)",
         f"expected time: {milliseconds(point['forward']['median'])} per frame, "
         f"{milliseconds(point['both']['median'])} with the reverse pass",
-        f"as settings: {settings_words(point['setting'])}",
+        f"as settings: {settings_words(point['setting'])}{_clamp_note(point['setting'])}",
     ]
 
 
 def settings_words(setting: SettingPart) -> str:
-    """The options of `endotsr train` for a setting.
-
-    They keep the clamp of `paper` for Gaussians far outside the picture (B3), which the swept settings do not have and
-    which no option changes.
-    """
-    raster = setting["raster"]
-    words = [
-        f"--raster.alpha-cutoff {raster['alpha_cutoff']:.4g}",
-        f"--raster.transmittance-stop {raster['transmittance_stop']:.4g}",
-        f"--raster.alpha-max {raster['alpha_max']:.7g}",
-        f"--training.precision {setting['precision']}",
-    ]
-    if raster["support"] == "everywhere":
-        return f"--raster.preset exact --training.precision {setting['precision']}"
-    if raster["support"] == "three_sigma_tiles":
-        words.insert(0, "--raster.preset legacy")
+    """The options of `endotsr train` for a setting, without those whose value is the default; at least the preset."""
+    raster, preset = setting["raster"], _preset(setting)
+    words = [] if preset == "paper" else [f"--raster.preset {preset}"]
+    for key, digits in (("alpha_cutoff", 4), ("transmittance_stop", 4), ("alpha_max", 7)):
+        if raster[key] != getattr(PRESETS[preset], key):
+            words.append(f"--raster.{key.replace('_', '-')} {raster[key]:.{digits}g}")
+    if setting["precision"] != PAPER.training.precision:
+        words.append(f"--training.precision {setting['precision']}")
     if setting["scale"] != 1:
         words.append(f"--scale {setting['scale']:g}")
-    return " ".join(words)
+    return " ".join(words or ["--raster.preset paper"])
+
+
+def _preset(setting: SettingPart) -> str:
+    """The preset of the rasteriser with the support of a setting, which has no option of its own."""
+    return {"everywhere": "exact", "three_sigma_tiles": "legacy"}.get(setting["raster"]["support"], "paper")
+
+
+def _clamp_note(setting: SettingPart) -> str:
+    """What the options keep of their preset although the setting was measured without it; no option changes it."""
+    kept = PRESETS[_preset(setting)].jacobian_clamp
+    if setting["raster"]["jacobian_clamp"] == kept:
+        return ""
+    return f" (they keep the Jacobian clamp {kept:g} of {_preset(setting)}, with which the setting was not measured)"

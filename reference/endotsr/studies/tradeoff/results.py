@@ -30,12 +30,13 @@ class ErrorPart(TypedDict):
 
 
 class RasterPart(TypedDict):
-    """The settings of the rasteriser that are command-line options; the file holds the others too."""
+    """The settings of the rasteriser that choose command-line options; the file holds the others too."""
 
     alpha_cutoff: float
     transmittance_stop: float
     alpha_max: float
     support: str
+    jacobian_clamp: float
 
 
 class SettingPart(TypedDict):
