@@ -35,6 +35,8 @@ def test_a_log_file_gets_what_is_printed_and_errors(quiet, tmp_path, capsys):
 def test_a_log_file_that_cannot_be_written_is_refused(tmp_path, capsys):
     assert_refused(capsys, ["--log-file", str(tmp_path / "no" / "a.log"), "render"], "a.log: cannot be written")
     assert_refused(capsys, ["render", "--log-file"], "--log-file: missing value FILE")
+    for other in (["--json", "a.txt"], ["--json=a.txt"], ["a.txt"]):
+        assert_refused(capsys, ["check", "--log-file", "a.txt", *other], "a.txt: the command names this file elsewhere")
 
 
 def test_no_output_replaces_a_recording_a_clip_or_a_run(run_copy, tmp_path, capsys):

@@ -30,6 +30,8 @@ def test_a_finding_reads_as_one_line(code):
     found = finding(code, Path("clip/images"), "something is wrong", 3)
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", code)
     assert found.line == f"clip/images, frame 3: something is wrong; {KINDS[code].why}; {KINDS[code].remedy}"
+    named = finding(code, "clip/images", "clip/images: something is wrong")
+    assert named.line == f"clip/images: something is wrong; {KINDS[code].why}; {KINDS[code].remedy}"
     assert not any(text.endswith(".") or "\n" in text for text in found[4:])
 
 

@@ -26,7 +26,7 @@ class OutputOptions(NamedTuple):
 def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
     """The output options, and the other words in order.
 
-    Raises: InputError for `--log-file` without a value.
+    Raises: InputError for `--log-file` without a value, or with a file that another word names.
     """
     rest, quiet, file = [], False, None
     found = iter(words)
@@ -41,6 +41,8 @@ def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
             file = Path(value)
         else:
             rest.append(word)
+    if file is not None and file in {Path(word.partition("=")[2] or word) for word in rest}:
+        raise InputError(f"--log-file {file}: the command names this file elsewhere too; allowed: another name")
     return OutputOptions(quiet, file), rest
 
 

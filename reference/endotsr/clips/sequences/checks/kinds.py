@@ -207,7 +207,8 @@ class Finding(NamedTuple):
     def line(self) -> str:
         """The finding in one line."""
         place = f"{self.where}, frame {self.frame}" if self.frame is not None else self.where
-        return f"{place}: {self.what}; {self.why}; {self.remedy}"
+        what = self.what.removeprefix(f"{self.where}: ")  # the text of an error begins with its file
+        return f"{place}: {what}; {self.why}; {self.remedy}"
 
 
 def finding(code: str, where: object, what: str, frame: int | None = None) -> Finding:
