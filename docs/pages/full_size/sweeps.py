@@ -102,11 +102,12 @@ def table(file: Path) -> str:
 
 def _line(rows: list[Row], name: str, to: str) -> list[str]:
     of = [row for row in rows if row["configuration"] == name]
-    if name == to:
+    level = name == to or all(row["configuration"] != to for row in rows)  # without a reference, no differences
+    if level:
         cells = means(of, [(key, digits) for key, _, digits in COLUMNS])
     else:
         cells = [shown(differences(rows, name, to, key), digits, "+") for key, _, digits in COLUMNS]
-    return [name if name == to else f"{name}, difference to {to}", str(len(of)), *cells]
+    return [name if level else f"{name}, difference to {to}", str(len(of)), *cells]
 
 
 def tables() -> str:

@@ -187,7 +187,7 @@ def keys_pressed(file, *keys):
 def test_keys_play_turn_and_change_the_frame(opened):
     times = opened[0].record.times
     said = keys_pressed(opened[1], ".", ",", ",", "ArrowLeft", "0", "+", "x", " ", " ")
-    assert [time for time, _, _ in said[:3]] == [f"frame {i} of 0 to 63, t = {times[i]:.3f}" for i in (1, 0, 63)]
+    assert [time for time, _, _ in said[:3]] == [f"frame {i} (0 to 63), t = {times[i]:.3f}" for i in (1, 0, 63)]
     assert [view.split(",")[0] for _, view, _ in said[2:7]] == [
         "Camera view", "Free view", "Camera view", "Free view", "Free view"
     ]  # fmt: skip

@@ -7,7 +7,7 @@ from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
 from endotsr.errors import InputError
-from endotsr.studies.tradeoff.budget import _clamp_note, frame_advice, parse_budget, settings_words
+from endotsr.studies.tradeoff.budget import clamp_note, frame_advice, parse_budget, settings_words
 from endotsr.studies.tradeoff.study import run_study
 from endotsr.training.fitting.model import raster_settings
 
@@ -86,7 +86,7 @@ def test_no_option_of_an_answer_is_the_default(result):
 
 def test_an_answer_says_that_its_options_keep_the_clamp_of_the_preset(result):
     """The swept settings have no Jacobian clamp, which no option switches off; `paper` and `exact` are as measured."""
-    notes = {p["name"]: _clamp_note(p["setting"]) for p in result["points"]}
+    notes = {p["name"]: clamp_note(p["setting"]) for p in result["points"]}
     assert notes["paper"] == notes["exact"] == notes["legacy"] == ""
     assert "keep the Jacobian clamp 1.3 of paper" in notes["float32, cutoff 1e-4, stop 1e-6"]
     assert "keep the Jacobian clamp" in frame_advice(result, parse_budget("0.5/255")).lines[3]

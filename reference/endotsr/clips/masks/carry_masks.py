@@ -58,14 +58,14 @@ class Carried(NamedTuple):
         return [i for i, agreement in enumerate(self.agreement) if agreement < LEAST_AGREEMENT]
 
 
-class Gap(NamedTuple):
+class CarriedGap(NamedTuple):
     """The frames between two keys, or between a key and an end of the clip, without the keys."""
 
     blend: list[NDArray[np.uint8]]  # (H, W) 255 times the blend c_i of both sides
     agreement: list[float]
 
 
-Gaps = dict[tuple[int, int], Gap]  # (key before or -1, key after or number of frames) -> its frames
+Gaps = dict[tuple[int, int], CarriedGap]  # (key before or -1, key after or number of frames) -> its frames
 
 
 def carry_masks(
@@ -103,16 +103,16 @@ def carry_masks(
     return Carried(masks, agreement, best, gain)
 
 
-def _gap(motion: ClipFlows, keys: Mapping[int, BoolArray], before: int, after: int) -> Gap:
+def _gap(motion: ClipFlows, keys: Mapping[int, BoolArray], before: int, after: int) -> CarriedGap:
     """The frames between two keys; -1 and the number of frames stand for the ends of the clip."""
     frames = range(before + 1, after)
     ahead = _carried(keys[before], motion.backward, frames, 1) if before in keys else []
     back = _carried(keys[after], motion.forward, frames[::-1], 0)[::-1] if after in keys else []
     if not ahead or not back:
-        return Gap([_levels(soft) for soft in ahead or back], [0.0] * len(frames))
+        return CarriedGap([_levels(soft) for soft in ahead or back], [0.0] * len(frames))
     weights = [np.float32((i - before) / (after - before)) for i in frames]
     blend = [_levels((1 - s) * one + s * other) for s, one, other in zip(weights, ahead, back)]
-    return Gap(blend, [overlap_of(one > 0.5, other > 0.5) for one, other in zip(ahead, back)])
+    return CarriedGap(blend, [overlap_of(one > 0.5, other > 0.5) for one, other in zip(ahead, back)])
 
 
 def _check_keys(keys: Mapping[int, BoolArray], count: int, motion: ClipFlows) -> None:

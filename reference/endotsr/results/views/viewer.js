@@ -439,8 +439,8 @@ const short = (number) => Number(number.toPrecision(4)).toString();
 function describe() {
   element("slider").value = state.time;
   const i = nearestFrame(state.time), frame = about.frames.names[i], numbers = about.frames.numbers;
-  element("time").textContent = "frame " + numbers[i] + " of " + numbers[0] + " to " + numbers[numbers.length - 1]
-    + ", t = " + state.time.toFixed(3)
+  element("time").textContent = "frame " + numbers[i] + " (" + numbers[0] + " to " + numbers[numbers.length - 1]
+    + "), t = " + state.time.toFixed(3)
     + (about.duration ? ", " + (state.time * about.duration).toFixed(2) + " s" : "");
   const gap = shows(state.time).length ? null : "No window covers this time" + gapReason(state.time);
   element("shown").textContent = gap || (waiting() ? "Loading window " + shows(state.time).map((k) => spans[k].name).join(" and ")

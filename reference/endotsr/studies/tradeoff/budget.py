@@ -108,7 +108,7 @@ def _expectation(point: Point) -> list[str]:
         f"worst gradient block {error['gradient']:.2g} (relative)",
         f"expected time: {milliseconds(point['forward']['median'])} per frame, "
         f"{milliseconds(point['both']['median'])} with the reverse pass",
-        f"as settings: {settings_words(point['setting'])}{_clamp_note(point['setting'])}",
+        f"as settings: {settings_words(point['setting'])}{clamp_note(point['setting'])}",
     ]
 
 
@@ -131,7 +131,7 @@ def _preset(setting: SettingPart) -> str:
     return {"everywhere": "exact", "three_sigma_tiles": "legacy"}.get(setting["raster"]["support"], "paper")
 
 
-def _clamp_note(setting: SettingPart) -> str:
+def clamp_note(setting: SettingPart) -> str:
     """What the options keep of their preset although the setting was measured without it; no option changes it."""
     kept = PRESETS[_preset(setting)].jacobian_clamp
     if setting["raster"]["jacobian_clamp"] == kept:
