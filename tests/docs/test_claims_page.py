@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pages.claims import page as claims
-from pages.claims.answer import against, answer, baselines, black
+from pages.claims.answer import against, answer, baselines, black, with_other_weights
 from pages.claims.estimates import averaged, contrast, spread
 from pages.claims.parts import planned_hours, protocols, tables
 from pages.claims.power import least_size, pairs_needed, power
@@ -340,6 +340,19 @@ def test_the_answer_says_what_the_records_say():
     bare = answer(claims.RESULTS, {"pulling": record, "cutting": None}, [], "")
     assert "on cutting is not finished" in bare and "right camera" not in bare and "1 combinations" in bare
     assert "| cutting | 40.96 | - | - | 42.80 |" in bare
+
+
+def test_the_answer_names_the_level_with_other_weights_of_ssim():
+    weights = ((0.0, 38.0), (0.1, 39.0), (0.2, 39.3), (0.4, 40.0))
+    rows = [
+        {"configuration": f"w {weight}", "sequence": "endonerf_pulling", "psnr_full": level + step}
+        for weight, level in weights
+        for step in (-0.05, 0.0, 0.05)
+    ]
+    said = with_other_weights(rows)
+    assert "here 0.1: with 0.0 it is not reached on pulling (38.00 dB, 37.88 to 38.12 dB)" in said
+    assert "; with 0.2 it lies in the interval on pulling (39.30 dB" in said and "with 0.4 it is exceeded" in said
+    assert "with 0.1" not in said and with_other_weights(rows[:2]) == with_other_weights([]) == ""
 
 
 def test_the_answer_says_what_excluded_pixels_add():

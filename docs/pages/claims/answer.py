@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.simulator import SimulatorSettings
+from endotsr.config import PAPER
 from endotsr.studies.sweeps.ablation import COMPARISONS
 from pages.claims.estimates import Estimate, contrast, runs_of
 from pages.claims.rules import LEAST_PAIRS, increment_verdict, seeds_of
 from pages.claims.verdicts import CLIPS, FULL, ROUNDED, STEPS, WHOLE
+from pages.full_size.sweeps import FOLDER, rows_of
 from pages.store.commands import loaded
 from pages.store.intervals import shown, student
 from pages.store.published import MATCHED_PSNR, PUBLISHED
@@ -35,7 +37,8 @@ def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record |
     right_eye   mean and interval of the gain on the right camera at held-out times as text, or ""
     """
     known = {clip: found[clip] for clip in CLIPS if contrast(found[clip], WHOLE, "psnr_full") is not None}
-    parts = [components(known), at_fixed_count(known), reached(known)] if known else []
+    weights = with_other_weights(rows_of(FOLDER / "similarity_weight.toml"))
+    parts = [components(known), at_fixed_count(known), reached(known) + weights] if known else []
     parts += [beaten(folder, clip, record) for clip, record in known.items()]
     parts.append(splits(found, half))
     if right_eye:
@@ -110,9 +113,38 @@ def reached(known: Mapping[str, Record]) -> str:
         if limits is None:
             texts.append(f"is not decided on {clip}")
         else:
-            inside = "is exceeded" if limits[0] > published else "lies in the interval"
-            texts.append(f"{'is not reached' if limits[1] < published else inside} on {clip}")
+            texts.append(f"{_stands(limits, published)} on {clip}")
     return f"The published level {' and '.join(texts)}."
+
+
+def _stands(limits: tuple[float, float], published: float) -> str:
+    """The published level against the interval of the reproduced one."""
+    inside = "is exceeded" if limits[0] > published else "lies in the interval"
+    return "is not reached" if limits[1] < published else inside
+
+
+def with_other_weights(rows: list[Record]) -> str:
+    """The level against the published one with other weights of D-SSIM, which the paper does not print.
+
+    rows   of the sweep `similarity_weight`; a clip and weight with fewer seeds than a verdict needs is left out
+    """
+    found: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        found.setdefault((row["configuration"].removeprefix("w "), row["sequence"]), []).append(row["psnr_full"])
+    texts = []
+    for (weight, sequence), values in sorted(found.items()):
+        mean, limits = student(values)
+        if limits is None or len(values) < LEAST_PAIRS or float(weight) == PAPER.loss.ssim_weight:
+            continue
+        clip = sequence.removeprefix("endonerf_")
+        published = PUBLISHED[clip]["psnr_full"] or 0.0
+        texts.append(
+            f"{weight} it {_stands(limits, published)} on {clip} ({mean:.2f} dB, {limits[0]:.2f} to {limits[1]:.2f} dB)"
+        )
+    if not texts:
+        return ""
+    used = f"{PAPER.loss.ssim_weight:g}"
+    return f" The paper does not print the weight of D-SSIM, here {used}: with {'; with '.join(texts)}."
 
 
 def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
