@@ -437,3 +437,9 @@ def test_real_sequence(masks, share, found):
         assert kind in note and place in note
     with pytest.raises(InputError, match="other polarity"):
         read_sequence(folder, SequenceConfig(masks=masks, excluded_value="black", frames="0:12"))
+
+
+@pytest.mark.data
+def test_the_display_of_the_console_in_cutting_is_at_rest_within_gt_masks():
+    notes = read_sequence(data_folder("endonerf_cutting"), SequenceConfig(masks="gt_masks")).notes
+    assert [note for note in notes if "burnt-in" in note and "rows 501 to 510" in note]

@@ -96,7 +96,7 @@ def flicker(sequence: Sequence, render: RenderView) -> Measured:
     """
     if not sequence.static_camera:
         return {"reason": "the camera moves: pixels do not show the same tissue in all frames"}
-    shown = np.asarray(sequence.masks.any(axis=(1, 2)))
+    shown = _with_tissue(sequence)
     if not (shown[:-2] & shown[1:-1] & shown[2:]).any():
         return {"reason": "no three successive frames show tissue"}
     static = static_pixels(sequence)
@@ -115,8 +115,8 @@ def flicker(sequence: Sequence, render: RenderView) -> Measured:
 def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int], FloatArray]) -> MeasureRow:
     squares: dict[int, float] = {}  # of the frames between two others that show tissue
     last: list[FloatArray] = []  # at most three frames at a time: a long clip does not fit in memory
-    for i in range(sequence.count):
-        if not sequence.masks[i].any():
+    for i, shown in enumerate(_with_tissue(sequence)):
+        if not shown:
             last = []
             continue
         last = [*last[-2:], frame(i)[:, static].astype(np.float64)]
@@ -127,11 +127,16 @@ def _row(label: str, sequence: Sequence, static: BoolArray, frame: Callable[[int
     return {"label": label, "all_frames": float(np.sqrt(np.mean(list(squares.values()))) * LEVELS), "held_out": inside}
 
 
+def _with_tissue(sequence: Sequence) -> BoolArray:
+    """(n,) bool: the frames that show tissue."""
+    return np.asarray(sequence.masks.any(axis=(1, 2)))
+
+
 def static_pixels(sequence: Sequence) -> BoolArray:
     """(H, W) bool: tissue in every frame that shows any, with small optical flow between successive ones of them."""
     from endotsr.clips.opencv import dense_flow
 
-    shown = np.asarray(sequence.masks.any(axis=(1, 2)))
+    shown = _with_tissue(sequence)
     pairs = np.flatnonzero(shown[:-1] & shown[1:])
     lengths = np.stack([np.hypot(*dense_flow(sequence.images[i], sequence.images[i + 1])) for i in pairs])
     middle, high = np.quantile(lengths, (0.5, 0.9), axis=0)

@@ -301,7 +301,7 @@ def _pair(clip: Clip, run: _Pass, i: int, picture: Picture, tissue: NDArray | No
         return
     if i == 0 and (disparity := agreed_disparity(picture, right)) is not None:
         run.findings += stereo_finding(depth, disparity, str(clip.depth.files[0]), 0)
-    if tissue is not None or not clip.masks:
+    if i in run.against.sampled and (tissue is not None or not clip.masks):
         with suppress(InputError):  # the check of the cameras reports it
             run.against.add(i, frame_of(picture, tissue, depth), right)
 

@@ -60,9 +60,8 @@ class DepthPairs:
         self.found: list[Compared | None] = []
 
     def add(self, i: int, frame: ViewFrame, right: Picture) -> None:
-        """Frame i, if it is sampled. Raises InputError without a camera."""
-        if i in self.sampled:
-            self.found.append(_compared(self.clip, i, frame, right))
+        """Frame i of `sampled`. Raises InputError without a camera."""
+        self.found.append(_compared(self.clip, i, frame, right))
 
     def findings(self) -> list[Finding]:
         """A warning where the depth contradicts the pairs; none if a sampled frame was left out."""
