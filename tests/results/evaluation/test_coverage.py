@@ -88,7 +88,7 @@ def test_extrapolated_frames_have_means_of_their_own():
     within, beyond = held_out_means(result, result["held_out"])
     assert within["psnr_tissue"] == pytest.approx(20, abs=1e-3) and beyond["psnr_tissue"] == pytest.approx(10, abs=1e-3)
     first, second = held_out_table(result).split("\n1 extrapolated")
-    assert first.startswith("1 held-out frames") and "20.00" in first.splitlines()[1]
+    assert first.startswith("1 held-out frame ") and "20.00" in first.splitlines()[1]
     assert "10.00" in second.splitlines()[1] and "15.00" not in held_out_table(result)
 
 

@@ -61,6 +61,10 @@ def test_an_option_and_its_value_stay_on_one_line():
     assert re.search(r'<code><span class="whole">--raster\.alpha-cutoff \S+</span> <span', tradeoff_page(RESULT))
 
 
+def test_an_answer_on_the_page_says_what_its_options_keep():
+    assert "</code> (they keep the Jacobian clamp 1.3 of paper" in tradeoff_page(RESULT)
+
+
 def test_the_options_of_legacy_name_the_preset():
     """Its support and its gradients have no options of their own."""
     assert settings_words(POINTS["legacy"]["setting"]) == "--raster.preset legacy"

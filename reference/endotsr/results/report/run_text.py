@@ -6,6 +6,7 @@ In: the dictionary of metrics.json. Out: plain text.
 from endotsr.results.evaluation.evaluate import all_extrapolated, held_out_means, left_out
 from endotsr.results.evaluation.records import EvaluationRecord, FramesMeasured, Means, MotionPart, PosePart, RunPart
 from endotsr.results.report.tables import duration, fixed, plain
+from endotsr.untrusted.names import counted
 
 SHOWN = (("psnr_full", "PSNR full", 2), ("psnr_tissue", "PSNR tissue", 2), ("ssim_full", "SSIM full", 4))
 TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
@@ -50,7 +51,8 @@ def held_out_table(metrics: EvaluationRecord) -> str:
     means = [(label, *held_out_means(metrics, entry)) for label, entry in measured]
     total, outside = len(metrics["held_out"]["per_frame"]), (metrics.get("frames") or {}).get("extrapolated") or []
     split = bool(means[0][2])  # frames between training frames, and extrapolated ones
-    lines = [_means_table(f"{total - len(outside) if split else total} held-out frames", [row[:2] for row in means])]
+    between = total - len(outside) if split else total
+    lines = [_means_table(counted(between, "held-out frame"), [row[:2] for row in means])]
     if split:
         lines.append(_means_table(f"{len(outside)} extrapolated", [(label, beyond) for label, _, beyond in means]))
     elif outside:

@@ -5,7 +5,7 @@ from endotsr.results.report import parts
 from endotsr.results.report.figures import data_uri
 from endotsr.results.report.style import encoded
 from endotsr.results.report.tables import html_table
-from endotsr.studies.tradeoff.budget import best_point, parse_budget, settings_words
+from endotsr.studies.tradeoff.budget import best_point, clamp_note, parse_budget, settings_words
 from endotsr.studies.tradeoff.figure import main_figure
 from endotsr.studies.tradeoff.results import DatedMeasurement, Measurement, Point
 from endotsr.studies.tradeoff.text import COLUMNS, LEVELS, front_rows, levels, made, milliseconds
@@ -64,7 +64,8 @@ def _answers(result: Measurement) -> list[tuple[str, str]]:
             continue
         said = f"{point['name']}: largest error {levels(point['error']['max'])}, "
         said += f"{milliseconds(point['forward']['median'])} a frame"
-        answers.append((parts.text(text), f"{parts.text(said)}<br><code>{_unbroken(point)}</code>"))
+        options = f"<code>{_unbroken(point)}</code>{parts.text(clamp_note(point['setting']))}"
+        answers.append((parts.text(text), f"{parts.text(said)}<br>{options}"))
     return answers
 
 
