@@ -251,13 +251,13 @@ def test_the_evaluation_of_a_simulated_clip_is_forecast_with_its_known_motion(co
 def test_the_vectors_change_the_forecast_of_the_iterations_alone(monkeypatch):
     """Reading, motion and evaluation are assumed to take as long without AVX-512."""
     plan, seconds = plan_of("quick", 63, 2)._replace(perceived=True), {}
-    for register, unit in ((64, 0.08), (32, 0.128)):
+    for register, unit in ((64, 0.085), (32, 0.1275)):
         monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", register)
         assert assumed_unit(2) == pytest.approx(unit)
         seconds[register] = estimated_seconds(plan._replace(vectors=vector_factor()), unit)
-    work = {vectors: work_left(plan.config, PIXELS, at_start(plan.config), vectors) for vectors in (1.0, 1.6)}
-    assert work[1.6] != work[1.0], "the parts of an iteration depend on the vectors"
-    assert seconds[32].iterations / work[1.6] == pytest.approx(1.6 * seconds[64].iterations / work[1.0])
+    work = {vectors: work_left(plan.config, PIXELS, at_start(plan.config), vectors) for vectors in (1.0, 1.5)}
+    assert work[1.5] != work[1.0], "the parts of an iteration depend on the vectors"
+    assert seconds[32].iterations / work[1.5] == pytest.approx(1.5 * seconds[64].iterations / work[1.0])
     assert seconds[32]._replace(iterations=0.0) == pytest.approx(seconds[64]._replace(iterations=0.0))
 
 

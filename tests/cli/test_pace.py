@@ -70,7 +70,7 @@ def test_a_late_iteration_of_the_whole_model_takes_longer_than_the_timed_ones(st
     points = new_training(
         still, with_settings(SHARP, initialisation=with_settings(QUICK.initialisation, motion="none"))
     )
-    work = 0.1 + 0.4 * 64 * 48 / (640 * 512) + 0.5 * points.gaussians.count / 60_000
+    work = 0.08 + 0.35 * 64 * 48 / (640 * 512) + 0.57 * points.gaussians.count / 60_000
     assert seconds_of_unit(still, SHARP) == pytest.approx(1 / work / 0.55)
 
 
@@ -89,4 +89,4 @@ def test_the_line_on_minutes_is_of_this_clip_and_of_the_points_that_it_starts_wi
     config, line = config_of_minutes(SimpleNamespace(minutes=0.13), still, SHARP, 1)
     points = config.initialisation.first_frame_points + config.initialisation.other_frame_points
     assert config.density.maximum < points and line.endswith(f" iterations, {points} Gaussians")
-    assert "an iteration of 60 000 Gaussians takes 60 ms" in line, "and 100 ms at 640x512"
+    assert "an iteration of 60 000 Gaussians takes 65 ms" in line, "and 100 ms at 640x512"

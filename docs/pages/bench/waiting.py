@@ -38,7 +38,8 @@ from pages.store.program import CLIPS, LPIPS, Program
 MARKS = 10  # renders of every held-out frame, evenly over the iterations
 MINUTE = 60.0
 KEYS = ("psnr_full", "psnr_tissue", "lpips")
-SAME = ("clip", "preset", "iterations", "seed", "clock", "cold", "register_bytes")  # a row replaces such a row
+# A row replaces the row with these values.
+SAME = ("clip", "preset", "iterations", "seed", "clock", "cold", "register_bytes", "processor")
 
 
 class Watch:
@@ -144,7 +145,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "forecast_after": progress.FORECAST_AFTER, "curve": spoken.curve,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
-        "machine": machine(), "date": now()[:10],
+        "processor": machine().get("processor"), "machine": machine(), "date": now()[:10],
     }  # fmt: skip
 
 

@@ -45,10 +45,17 @@ def today(row: dict[str, Any]) -> str:
 
 
 def named(row: dict[str, Any]) -> str:
-    """Clip, preset, seed, vectors of the processor, clock, and whether the kernels were compiled first."""
+    """Clip, preset, seed, processor and clock, and whether the kernels were compiled first."""
     about = [row["clip"], f"`{row['preset']}`", f"{row['iterations']} iterations", f"seed {row['seed']}"]
-    about += [VECTORS[row["register_bytes"]], CLOCKS["wall"] * (row["clock"] == "wall")]
+    about += [processor(row), CLOCKS["wall"]] if row["clock"] == "wall" else []
     return ", ".join(filter(None, (*about, "with compilation" * row["cold"])))
+
+
+def processor(row: dict[str, Any]) -> str:
+    """The processor of a row without marks of trade, with its vectors where they were recorded."""
+    name = row["processor"].replace("(R)", "").removesuffix(" Processor")
+    vectors = VECTORS[row["register_bytes"]]
+    return f"{name} with {vectors}" if vectors else name
 
 
 def said(result: dict[str, Any]) -> str:
@@ -70,7 +77,7 @@ def said(result: dict[str, Any]) -> str:
 def about(rows: list[dict[str, Any]]) -> str:
     """Sizes, clocks, machines and the last day."""
     sizes, clocks = sorted({row["size"] for row in rows}), sorted({CLOCKS[row["clock"]] for row in rows})
-    machines = sorted({row["machine"]["processor"] for row in rows})
+    machines = sorted({row["processor"] for row in rows})
     after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "

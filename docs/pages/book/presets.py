@@ -12,7 +12,7 @@ import numpy as np
 
 from endotsr.config import PRESETS
 from endotsr.results.report.tables import duration, markdown
-from pages.bench.waiting_text import CLOCKS, VECTORS
+from pages.bench.waiting_text import CLOCKS, processor
 from pages.book import running_clip
 from pages.full_size import page as full_size
 from pages.full_size import record
@@ -77,16 +77,16 @@ def whole() -> str:
             f"`{row['preset']}`",
             f"{row['clip']}, {row['frames']} frames",
             duration(row["whole"]),
-            ", ".join(filter(None, (VECTORS[row["register_bytes"]], CLOCKS[row["clock"]]))),
+            f"{processor(row)}, {CLOCKS[row['clock']]}",
             "yes" if row["cold"] else "no",
         ]
         for row in shown
     ]
-    machines, sizes = sorted({row["machine"]["processor"] for row in rows}), sorted({row["size"] for row in rows})
+    sizes, days = sorted({row["size"] for row in rows}), sorted({row["date"] for row in rows})
     about = (
         "Time of the whole command, from reading the clip to its report, with LPIPS; kernels are compiled once on a "
         "machine. "
-        f"Frames of {', '.join(sizes)}; {', '.join(machines)}; {max(row['date'] for row in rows)}."
+        f"Frames of {', '.join(sizes)}; {days[0]} to {days[-1]}."
     )
     return noted(("Preset", "Clip", "Minutes", "Measured on", "With compilation"), cells, about)
 

@@ -398,7 +398,7 @@ def test_a_budget_decides_gaussians_and_minutes():
 
 
 def test_the_work_that_is_left_adds_up():
-    """Half of an iteration is for 60 000 Gaussians, four tenths for 640x512 pixels; a coarse start sees a quarter,
+    """0.57 of an iteration is for 60 000 Gaussians, 0.35 for 640x512 pixels; a coarse start sees a quarter of these,
     and the first third of a run takes less."""
     config = msgspec.structs.replace(
         PAPER, density=msgspec.structs.replace(PAPER.density, growth="budget", maximum=120_000)
@@ -407,12 +407,12 @@ def test_the_work_that_is_left_adds_up():
     assert work_left(config, full, Standing(5990, 60_000)) == pytest.approx(10 * 1.0)
     assert work_left(config, full, Standing(6000, 60_000)) == 0.0
     assert work_left(config, full, Standing(3990, 60_000, True)) == pytest.approx(
-        work_left(config, full, Standing(3990, 60_000)) - 10 * 0.3
+        work_left(config, full, Standing(3990, 60_000)) - 10 * 0.35 * 3 / 4
     )
     growing = work_left(config, full, Standing(2100, 60_000)) - work_left(config, full, Standing(4000, 120_000))
-    assert growing == pytest.approx(1900 * 1.25, rel=1e-3)
+    assert growing == pytest.approx(1900 * (1 + 0.57 / 2), rel=1e-3)
     early = work_left(config, full, Standing(0, 120_000)) - work_left(config, full, Standing(2100, 120_000))
-    assert early == pytest.approx(2100 * 1.5 * (0.77 + 1) / 2, rel=1e-3)
+    assert early == pytest.approx(2100 * 1.57 * (0.77 + 1) / 2, rel=1e-3)
 
 
 def test_a_clip_that_fits_nowhere_is_refused_before_reading(sequence, tmp_path, monkeypatch):

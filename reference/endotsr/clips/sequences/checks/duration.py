@@ -4,10 +4,10 @@
 
 is the work of an iteration with N Gaussians and P pixels at the fraction u of the run. Its unit is a late iteration of
 the common workload (60 000 Gaussians at 640x512), whose time depends on machine and clip: SECONDS without a timing.
-b = 0.1, p = 0.4 and n = 0.5 were measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and 320x256
-pixels on processors with AVX-512. Without it, 0.02, 0.36 and 0.62 follow from the times of a `quick` run on pulling
-before and after the end of its coarse start, and from those of a `sharp` run on cutting with 36 900 and with 80 000
-Gaussians.
+b, p and n depend on the machine. On processors with AVX-512 `endotsr bench` gave 0.1, 0.4 and 0.5 on one and 0.06, 0.3
+and 0.64 on another (10 000 to 90 000 Gaussians at 640x512 and 320x256 pixels); their mean is assumed. Without it, 0.02,
+0.36 and 0.62 follow from the times of a `quick` run on pulling before and after the end of its coarse start, and from
+those of a `sharp` run on cutting with 36 900 and with 80 000 Gaussians.
 The second factor was measured on `quick` with and without its coarse start, on both EndoNeRF clips: early iterations
 have small Gaussians, colours of degree 0 and mostly inactive time bases.
 
@@ -26,13 +26,13 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import IndexArray
 
 PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
-PARTS = (0.1, 0.4, 0.5)  # of its iteration: constant, of the pixels, of the Gaussians; on a processor with AVX-512
+PARTS = (0.08, 0.35, 0.57)  # of its iteration: constant, of the pixels, of the Gaussians; on a processor with AVX-512
 PARTS_WITHOUT = (0.02, 0.36, 0.62)  # and on one without
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
-SECONDS = 0.08  # of its iteration on two cores: 0.05 to 0.105 s were measured on three machines without other work
+SECONDS = 0.085  # of its iteration on two cores: 0.05 to 0.105 s were measured on four machines without other work
 # Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.14 s were measured on one
 # machine. The parts beside the iterations are assumed to take as long on both.
-WITHOUT_AVX512 = 1.6
+WITHOUT_AVX512 = 1.5
 # Assumed growth for `density.growth = "threshold"`, whose final number is not known in advance: a larger weight of the
 # similarity gives larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
 # at half size and twice the threshold the growth was 1.5, 1.8 and 2.1 with the weights 0.2, 0.35 and 0.5.
