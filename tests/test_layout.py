@@ -16,6 +16,15 @@ def test_every_room_is_on_the_list():
     assert rooms <= set(house.ROOMS), "a new room needs its place in tests/house.py"
 
 
+def test_every_line_is_counted_in_its_room():
+    lines = house.lines_of()
+    assert set(lines) - {"__init__"} == set(house.ROOMS)
+    package = house.ROOT / "reference" / "endotsr"
+    assert sum(lines.values()) == sum(len(f.read_text(encoding="utf-8").splitlines()) for f in package.rglob("*.py"))
+    losses = (package / "method" / "losses").rglob("*.py")
+    assert lines["method.losses"] == sum(len(file.read_text(encoding="utf-8").splitlines()) for file in losses)
+
+
 def test_imports_run_down_only():
     """Between rooms; import-linter checks the storeys (`lint-imports`, in `pyproject.toml`)."""
     assert house.upward() == []
