@@ -19,12 +19,13 @@ from endotsr.clips.sequences.checks.duration import (
     frames_of,
     iteration_work,
     vector_factor,
+    visited,
     work_left,
 )
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.training.fitting.records import Making
-from endotsr.training.runs.time_left import SLOWED, Timed, unit_seconds
+from endotsr.training.runs.time_left import SLOWED, Timed, TimeLeft, unit_seconds
 
 PIXELS, GAP = 640 * 512, 0.15  # of a frame; seconds on one thread for the targets of a gap at full size
 UNIT = 0.1
@@ -163,6 +164,22 @@ def test_half_a_minute_of_another_program_changes_the_time_left_of_a_long_run_by
         assert left <= 1.1 * least or now > told.end - 5, now
         least = min(least, left)
     assert len(slow) * UNIT < 30
+
+
+def test_two_slow_gaps_do_not_speak_for_all_of_a_size():
+    """At half size a gap took 0.05 s, so 0.2 s are expected at full size; the first two took 0.4 s each."""
+    plan, left = plan_of("quick", 156, 2), []
+    iterations, gaps = plan.config.training.iterations, plan.frames.gaps
+    for slow in (0.2, 0.4):
+        told, half = TimeLeft(plan), plan.config.density.until
+        for iteration in range(half - 20, half):
+            told.add(progress.Standing(iteration, 22_000, True), 0.05, Making(gaps, 0.0, 0.05 * gaps))
+        at = progress.Standing(half + 1, 22_000, False)
+        told.add(at, 0.1, Making(2, 0.0, 2 * slow))
+        left.append(told._targets(0.1, at))
+    visits = visited(plan.config, gaps, iterations - half - 1)
+    assert left[0] == pytest.approx((gaps - 2) * visits * 0.2 / 2)
+    assert left[1] == pytest.approx(left[0] * (10 * 0.2 + 2 * 0.4) / (12 * 0.2))
 
 
 def seconds(shown):

@@ -30,6 +30,10 @@ SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left o
 # cores, in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. A guess at the cause: of three threads on
 # two cores, a parallel loop waits for the one that shares a core.
 SLOWED = 1.6
+PIXELS_OF_FULL = 4  # times those of a frame of a coarse start
+# Weight of the time expected of a gap, in gaps. The first ones are no measure: after the coarse start of `quick` on
+# EndoNeRF pulling, two of them took 0.38 s each, and all of them 0.22 s on average.
+EXPECTED_GAPS = 10
 
 
 class Timed(NamedTuple):
@@ -49,6 +53,7 @@ class TimeLeft:
         most = max(MOST_ITERATIONS, round(REMEMBERED * plan.config.training.iterations))
         self._timed: deque[Timed] = deque(maxlen=most)
         self._coarse, self._making = False, NOTHING_MADE
+        self._expected: float | None = None  # seconds of a gap, by those of the size before
 
     def add(self, standing: Standing, seconds: float, making: Making) -> None:
         """An iteration took this time, with the work on targets since the previous one.
@@ -57,6 +62,8 @@ class TimeLeft:
         making    the work on targets of this size up to now
         """
         before = self._making if standing.coarse == self._coarse else NOTHING_MADE
+        if standing.coarse != self._coarse and self._making.gaps:
+            self._expected = PIXELS_OF_FULL * (self._making.waited + self._making.beside) / self._making.gaps
         self._coarse, self._making = standing.coarse, making
         waited, beside = making.waited - before.waited, making.beside - before.beside
         progress = standing.iteration / self._plan.config.training.iterations
@@ -79,14 +86,13 @@ class TimeLeft:
     def _targets(self, unit: float, standing: Standing) -> float:
         """Seconds that targets will add, at this size of the frames and, during a coarse start, at full size."""
         config, frames, made = self._plan.config, self._plan.frames, self._making
-        each = self._plan.alone(unit) * gap_units(frames) * self._seen(standing.coarse) / PIXELS
-        if made.gaps:
-            each = (made.waited + made.beside) / made.gaps
+        each = self._expected or self._plan.alone(unit) * gap_units(frames) * self._seen(standing.coarse) / PIXELS
+        each = (EXPECTED_GAPS * each + made.waited + made.beside) / (EXPECTED_GAPS + made.gaps)
         end = config.training.iterations
         until = min(coarse_end(config, standing), end) if standing.coarse else end
         missing = max(frames.gaps - made.gaps, 0) * visited(config, frames.gaps, until - standing.iteration)
         if standing.coarse:
-            missing += 4 * frames.gaps * visited(config, frames.gaps, end - until)
+            missing += PIXELS_OF_FULL * frames.gaps * visited(config, frames.gaps, end - until)
         return each * missing / self._plan.threads
 
     def _seen(self, coarse: bool) -> float:
