@@ -31,7 +31,8 @@ def test_one_process_at_a_time_evaluates_a_run(run, capsys):
     assert main(["evaluate", str(run), "--no-view"]) == 0  # the lock ends with its holder
 
 
-def test_the_evaluation_of_a_training_waits_for_another_one(run):
+def test_the_evaluation_of_a_training_waits_for_another_one(run, monkeypatch):
+    monkeypatch.setattr("endotsr.training.runs.folder.POLL", 0.01)  # it asks again and again, not once
     entered, other = threading.Event(), RunFolder(run)
 
     def second() -> None:
