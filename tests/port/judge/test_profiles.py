@@ -77,6 +77,7 @@ def test_a_forward_renderer_claims_its_images(golden, port):
     report = judge(golden, port, "float32", level=3)
     assert (said(report) == {"renderer-forward": 3, "renderer": 1} and not report.accepted) or report.level == 1
     assert report.claim.endswith(", reverse passes") and len(report.notes) == 1
+    assert report.notes[0].count("--profile") == 1, "the other profiles have reverse passes"
     assert (
         "level 2 asks for gradients" in report.notes[0] and "ends at 1; --profile renderer-forward" in report.notes[0]
     )

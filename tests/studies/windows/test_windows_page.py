@@ -12,7 +12,7 @@ from small_recording import FRAMES
 from endotsr.cli.main import main
 from endotsr.errors import InputError
 from endotsr.results.report.figures import bytes_image
-from endotsr.results.views.page import page
+from endotsr.results.views.page import about_frames, page
 from endotsr.studies.windows.page import window_files, write_windows_page
 from endotsr.studies.windows.scene import WindowFrames, open_windows
 
@@ -57,6 +57,12 @@ def test_the_page_holds_no_gaussian_and_each_window_stands_in_a_file(written, co
         assert number == k and data == re.search(r'id="data">(.*?)</script>', one, re.S)[1]
         assert numbers["times"][0] == pytest.approx(scene.plan.windows[k].first / FRAMES)
         assert numbers["times"][-1] == pytest.approx(scene.plan.windows[k].end / FRAMES)
+
+
+def test_the_page_numbers_the_frames_as_the_recording_does(written):
+    """Frames that a recording leaves out are no frames of the page; the others keep their numbers."""
+    record = written[0].record
+    assert about_frames(record, range(5, 5 + record.count))["frames"]["numbers"] == [*range(5, 5 + record.count)]
 
 
 def test_a_held_out_frame_is_found_in_the_file_of_its_window(written):
