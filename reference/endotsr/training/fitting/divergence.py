@@ -38,8 +38,8 @@ class Diverged(FloatingPointError):
 def not_finite(gradients: Mapping[str, FloatArray | None]) -> tuple[str, str] | None:
     """Name, index and value of the first non-finite number, as ("d_position[1, 7]", "nan"); None if there is none.
 
-    No function of a BLAS library takes part (`dot` of the squares): after a call in float64 its threads wait actively
-    for the next one on the cores of the kernels, and an iteration takes up to 1.8 times as long.
+    No function of a BLAS library takes part (`dot` of the squares): after a call its threads may wait actively for the
+    next one, on the cores of the kernels.
     """
     for name, array in gradients.items():
         if array is None or np.isfinite(array).all():
