@@ -60,7 +60,7 @@ def table(columns: Columns = MEASURED) -> str:
     about = (
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, every eighth held out; "
         f"{' or '.join(map(str, threads))} threads of {', '.join(machines)}, {max(run['date'] for run in runs)}. The "
-        "time is that of the iterations; it holds for this class of machine."
+        "time is that of the iterations on one machine; another one of this name took longer."
     )
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
 
