@@ -151,7 +151,7 @@ def test_displays_are_those_of_the_specification(file):
     known = in_specification()
     shown = displays(prose(file))
     for content, _ in shown:
-        assert content in known, f"not in the specification:\n{content}"
+        assert content in known, f"{file.name}: no page of docs/specification prints this; copy its display:\n{content}"
     announced = LINK.findall(prose(file).split("\n## ")[0])
     missing = set(announced) - {known[content] for content, _ in shown}
     assert announced and not missing, f"announced, but not displayed: {sorted(missing)}"

@@ -33,6 +33,21 @@ def files_of(body: str, part: str) -> list[str]:
     return re.findall(r"^- `([^`]+)`", text, re.MULTILINE)
 
 
+def test_every_path_in_the_text_exists():
+    """A path with a folder starts at the root; a file beside another is named without one."""
+    said = re.findall(r"`(\w[\w/]*/[\w/]+\.\w+)`", PAGE.read_text(encoding="utf-8"))
+    assert said and [path for path in said if not (ROOT / path).is_file()] == []
+
+
+def test_the_notebooks_that_print_the_objective_are_named():
+    """A new term in the display of the specification has to be added there too."""
+    display = (ROOT / "docs/specification/06_objective.md").read_text(encoding="utf-8").split("$$\n")[1].splitlines()[1]
+    printing = [f"`notebooks/{file.name}`" for file in sorted((ROOT / "notebooks").glob("*.py"))
+                if display in file.read_text(encoding="utf-8")]  # fmt: skip
+    text = PAGE.read_text(encoding="utf-8")
+    assert printing and [name for name in printing if name not in text] == []
+
+
 def test_the_changes_are_all_there():
     assert len(SECTIONS) == len(CHANGES)
     assert all(change in title for change, title in zip(CHANGES, IDS, strict=True))
