@@ -3,6 +3,9 @@
 Without a name: the list of all programs. `claims` runs `docs/pages/claims/page.py`; `claims.paper` runs
 `docs/pages/claims/paper.py`. Without words a program rewrites its parts of the pages from its record, a file of
 `docs/results`; with the word `measure` it makes the record first. `NAME measure --help` lists the options.
+
+A generated part of a page stands between marks such as `<!-- presets:whole:start -->`. With the words of a mark,
+`python docs/make.py presets:whole` prints the command that writes the part.
 """
 
 import ast
@@ -13,6 +16,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 PAGES = HERE / "pages"
+ROOM = re.compile(r'\broom="(\w+)"|\bwrite_marked\(.*, "(\w+)"\)')  # of the marks, where the file has another name
 STARTS = re.compile(r"^(PROGRAM = Program\(|def main\(words: list\[str\])", re.MULTILINE)  # `pages.store.program`
 
 
@@ -30,6 +34,15 @@ def first_line(file: Path) -> str:
     return (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").split("\n")[0]
 
 
+def writers(mark: str) -> list[str]:
+    """Programs that write the part of a mark, ROOM:PART; all programs of the room if none states the part by name."""
+    room, _, part = mark.partition(":")
+    texts = {name: file.read_text(encoding="utf-8") for name, file in programs().items()}
+    other = {name: next(filter(None, found.groups())) for name, text in texts.items() if (found := ROOM.search(text))}
+    mine = [name for name in texts if other.get(name, name.rpartition(".")[2]) == room]
+    return [name for name in mine if f'"{part}"' in texts[name]] or mine
+
+
 def main(words: list[str]) -> int:
     """Run a program, or list all. Returns: the exit code."""
     found = programs()
@@ -39,6 +52,9 @@ def main(words: list[str]) -> int:
         print("\n".join(f"    {name:{width}}  {first_line(file)}" for name, file in found.items()))
         return 0
     name, *rest = words
+    if ":" in name and (mine := writers(name)):
+        print("\n".join(f"python docs/make.py {one}" for one in mine))
+        return 0
     if name not in found:
         print(f"docs/make.py: {name!r} is not a program; use one of: {', '.join(found)}", file=sys.stderr)
         return 2

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import re
 import sys
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
@@ -30,6 +31,27 @@ def test_a_page_is_what_its_program_writes(name, page):
     about, text = PROGRAMS[name], page.read_text(encoding="utf-8")
     assert f"<!-- {about.marks}:" in text
     assert replaced(text, about.made(), page, about.marks) == text, f"run: python docs/make.py {name}"
+
+
+MARK = re.compile(r"<!-- (\w+:\w+):start -->")
+SURVEY = "programs:tables"  # written by `tests/port/programs/survey.py`
+MARKS = sorted({mark for folder in ("", "docs", "docs/guides", "docs/specification", "docs/results", "notebooks")
+                for page in (program.DOCS.parent / folder).glob("*.md")
+                for mark in MARK.findall(page.read_text(encoding="utf-8"))} - {SURVEY})  # fmt: skip
+
+
+@pytest.mark.parametrize("mark", MARKS)
+def test_the_program_of_a_mark_is_named(mark, capsys):
+    """One program, unless its parts are named as they are made; a program with a declaration writes to this room."""
+    named = make.writers(mark)
+    assert named and {PROGRAMS[name].marks for name in named if name in PROGRAMS} <= {mark.partition(":")[0]}
+    assert make.main([mark]) == 0
+    assert capsys.readouterr().out.splitlines() == [f"python docs/make.py {name}" for name in named]
+
+
+def test_the_program_of_the_table_of_whole_commands(capsys):
+    assert make.writers("presets:whole") == ["book.presets"]
+    assert make.main(["no_such_room:table"]) == 2 and "no_such_room:table" in capsys.readouterr().err
 
 
 def test_every_part_stands_on_a_page():

@@ -1,4 +1,4 @@
-"""The tables of the presets in README.md and docs/guides/which_preset.md: time, memory and quality.
+"""The tables of the presets in README.md and which_preset.md: time of trainings and whole commands, memory, quality.
 
 The records are docs/results/minutes.json (`bench.minutes`), for whole commands waiting.json (`bench.waiting`), and
 for the simulated clip those of `book.running_clip` and of `full_size`.
