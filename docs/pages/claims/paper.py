@@ -74,10 +74,11 @@ SECTIONS: dict[str, tuple[Sentence, ...]] = {
     ),
     "L: Laplacian detail": (
         Sentence("Three bands of a Laplacian pyramid of render and frame are compared by L1.", "5",
-                 ("pyramid filter", "pyramid up-sampling", "empty level"),
+                 ("filter of the Laplacian pyramid", "up-sampling of the Laplacian pyramid",
+                  "empty level of the Laplacian pyramid"),
                  "Laplacian detail improves on both residuals: PSNR"),
         Sentence("The mask propagates through the pyramid, so that no excluded pixel enters a band value.", "5",
-                 ("pyramid mask",)),
+                 ("mask of the Laplacian pyramid",)),
         Sentence("The weight of L makes its gradient a given fraction of the photometric one.", "7",
                  ("calibration", "degenerate calibration")),
     ),
