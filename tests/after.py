@@ -69,9 +69,15 @@ def git(*words: str) -> list[str]:
 
 
 def changed(revision: str | None) -> list[str]:
-    """Paths that differ from the revision, files that git does not know included; deleted files left out."""
+    """Paths that differ from the revision, files that git does not know included; deleted files left out.
+
+    With a clean tree and no revision, a line of stderr says that the last commit is examined.
+    """
     new = git("ls-files", "--others", "--exclude-standard")
-    base = revision or ("HEAD" if git("diff", "--name-only", "HEAD") or new else "HEAD~1")
+    clean = not (revision or new or git("diff", "--name-only", "HEAD"))
+    if clean:
+        print("# nothing is changed: the commands for the last commit, HEAD~1 to HEAD", file=sys.stderr)
+    base = revision or ("HEAD~1" if clean else "HEAD")
     return sorted({*git("diff", "--name-only", "--diff-filter=d", base), *new})
 
 

@@ -42,6 +42,17 @@ def test_every_path_of_the_tables_exists():
     assert not [path for path in tests | starts | programs if not (after.ROOT / path).exists()]
 
 
+@pytest.mark.parametrize(("revision", "edited", "base", "told"), [
+    (None, [], "HEAD~1", True), (None, ["README.md"], "HEAD", False), ("main", [], "main", False),
+])  # fmt: skip
+def test_a_clean_tree_is_told(revision, edited, base, told, monkeypatch, capsys):
+    """Without the line, the names of files that nobody has edited look like an error."""
+    asked = []
+    monkeypatch.setattr(after, "git", lambda *words: asked.append(words[-1]) or (edited if words[-1] == "HEAD" else []))
+    after.changed(revision)
+    assert asked[-1] == base and ("nothing is changed" in capsys.readouterr().err) == told
+
+
 def test_an_unknown_revision_is_named_in_one_line(capsys):
     with pytest.raises(SystemExit, match="2"):
         after.main(["no-such-revision"])
