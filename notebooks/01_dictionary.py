@@ -16,24 +16,24 @@
 # During a clip the light drifts, and breathing and heartbeat move the tissue. Endo-TSR describes these changes with
 # two residuals, one of the colour and one of the position of each Gaussian. Both are weighted sums of the same $2F$
 # sinusoids of time, which are called *atoms*. This chapter constructs the atoms, and then centres and scales them over
-# the training stamps. It also treats the one case in which an atom must not be scaled: an atom that is zero at every
-# stamp.
+# the training stamps. It also treats the one case in which an atom must not be scaled: an atom that is constant
+# over the stamps.
 #
 # | Symbol | Meaning | In `paper` |
 # |---|---|---|
-# | $t$ | normalised time: frame $k$ of a clip of $n$ frames has $t=k/n$ | |
+# | $t$ | normalised time: the index of a frame divided by the number of frames of the clip | |
 # | $F$ | number of frequencies | 8 |
 # | $\omega_f$ | frequency $f$, in cycles per sequence; $\omega_{\min}$, $\omega_{\max}$ are the smallest and the largest | 1 to 16 |
 # | $\phi_k(t)$ | the $2F$ *atoms*: a sine and a cosine of each frequency | 16 atoms |
 # | $\mathcal T$, $n$ | the training stamps, which are the distinct times of the training frames, and their number | |
 # | $m_k$, $\rho^{\mathrm{rms}}_k$ | mean and root mean square deviation (RMS) of atom $k$ over $\mathcal T$ | |
-# | $\bar\phi_k(t)$ | the *normalised* atoms, with mean 0 and RMS 1 over $\mathcal T$ | |
+# | $\bar\phi_k(t)$ | the *normalised* atoms, with mean 0 and RMS 1 over $\mathcal T$ unless they are dead | |
 #
 # The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
 # links.
 #
-# Each chapter prints an equation as the specification prints it, followed by its **definition** in plain NumPy. An
-# `assert` then compares the definition with the compiled function. If a sign is changed in either, the chapter stops
+# A chapter with equations prints them as the specification prints them, followed by their **definition** in plain NumPy.
+# An `assert` then compares the definition with the compiled function. If the two differ there, the chapter stops
 # with an error.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
@@ -146,7 +146,8 @@ for t in rng.uniform(0, 1, 20):
 #
 # The base colour of a Gaussian should represent its mean colour, and the colour residual should represent the
 # deviations from that mean. The atoms of the colour residual therefore have mean 0 over the training stamps
-# $\mathcal T$. They also have RMS 1, so that equal coefficients have equal RMS effect at every frequency:
+# $\mathcal T$. They also have RMS 1, so that equal coefficients contribute equally, in RMS, to the weighted sum of the
+# atoms:
 #
 # $$
 # \begin{aligned}
@@ -240,20 +241,25 @@ assert 0.07 < offset < 0.15, "about a tenth"
 # With raw atoms the mean colour shifts by about a third of a level on average. The shift is small, as is the mean of a
 # raw atom: over the 55 training stamps it is about a tenth of the deviation of that atom. With normalised atoms the
 # argument of the $\tanh$ has mean 0, so the shift that remains comes from the $\tanh$. The next section shows the case
-# in which the scale matters most.
+# in which an atom cannot be scaled.
 #
 # ## The dead atom
 #
 # Consider a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$. Between the frames
 # this atom differs from 0, but on the frames it is 0 up to rounding noise, and so is its RMS. If the noise were
 # divided by its own RMS, the atom would become a random signal of size 1, and the model would be trained on it. Such
-# an atom is called *dead*. The rule is therefore: if the RMS is below $10^{-6}$, the atom is set to 0, and so is its
+# an atom is called *dead*, and so is one with another constant value: at $t=k/16$ the cosine of 16 cycles is 1. The
+# rule is therefore: if the RMS is below $10^{-6}$, the atom is set to 0, and so is its
 # gradient.
 
 # %%
 stamps_32 = np.arange(32) / 32
 statistics_32 = atom_statistics(stamps_32, omega)
 assert np.flatnonzero(statistics_32.dead).tolist() == [F - 1]
+assert np.flatnonzero(atom_statistics(np.arange(16) / 16, omega).dead).tolist() == [
+    F - 1,
+    2 * F - 1,
+]
 print(report_atoms(stamps_32, omega))
 
 naive = np.array([np.sin(2 * np.pi * 16.0 * t) for t in stamps_32])
@@ -373,7 +379,7 @@ np.testing.assert_allclose(
 #
 # Each derived formula is checked numerically. `check_pair` compares the reverse pass with finite differences of the
 # forward pass, along random directions and for single entries. The comparison has no absolute tolerance: a gradient of
-# exactly 0 fails the check if the difference is not 0.
+# exactly 0 fails the check if the difference is larger than its error bar, however small both are.
 
 # %%
 with one_thread():
@@ -399,7 +405,8 @@ assert all(report.passed for report in reports)
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Over 21 stamps all 16 atoms are independent. Over 32 equally spaced stamps one atom is
 # dead, so at most 15 remain; a clip on the grid of the highest frequency is special, and the
-# rank is therefore reported. All other clips of 20 to 80 frames have rank 16.
+# rank is therefore reported. With every eighth frame held out, all other clips of 20 to 80
+# frames have rank 16.
 assert report_atoms(stamps, omega).rank == 16
 # The condition number: how much weaker the faintest combination is than the strongest.
 singular = np.linalg.svd(bars, compute_uv=False)

@@ -13,16 +13,16 @@
 # %% [markdown]
 # # 2. The bounded colour residual (component A)
 #
-# The light changes during a clip: the exposure drifts, and tissue becomes pale under pressure. Component A lets the
-# colour of each Gaussian follow such a change. Whatever its coefficients are, the displayed colour changes by at most
-# $\beta$. This bound limits the size of the residual. It does not limit what the residual represents, as the end of
+# Colours change during a clip: the exposure drifts, and tissue becomes pale under pressure. Component A lets the
+# colour of each Gaussian follow such a change. Whatever its coefficients are, the displayed colour differs from that
+# without A by at most $\beta$. This bound limits the size of the residual. It does not limit what the residual represents, as the end of
 # the next section shows.
 #
 # | Symbol | Meaning | Shape in the code |
 # |---|---|---|
 # | $A_{cki}$ | coefficients: colour channel $c$, atom $k$, Gaussian $i$ | (3, 2F, N) |
 # | $\bar\phi_k(t)$ | normalised atoms of {doc}`01_dictionary` | (2F,) |
-# | $\beta$ | bound of a change of displayed colour; 0.3 in `paper` | |
+# | $\beta$ | bound of the change of displayed colour by the residual; 0.3 in `paper` | |
 # | $x_{ci}(t)$ | argument of the residual | (3, N) |
 # | $\Delta h_{0,ci}(t)$ | the residual, added to the degree-0 harmonic coefficient $h_0$ | (3, N) |
 # | $Y_{00}$ | the constant spherical harmonic | |
@@ -58,7 +58,8 @@ statistics = atom_statistics(stamps, omega)
 # $Y_{00}h_0+\dots+\tfrac12$. To change the displayed colour by $\beta\tanh x$, the residual must therefore be
 # $\Delta h_0=\frac{\beta}{Y_{00}}\tanh x$.
 #
-# **(2.2) The bound.** Since $|\tanh x|\le1$, the displayed colour changes by at most $\beta$ for any coefficients.
+# **(2.2) The bound.** Since $|\tanh x|\le1$, the residual changes the displayed colour by at most $\beta$ for any
+# coefficients. Between two times the colour can therefore change by up to $2\beta$.
 #
 # <!-- definition: endotsr.definition.appearance.appearance_forward -->
 # ```python
@@ -111,8 +112,8 @@ assert contrast > 0.2 and moved > 0.2 and np.abs(frames).max() < beta
 # ## Figure: brightening explained by colour, or by motion
 #
 # A patch of tissue becomes paler and recovers, without moving. The left panel shows how component A represents the
-# event: the colour changes over time. A model without A has constant colours. It can make a pixel brighter at one time
-# by moving, turning or scaling Gaussians. The middle panel shows an example: a bright neighbour four pixels away is
+# event: the colour changes over time. A model without A has constant colour coefficients. It can make a pixel brighter at
+# one time by moving, turning or scaling Gaussians. The middle panel shows an example: a bright neighbour four pixels away is
 # shifted so that the pixel has the brightness of the patch at each time. How far do you expect it to move? In both
 # cases the image at this pixel is right, but in the second case the geometry is wrong. The paper gives colour and
 # motion separate components. (The right panel belongs to step (2.4).)
@@ -242,7 +243,7 @@ assert np.abs(start).max() > 0
 # %% [markdown]
 # ## The gradient check
 #
-# The check treats each atom as a separate block, so the fifteen other atoms cannot mask a mistake in one of them.
+# The check treats each atom as a separate block, so the other atoms cannot mask a mistake in one of them.
 
 # %%
 with one_thread():

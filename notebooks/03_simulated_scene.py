@@ -31,6 +31,7 @@ import numpy as np
 
 from endotsr.clips.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.config import InitialisationConfig, ModelConfig
+from endotsr.definition import initialisation as definition
 from endotsr.method.splatting.camera import backproject
 from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.training.scene.initialisation import Y00, gaussians_at, initialise
@@ -126,7 +127,7 @@ plt.show()
 # ## Figure: frames, true depth, true motion
 #
 # Optical flow methods estimate the flow; here it is known, also behind the instrument. The lower right panel follows
-# single points over the clip. Breathing moves all of them; the beat and the pull move only some.
+# single points over the clip. Breathing moves all of them; the beat and the pull move the points near their centres.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(10.9, 4.8), layout="constrained")
@@ -193,8 +194,8 @@ plt.show()
 #
 # Each of these frames adds `initialisation.other_frame_points` divided by the number of frames of the clip, held-out
 # frames included, and rounded down. The preset `paper` has the numbers 35 000 and 5000, and $\tau=40$ scene units. If a
-# frame has fewer candidates than that, all of them are used. In clips of more than 150 frames, the training frames at
-# an even distance from the first one are left out.
+# frame has fewer candidates than that, all of them are used. In clips of more than 150 frames, the other training frames
+# at an even distance from the first one are left out.
 #
 # <!-- definition: endotsr.definition.initialisation.drawn_pixels -->
 # ```python
@@ -227,7 +228,7 @@ plt.show()
 # $h_0=(rgb-\frac12)/Y_{00}$ with $Y_{00}=1/\sqrt{4\pi}$. The colours of a frame are its 8-bit values divided by 255.
 #
 # **(3.4) Size.** All three semi-axes are the root mean square distance to the three nearest other points, so
-# neighbours overlap and leave no holes. Two points may coincide; the floor keeps the logarithm finite:
+# near neighbours overlap. Two points may coincide; the floor keeps the logarithm finite:
 # $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. With fewer than four points the mean is over the others that exist, and a
 # single point has the floor. A sphere needs no rotation, and the quaternion starts at $(1,0,0,0)$.
 #
@@ -236,7 +237,8 @@ plt.show()
 #
 # **(3.6) Motion.** The weights of the time bases start at 0, their centres are evenly spaced from 0 to 1, and their
 # widths are `model.initial_width`, 0.01 in `paper`. With the weights 0 the scene is at rest.
-# By (4.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
+# By (4.1) the gradient with respect to the weight of a basis near the time of a frame is not 0 there, so motion can be
+# learned.
 
 
 # %% tags=["transcription"]
@@ -276,13 +278,16 @@ np.testing.assert_allclose(
     rtol=1e-13,
 )
 
-start = initialise(
-    sequence,
-    InitialisationConfig(first_frame_points=400, other_frame_points=0),
-    ModelConfig(),
-    np.random.default_rng(0),
-    np.float64,
+drawing = InitialisationConfig(
+    first_frame_points=400, other_frame_points=600, motion_threshold=1.0
 )
+start = initialise(sequence, drawing, ModelConfig(), np.random.default_rng(0), np.float64)
+assert start.opacity_logit.size > 400, "other frames add points"
+text = definition.initialise(sequence, drawing, ModelConfig(), np.random.default_rng(0))
+for name, expected in text._asdict().items():
+    if expected is not None:
+        found = getattr(start, name)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12, err_msg=name)
 np.testing.assert_allclose(
     start.log_scale, np.tile(log_scale_text(start.position), (3, 1)), rtol=1e-9, atol=1e-12
 )
@@ -308,8 +313,8 @@ assert report.passed
 # 1. Why can no Gaussian start at a pixel without prior depth? What follows for tissue under an instrument?
 # 2. Write `initialise` for given draws and let the golden cases judge it: `--only initialisation` ({doc}`index`). The
 #    case `one_point` has no neighbour from which a scale could be made.
-# 3. The cell below answers this one. Held-out frames contribute nothing to the initial Gaussians. How would you test
-#    whether that is true of a program whose source you cannot read?
+# 3. The cell below answers this one. No picture, mask or depth of a held-out frame contributes to the initial
+#    Gaussians. How would you test whether that is true of a program whose source you cannot read?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Change the held-out frames arbitrarily; the result must stay bitwise equal.

@@ -70,8 +70,8 @@ B, N = 17, 4
 # What the square changes can be computed. Take the distance at which a bell has fallen to one half as its half-width:
 # this is $(\ln2)^{1/4}\sqrt\Sigma=0.91\sqrt\Sigma$ for `quartic` and $(2\ln2)^{1/2}\sqrt\Sigma=1.18\sqrt\Sigma$ for
 # `gaussian`. A thousandth is reached at $1.62\sqrt\Sigma$ and $3.72\sqrt\Sigma$, which is 1.8 and 3.2 half-widths. For
-# the same half-width a quartic bell is flatter at its centre and ends sooner, and a frame changes the weights of fewer
-# bases. The price is the gaps of the next figure. For the same $\sigma$ the two differ much: at $\Delta=0.02$,
+# the same half-width a quartic bell is flatter at its centre and ends sooner, and fewer weights have a gradient of
+# notable size at a frame. The price is the gaps of the next figure. For the same $\sigma$ the two differ much: at $\Delta=0.02$,
 # $\sigma=0.01$ they give 0.0183 and 0.3679.
 #
 # <!-- definition: endotsr.definition.deformation.bell -->
@@ -132,7 +132,8 @@ np.testing.assert_allclose(found, [0.91, 1.18, 1.8, 3.2], rtol=0.02)
 # At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
 # with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the published width of
 # 0.01 there are times at which no basis exceeds 0.001. How many frames of a clip of 63 lie at such times: none, a few, or a
-# quarter? These frames hardly change the weights at first. Training can widen the bases later, as step (4.5) below shows.
+# quarter? These frames add little to the gradients of the weights at first. Training can widen the bases later, as step
+# (4.5) below shows.
 # The preset `sharp` starts at the width 0.05 and has no such gaps.
 
 # %% tags=["hide-input"]
@@ -244,8 +245,8 @@ for basis in ("quartic", "gaussian"):
     assert np.array_equal(np.sign(grads.d_fdm_centre)[reached], sign[reached]), "(4.5)"
 
 # %% [markdown]
-# Two things follow. While all weights are 0, the gradients with respect to centre and width are exactly 0, so only the
-# weights change in the first step. A width of exactly 0 has the gradient 0 and never changes.
+# Two things follow. While all weights are 0, the gradients with respect to centre and width are exactly 0, so of the three
+# only the weights change in the first step. A width of exactly 0 has the gradient 0, and one that starts at 0 never changes.
 
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)

@@ -13,8 +13,8 @@
 # %% [markdown]
 # # 6. Quaternions, scales and the covariance
 #
-# A few flat or long Gaussians cover a wall or a vessel better than many round ones. A Gaussian therefore has three
-# semi-axes and a rotation. A gradient step can move a stored number to any real value, so both are stored in a form
+# A flat Gaussian can cover a piece of a wall, and a long one a piece of a vessel, for which many round ones would be
+# needed. A Gaussian therefore has three semi-axes and a rotation. A gradient step can move a stored number to any real value, so both are stored in a form
 # for which every real value is valid: the rotation as a quaternion of any length, and the semi-axes as logarithms.
 #
 # | Symbol | Meaning | Shape in the code |
@@ -84,7 +84,7 @@ N = 6
 # <!-- definition: endotsr.definition.covariance.unit -->
 # ```python
 # def unit(quaternion):
-#     """q / |q| (4, N) and 1 / |q| (N,); (1, 0, 0, 0) and 0 for q = 0. The largest entry is divided out first."""
+#     """q / |q| (4, N) and 1 / |q| (N,), at most 1e20; (1, 0, 0, 0) and 0 for q = 0. The largest entry is divided out."""
 #     largest = np.abs(quaternion.real).max(axis=0, initial=0)
 #     zero = largest == 0
 #     q = np.where(zero, np.eye(4)[:, :1], quaternion / np.where(zero, 1, largest))
@@ -106,7 +106,7 @@ N = 6
 # ```python
 # def covariance_forward(quaternion, log_scale):
 #     """Equation (B2): Shape from raw quaternions (4, N) w, x, y, z and log-scales (3, N), clipped to +-40."""
-#     # The square of a scale beyond exp(44) overflows in float32; of exp(-44) it is 0.
+#     # In float32 the square of exp(44.4) overflows, and that of exp(-44) is not a normal number.
 #     scale = np.exp(np.where(np.abs(log_scale.real) > 40, np.copysign(40, log_scale.real), log_scale))
 #     return Shape(rotation_of(unit(quaternion)[0]), scale), CovarianceSaved(quaternion, log_scale)
 # ```
@@ -275,9 +275,21 @@ g_x = 2 * (
     + z * (G[0, 2] + G[2, 0])
     + w * (G[2, 1] - G[1, 2])
 )
+g_y = 2 * (
+    x * (G[0, 1] + G[1, 0])
+    - 2 * y * (G[0, 0] + G[2, 2])
+    + z * (G[1, 2] + G[2, 1])
+    + w * (G[0, 2] - G[2, 0])
+)
+g_z = 2 * (
+    x * (G[0, 2] + G[2, 0])
+    + y * (G[1, 2] + G[2, 1])
+    - 2 * z * (G[0, 0] + G[1, 1])
+    + w * (G[1, 0] - G[0, 1])
+)
 tau = np.einsum("jji->i", G)
-lacking = definition.rotation_reverse(unit, G)[:2] - np.array([g_w, g_x])
-np.testing.assert_allclose(lacking, 2 * tau * unit[:2], atol=1e-12)
+lacking = definition.rotation_reverse(unit, G) - np.array([g_w, g_x, g_y, g_z])
+np.testing.assert_allclose(lacking, 2 * tau * unit, atol=1e-12)
 
 along = np.abs((q * grads.d_quaternion).sum(axis=0)) / np.linalg.norm(
     grads.d_quaternion, axis=0
@@ -380,10 +392,10 @@ assert all(report.passed for report in reports)
 # 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (6.1), (6.2), and
 #    $\mathrm dR=[\mathrm d\theta]_\times R$ for a rotation by the small vector $\mathrm d\theta$.
 # 2. Write `covariance_reverse` from (6.3), (6.6) and (6.8) and let the golden cases judge it: `--only covariance`
-#    ({doc}`index`). Which case fails if the division by the length is omitted?
+#    ({doc}`index`). Why does every case fail if the division by the length is omitted?
 # 3. The cell below answers this one. Change the order of the axes of a Gaussian: its log-scales become $(s_2,s_3,s_1)$
 #    instead of $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many sets of parameters
-#    describe one ellipsoid?
+#    describe one ellipsoid with three different semi-axes?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1:

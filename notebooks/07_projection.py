@@ -81,8 +81,8 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 #   is $R\,\mathrm{diag}(S)^2R^\top$. The covariance on the screen is therefore $JW\,R\,\mathrm{diag}(S)^2R^\top\,(JW)^\top$,
 #   the last line with $T=JWR$.
 #
-# A Gaussian is drawn if its centre is in front of the *near plane*, which means $z>0.2$ scene units (`raster.near`).
-# Any other Gaussian contributes nothing, and its gradients are 0.
+# A Gaussian is drawn if its centre is in front of the *near plane*, which means $z>0.2$ scene units (`raster.near`), and
+# all numbers above are finite. Any other Gaussian contributes nothing, and its gradients are 0.
 #
 # Far off the axis the linear expansion grows without bound. The slope that enters $J$ is clamped for this reason, with
 # $\kappa=1.3$ in the presets `paper` and `legacy`: if the principal point is the centre of the image, the clamp begins
@@ -269,8 +269,8 @@ plt.show()
 # **(7.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (6.1), and
 # because $G_2$ is symmetric, $g_M=2\,G_2M$. The low-pass is a constant and drops out.
 #
-# **(7.3) Its factors.** The product $M_{rk}=T_{rk}S_k$ gives $g_{S_k}=\sum_rT_{rk}\,g_{M_{rk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
-# (6.2). The definition goes through $\Sigma$ and reaches the same $g_S$ and $g_R$.
+# **(7.3) Its factors.** The product $M_{jk}=T_{jk}S_k$ gives $g_{S_k}=\sum_jT_{jk}\,g_{M_{jk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
+# (6.2). The definition has $JW$ in `t`, goes through $\Sigma$ and reaches the same $g_S$ and $g_R$.
 #
 # **(7.4) The three matrices.** The product $T=JWR$ gives $\mathrm dT=\mathrm dJ\,WR+J\,\mathrm dW\,R+JW\,\mathrm dR$. A factor to the
 # left of the differential moves to the left of $g_T$, transposed; a factor to the right moves to the right:
@@ -278,7 +278,7 @@ plt.show()
 #
 # $$
 # \begin{aligned}
-# g_M&=2\,G_2\,M,\qquad g_{S_k}=\sum_r T_{rk}\,g_{M_{rk}},\qquad g_T=g_M\,\mathrm{diag}(S),\\
+# g_M&=2\,G_2\,M,\qquad g_{S_k}=\sum_j T_{jk}\,g_{M_{jk}},\qquad g_T=g_M\,\mathrm{diag}(S),\\
 # g_J&=g_T\,(WR)^\top,\qquad g_R=(JW)^\top g_T .
 # \end{aligned}
 # $$
@@ -465,13 +465,13 @@ for name in ("position", "rotation", "scale"):
 # $$
 # \begin{aligned}
 # E&=I+\alpha\,[\boldsymbol\omega]_\times+\beta\,[\boldsymbol\omega]_\times^2,\qquad
-# \alpha=\frac{\sin r}{r},\quad\beta=\frac{1-\cos r}{r^2},\\
+# \alpha=\frac{\sin\vartheta}{\vartheta},\quad\beta=\frac{1-\cos\vartheta}{\vartheta^2},\\
 # W'&=E\,W,\qquad\mathbf d'=E\,\mathbf d+\boldsymbol\tau .
 # \end{aligned}
 # $$
 #
 # A pose that was measured or estimated has small errors, and training can correct them. The correction of one view has
-# six numbers: a rotation vector $\boldsymbol\omega$, whose direction is the axis and whose length $r$ is the angle,
+# six numbers: a rotation vector $\boldsymbol\omega$, whose direction is the axis and whose length $\vartheta$ is the angle,
 # and an offset $\boldsymbol\tau$. The matrix $[\boldsymbol\omega]_\times$ is the one with $[\boldsymbol\omega]_\times\mathbf
 # p=\boldsymbol\omega\times\mathbf p$, and $E$ is its exponential, a rotation. The view is rendered with $W'$ and
 # $\mathbf d'$, and the projection above returns the gradients with respect to them.
@@ -482,9 +482,9 @@ for name in ("position", "rotation", "scale"):
 #
 # **(7.13) The closed form.** Let $K=[\boldsymbol\omega]_\times$, so $E=I+\alpha K+\beta K^2$. Every entry of $E$
 # depends on $\omega_i$ in two ways. The first is $K$ itself, with $\partial K/\partial\omega_i=[\mathbf e_i]_\times$.
-# The second is $r$ in the two factors: $\partial r/\partial\omega_i=\omega_i/r$, and their derivatives with respect to
-# $\omega_i$ are $\omega_i\alpha'$ and $\omega_i\beta'$ with $\alpha'=(\cos r-\alpha)/r^2$ and
-# $\beta'=(\alpha-2\beta)/r^2$. The compiled function sums these parts:
+# The second is $\vartheta$ in the two factors: $\partial\vartheta/\partial\omega_i=\omega_i/\vartheta$, and their derivatives with respect to
+# $\omega_i$ are $\omega_i\alpha'$ and $\omega_i\beta'$ with $\alpha'=(\cos\vartheta-\alpha)/\vartheta^2$ and
+# $\beta'=(\alpha-2\beta)/\vartheta^2$. The compiled function sums these parts:
 # $g_{\omega_i}=\langle\alpha G+\beta(GK^\top+K^\top G),[\mathbf e_i]_\times\rangle+\omega_i\langle G,\alpha'K+\beta'K^2\rangle$.
 #
 # **(7.14) The definition** needs no derivative of a series. The exponential of the block matrix
@@ -540,11 +540,11 @@ for array, text in zip(
     np.testing.assert_allclose(array, text, rtol=1e-11)
 
 # (7.13), written out
-K, r = pose_definition.CROSS @ omega, np.linalg.norm(omega)
-alpha, beta = np.sin(r) / r, (1 - np.cos(r)) / r**2
+K, angle = pose_definition.CROSS @ omega, np.linalg.norm(omega)
+alpha, beta = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
 G = g_W @ W.T + np.outer(g_d, d)
 inner = alpha * G + beta * (G @ K.T + K.T @ G)
-factors = (np.cos(r) - alpha) / r**2 * K + (alpha - 2 * beta) / r**2 * K @ K
+factors = (np.cos(angle) - alpha) / angle**2 * K + (alpha - 2 * beta) / angle**2 * K @ K
 closed = np.einsum("ij,ijk->k", inner, pose_definition.CROSS) + omega * (G * factors).sum()
 np.testing.assert_allclose(pose_reverse(g_W, g_d, saved_pose)[2], closed, rtol=1e-11)
 

@@ -195,7 +195,7 @@ np.testing.assert_allclose(opposite, sign * definition.basis(around, 16), atol=1
 # has the slope 0, so the sum begins at $k=1$.
 #
 # **(8.4) The slope of a monomial.** With $x,y,z$ taken as independent,
-# $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$. The resulting gradient also has a component along $\mathbf n$,
+# $\partial(x^py^qz^r)/\partial x=p\,x^{p-1}y^qz^r$. The resulting gradient also has a component along $\mathbf n$,
 # which (8.5) removes.
 #
 # **(8.5) The normalisation.** From $\mathbf n=\mathbf v/\|\mathbf v\|$ follows

@@ -260,7 +260,8 @@ for panel in axes.flat:
 plt.show()
 
 # %% [markdown]
-# The strongest detail is the edge of the instrument, and a loss on these bands would make the render reproduce it.
+# The strongest detail is the edge of the instrument. A loss that compares the bands of an unmasked render with these bands
+# would make the render reproduce it.
 
 # %% [markdown]
 # ## The reverse pass, line by line
@@ -347,8 +348,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. A render is brighter than the frame by the same amount everywhere. In which bands do the two differ? Which
-#    component of the model, and which other loss, corrects such an error?
+# 1. A render is brighter than the frame by the same amount everywhere. In which bands do valid values of the two differ?
+#    Which other losses show such an error, and which parameters of the model can correct it?
 # 2. Write the pair of {eq}`eq-5`, and let the golden cases judge it: `--only laplacian` ({doc}`index`). A pyramid that
 #    reads the instrument and multiplies by the mask afterwards fails the case `not_finite_under_mask`.
 # 3. The cell below answers this one. A single pixel in the middle of a large image is excluded. How many values of
@@ -356,9 +357,9 @@ assert all(report.passed for report in reports)
 #    or odd?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. In band 1 an even pixel is read by more coarse samples than an odd one: it costs 49
-# values, an odd one 25. In bands 2 and 3 the parity does not decide: the even pixels 64 and 66
-# cost 49 and 81 values of each. There the position modulo 4 and modulo 8 counts.
+# Answer. On the diagonal, an even pixel is read by more coarse samples of band 1 than an odd one:
+# it costs 49 values, an odd one 25. In bands 2 and 3 the parity does not decide: the even pixels
+# 64 and 66 cost 49 and 81 values of each. There the position modulo 4 and modulo 8 counts.
 costs = {}
 for at in range(64, 73):
     hole = np.ones((161, 161), bool)

@@ -115,7 +115,7 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # <!-- definition: endotsr.definition.calibration.calibrate -->
 # ```python
 # def calibrate(views, gradient_ratio):
-#     """Equation (7): from (name, g_rgb, g_lap) of every view; a view without a finite ratio is dropped.
+#     """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or without finite numbers is dropped.
 #
 #     Raises: ValueError if no view remains or the median is 0.
 #     """

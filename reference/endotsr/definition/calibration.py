@@ -18,7 +18,7 @@ def calibration_views(n_train, count):
 
 
 def calibrate(views, gradient_ratio):
-    """Equation (7): from (name, g_rgb, g_lap) of every view; a view without a finite ratio is dropped.
+    """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or without finite numbers is dropped.
 
     Raises: ValueError if no view remains or the median is 0.
     """

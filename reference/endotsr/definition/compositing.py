@@ -43,7 +43,7 @@ def reach_ellipse(projected, opacity_logit, settings, at, axis):
 
 
 def reach_tiles(projected, opacity_logit, settings, at, axis):
-    """Preset `legacy`: the tiles of 16 px that a square of three standard deviations of the longer axis meets."""
+    """Preset `legacy`: tiles of 16 px around a square of three standard deviations of the longer axis, as in CUDA."""
     centre = projected.mean2d[axis].real
     middle = (projected.covariance2d[0] + projected.covariance2d[2]).real / 2
     longest = middle + np.sqrt(np.maximum(0.1, middle**2 - projected.determinant.real))
@@ -104,7 +104,7 @@ def composite_forward(projected, opacity_logit, colour, settings, background, wi
 
 
 def composite_reverse(d_colour, d_depth, d_opacity, saved):
-    """Reverse of (B5) from images: the recursion R_k, back to front, then d(-q/2)/dSigma = Q d d^T Q / 2."""
+    """Reverse of (B5) from images: the recursion R_k, back to front, then d(-q/2)/dSigma, Sigma on the screen."""
     projected, logit, colour, settings, background, layers, t = saved
     out = CompositeGrads._make(np.zeros((*n, logit.size), t.dtype) for n in ((2,), (3,), (), (3,), (), ()))
     rest = (background[:, None, None] * d_colour).sum(axis=0)  # <g, R>: colour, depth and opacity behind the layer
@@ -113,7 +113,7 @@ def composite_reverse(d_colour, d_depth, d_opacity, saved):
         passes = taken & ~(value > settings.alpha_max)  # ruling "alpha clamp": gradient 0 where it is active
         power = np.where(passes, value * front * (own - rest), 0)  # by -q/2; (9.3), (9.6)
         (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
-        px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d; (9.7)
+        px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Sigma^-1 d; (9.7)
         out.d_mean2d[:, i] = (power * px).sum(), (power * py).sum()
         out.d_covariance2d[:, i] = np.array([power * px**2 / 2, power * px * py, power * py**2 / 2]).sum((1, 2))
         out.d_opacity_logit[i] = power.sum() * opacity_of(-logit[i])

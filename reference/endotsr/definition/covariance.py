@@ -14,7 +14,7 @@ CovarianceGrads = namedtuple("CovarianceGrads", "d_quaternion d_log_scale")
 
 
 def unit(quaternion):
-    """q / |q| (4, N) and 1 / |q| (N,); (1, 0, 0, 0) and 0 for q = 0. The largest entry is divided out first."""
+    """q / |q| (4, N) and 1 / |q| (N,), at most 1e20; (1, 0, 0, 0) and 0 for q = 0. The largest entry is divided out."""
     largest = np.abs(quaternion.real).max(axis=0, initial=0)
     zero = largest == 0
     q = np.where(zero, np.eye(4)[:, :1], quaternion / np.where(zero, 1, largest))
@@ -43,7 +43,7 @@ def rotation_reverse(q, g):
 
 def covariance_forward(quaternion, log_scale):
     """Equation (B2): Shape from raw quaternions (4, N) w, x, y, z and log-scales (3, N), clipped to +-40."""
-    # The square of a scale beyond exp(44) overflows in float32; of exp(-44) it is 0.
+    # In float32 the square of exp(44.4) overflows, and that of exp(-44) is not a normal number.
     scale = np.exp(np.where(np.abs(log_scale.real) > 40, np.copysign(40, log_scale.real), log_scale))
     return Shape(rotation_of(unit(quaternion)[0]), scale), CovarianceSaved(quaternion, log_scale)
 

@@ -46,5 +46,5 @@ def masked_ssim_forward(rendered, target):
 def masked_ssim_reverse(d_ssim, saved):
     """Reverse of (B7): d_rendered (C, H, W). The window is symmetric, so it is its own adjoint."""
     x, _, slopes, (y, mask, count) = saved
-    p, p_xx, p_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
-    return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)  # (11.7)
+    u, u_xx, u_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
+    return np.where(mask, u + 2 * x * u_xx + y * u_xy, 0)  # (11.7)

@@ -59,7 +59,7 @@ def statistics_active(iteration, config):
 
 
 def densifications_left(iteration, config):
-    """Equation (B11): runs of density control from this iteration on, at least 1."""
+    """Equation (B11): runs of density control that are left, in an iteration that has one; at least 1."""
     d = config.density
     return max(1, (d.until - 1) // d.interval - (iteration - 1) // d.interval)
 

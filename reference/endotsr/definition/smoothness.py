@@ -16,7 +16,7 @@ def steps_reverse(d_steps, axis):
 
 
 def squared_steps(depth, smooth):
-    """Q and its derivative (H, W): squared differences of neighbours that are both smooth, over their number."""
+    """Q and its derivative (H, W): squared differences of smooth neighbours, over the number of smooth pixels."""
     total = 0.0
     gradient = np.zeros_like(depth)
     number = smooth.sum() + 1e-6
@@ -41,7 +41,7 @@ def total_variation(image, mask):
 
 
 def smoothness_forward(rendered_depth, rendered, mask, edges, total_variation_factor):
-    """Equation (B9): a squared depth, a depth and a colour; the depth (H, W) is not smoothed across `edges` (H, W)."""
+    """Equation (B9): squared steps of the depth (H, W), none to a pixel of `edges` (H, W), and two total variations."""
     loss = squared_steps(rendered_depth, mask & ~edges)[0]
     if total_variation_factor:
         variation = total_variation(rendered_depth[None], mask)[0] + total_variation(rendered, mask)[0]

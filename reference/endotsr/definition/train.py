@@ -18,7 +18,7 @@ from endotsr.definition.scene import arrays, scene_at, spectral_from
 from endotsr.definition.settings import PAPER
 from endotsr.definition.view import view_gradients
 
-State = namedtuple("State", "gaussians adam statistics iteration exposures")  # all that changes between iterations
+State = namedtuple("State", "gaussians adam statistics iteration exposures")  # what an iteration changes
 
 
 def start(gaussians, exposures=None):

@@ -188,8 +188,8 @@ def log_sigmoid(dtype):
     "A Gaussian at the camera centre",
     naive="`direction = v / norm(v)`",
     bound=8,
-    why="The viewing direction is 0/0, and the NaN reaches the colour and every pixel. This occurs with a camera at "
-    "the origin and a centre initialised at 0. Without a direction only degree 0 remains, here 0.7.",
+    why="The viewing direction is 0/0, and the NaN reaches the colour and every pixel of the Gaussian. This occurs "
+    "with a camera at the origin and a centre initialised at 0. Without a direction only degree 0 remains, here 0.7.",
 )
 def at_the_camera(dtype):
     h = np.full((4, 3, 1), 0.2 / Y00, dtype)

@@ -117,8 +117,8 @@ def under_the_mask(dtype):
     naive="`mean(x*x) - mean(x)**2`",
     bound=1000,
     why="In float32 the variance of a wall lit at 0.95 is a difference of numbers near 0.9. Its error can be as large "
-    "as the variance itself, and the result can be negative. Using the sum and the difference of the images subtracts "
-    "no moments.",
+    "as the variance itself, and the result can be negative. Moments of the sum and of the difference of the images, "
+    "about the centre of the window, have no large terms to subtract.",
 )
 def similarity(dtype):
     rng = np.random.default_rng(3)

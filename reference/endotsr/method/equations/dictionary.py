@@ -194,8 +194,8 @@ def normalised_atoms(t: float, omega: FloatArray, statistics: AtomStatistics) ->
 def report_atoms(times: FloatArray, omega: FloatArray) -> AtomReport:
     """Rank and condition of the normalised dictionary over the training stamps, and its dead and weak atoms.
 
-    If the rank is below 2F, the stamps do not determine all coefficients: there are too few frames, or their
-    spacing aliases the highest frequency.
+    If the rank is below 2F, the stamps do not determine all coefficients. There are too few frames, for example, or
+    their spacing aliases one frequency to another or to a constant.
     """
     statistics = atom_statistics(times, omega)
     gain = np.where(statistics.dead, 0.0, 1.0 / np.where(statistics.dead, 1.0, statistics.rms))

@@ -10,8 +10,9 @@ Written with the difference e = x - y and the sum s = x + y, the same quantity i
                   Q = 1 - sigma_e^2 / B2, B2 = (sigma_s^2 + sigma_e^2) / 2 + C2
 
 because B1 - A1 = (mu_x - mu_y)^2 and B2 - A2 is the variance of x - y (A1, A2 the factors of the numerator). This form
-needs no covariance. For x = y it is exactly 1 with an exactly zero gradient. It is bitwise symmetric in x and y, and
-1 - SSIM has full relative precision. No moments of the target are needed: only the masked target is cached.
+needs no covariance. For x = y it is exactly 1 with an exactly zero gradient. It is bitwise symmetric in x and y. For
+x, y >= 0, 1 - SSIM = (1 - P) + P (1 - Q) has no negative term and keeps full relative precision. No moments of the
+target are needed: only the masked target is cached.
 
 Variances are sums of squares about the window's central value c,  sigma^2 = sum w (x - c)^2 - (sum w (x - c))^2,
 first down columns, then along rows (variance of a mixture = mean of variances + variance of means). The central

@@ -45,7 +45,7 @@ def smoothness_forward(
     edges: BoolArray,
     total_variation_factor: float,
 ) -> tuple[float, SmoothnessSaved]:
-    """Smoothness loss (B9), the sum of a squared depth, a depth and a colour; see the module docstring.
+    """Smoothness loss (B9), squared steps of the depth and two total variations; see the module docstring.
 
     rendered_depth          (H, W)     scene units, as rendered
     rendered                (C, H, W)  display units, not clamped

@@ -50,7 +50,7 @@ class CovarianceGrads(NamedTuple):
 
 @jit_formula
 def unit_quaternion(w, x, y, z):
-    """The normalised quaternion and 1/norm; (1, 0, 0, 0) and 0 for the zero quaternion.
+    """The normalised quaternion and 1/norm, at most 1e20; (1, 0, 0, 0) and 0 for the zero quaternion.
 
     The largest entry is divided out first, so the squares do not overflow or underflow for norms of 1e-300 to 1e300.
     """

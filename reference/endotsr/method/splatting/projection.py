@@ -2,8 +2,8 @@
 
 With T = J W R (J the Jacobian of the projection at the centre, W the camera rotation) and S the semi-axes,
 the screen covariance is (T S)(T S)^T + low_pass I = [[a, b], [b, c]]. Its determinant is computed as a sum of
-non-negative terms, low_pass^2 + low_pass |T S|^2 + sum_{k<l} (s_k s_l (t_k x t_l))^2, because a c - b^2 loses
-every digit for a needle seen at an angle.
+non-negative terms, low_pass^2 + low_pass |T S|^2 + sum_{k<l} (s_k s_l (t_k x t_l))^2, because a c - b^2 can
+lose every digit for a needle seen at an angle.
 """
 
 from typing import NamedTuple

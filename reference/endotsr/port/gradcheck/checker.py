@@ -1,8 +1,8 @@
 """The gradient checker: whether a reverse pass is the derivative of its forward pass, for registered pairs and ports.
 
-The rule is relative, without an absolute floor: |fd - an| <= rtol |an| + error bar of fd. A zero gradient with a
-non-zero difference fails at any magnitude. A probe counts only if it rejects the gradient scaled by 1 + control;
-otherwise it is unresolved.
+The rule is relative, without an absolute floor: |fd - an| <= rtol |an| + error bar of fd. A zero gradient fails beside
+a difference larger than its error bar, at any magnitude. A probe counts only if it rejects the gradient scaled by
+1 + control; otherwise it is unresolved.
 """
 
 import time

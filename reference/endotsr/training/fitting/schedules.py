@@ -119,7 +119,7 @@ def statistics_active(iteration: int, config: Config) -> bool:
 
 
 def densifications_left(iteration: int, config: Config) -> int:
-    """Number of densifications from this iteration to the last one, both included; at least 1."""
+    """Number of densifications from this one, at which density control runs, to the last, both included; at least 1."""
     density = config.density
     last = (density.until - 1) // density.interval
     return max(1, last - (iteration - 1) // density.interval)
