@@ -59,7 +59,7 @@ statistics = atom_statistics(stamps, omega)
 # $\Delta h_0=\frac{\beta}{Y_{00}}\tanh x$.
 #
 # **(2.2) The bound.** Since $|\tanh x|\le1$, the residual changes the displayed colour by at most $\beta$ for any
-# coefficients. Between two times the colour can therefore change by up to $2\beta$.
+# coefficients. From one time to another the colour can therefore change by up to $2\beta$.
 #
 # <!-- definition: endotsr.definition.appearance.appearance_forward -->
 # ```python

@@ -43,7 +43,7 @@ def rotation_reverse(q, g):
 
 def covariance_forward(quaternion, log_scale):
     """Equation (B2): Shape from raw quaternions (4, N) w, x, y, z and log-scales (3, N), clipped to +-40."""
-    # In float32 the square of exp(44.4) overflows, and that of exp(-44) is not a normal number.
+    # In float32 the square of e^44.4 overflows, and that of e^-44 is not a normal number.
     scale = np.exp(np.where(np.abs(log_scale.real) > 40, np.copysign(40, log_scale.real), log_scale))
     return Shape(rotation_of(unit(quaternion)[0]), scale), CovarianceSaved(quaternion, log_scale)
 

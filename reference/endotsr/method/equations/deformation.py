@@ -8,8 +8,8 @@ Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the lo
 `scene_at`). In: three arrays (10, B, N) and one time. Out: ten offsets per Gaussian.
 
 These arrays are 510 of about 670 numbers per Gaussian, so the passes are memory-bound. Each (channel, basis) row is
-streamed once, in pieces that fit in the second-level cache. Basis values below 2^-60 are 0, so most bases do not reach
-a given time. A stretch of Gaussians without a basis that does is skipped before its exponentials are computed.
+streamed once, in pieces that fit in the second-level cache. Basis values below 2^-60 are 0, so a narrow basis does
+not reach most times. A stretch of Gaussians whose bases do not reach t is skipped before its exponentials are computed.
 """
 
 from typing import Literal, NamedTuple
@@ -62,7 +62,7 @@ def deformation_forward(
     fdm_weight  (10, B, N)  w; position, quaternion or log-scale units by channel
     fdm_centre  (10, B, N)  theta, normalised time
     fdm_width   (10, B, N)  sigma, normalised time, any sign (only its square counts)
-    t           normalised time; outside [0, 1] the model fades to the canonical pose
+    t           normalised time; far from all centres the model fades to the canonical pose
     returns     (10, N) offsets in the dtype of the input, and the saved tuple
 
     Reverse: `deformation_reverse`.

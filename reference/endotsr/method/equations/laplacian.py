@@ -1,6 +1,6 @@
 """Equation (5): the mask-propagating Laplacian loss of component L.
 
-In: the rendered and the observed image, planar (3, H, W), display units [0, 1], and the tissue mask (H, W), True =
+In: the rendered image, not clamped, and the observed one in [0, 1], planar (3, H, W); the tissue mask (H, W), True =
 tissue. Out: a scalar in display units, and its derivative with respect to the rendered image.
 
     G_0 = image, G_j = reduce(G_{j-1}), P_j = G_{j-1} - expand(G_j), j = 1 ... 3

@@ -130,7 +130,7 @@ def registration_forward(
 
     Reverse: registration_reverse, below.
     Edges:   a point that is not seen has residual 0: z <= 0, a projection less than one pixel from the centre of a
-             pixel at the left or upper edge, or less than two from one at the right or lower edge.
+             pixel at the left or upper edge, or at most one from one at the right or lower edge.
     Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.registration`
     """
