@@ -367,7 +367,7 @@ assert held[1] > 0 > held[4] and held[6] > held[4], "not monotonic in the rate"
 # ## Exercise
 #
 # 1. In the clip with light alone the true motion is zero. Which two numbers of the table show that A explains the light
-#    without false motion? Which number would show that a model paints?
+#    without false motion? Which numbers would show that a model paints motion?
 # 2. Come back after chapter 11. Write the objective {eq}`eq-6` of one view with its gradients, and let the golden cases
 #    judge it: `--only objective` ({doc}`index`). The case `components_off` has neither A, S nor L.
 # 3. The cell below answers this one. Render the model of the motion clip that was trained with A, but without A in the

@@ -136,7 +136,8 @@ def view_gradients(
     pose      correction of the pose of `camera`, equation (B16); None = none
     raster    None = that of `config`;  degree   active harmonic degree, None = the model's
 
-    Edges:  a term of weight 0 is not evaluated; a component without arrays gets no gradient.
+    Edges:  a term of weight 0 is not evaluated, but for L1 and the Matern penalty; a component without arrays gets no
+            gradient.
     Oracle: central differences (`endotsr gradcheck objective`), golden family `objective`.
     """
     found = view_pass(
