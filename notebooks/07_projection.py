@@ -349,7 +349,7 @@ plt.show()
 # **(7.11) The pose.** The same point also gives the gradient with respect to $\mathbf d$, and the
 # second part of the one with respect to $W$; the first part is that of (7.4). Both are sums over all Gaussians.
 # The centre of the camera is $\mathbf o=-W^\top\mathbf d$. Its gradient $g_{\mathbf o}$ comes from the viewing
-# directions of {doc}`08_harmonics` and is added there.
+# directions of {doc}`08_harmonics`, and the reverse pass of the render adds the terms that contain it.
 #
 # $$
 # \begin{aligned}
