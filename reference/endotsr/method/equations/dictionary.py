@@ -72,7 +72,7 @@ def frequencies(count: int, low: float, high: float, dtype: DTypeLike = np.float
     count    F >= 1; F = 1 gives `low`
     low      lowest frequency, cycles per unit of normalised time, > 0
     high     highest frequency, >= low
-    returns  (F,)  omega[0] == low and omega[-1] == high to the last bit
+    returns  (F,)  omega[0] == low and, for F > 1, omega[-1] == high to the last bit
     Raises:  ValueError for a count below 1, frequencies that are not finite and positive, or low > high.
     Oracle:  the powers 16^(k/7) in extended precision.
     """

@@ -112,7 +112,7 @@ def _logarithm_float64(x):
 def exponential(x):
     """e^x for a scalar, float32 or float64; inlined when called from a kernel.
 
-    returns  e^x in the dtype of x. float32: within 0.502 of the last place, 0 below -104, infinite above 88.72
+    returns  e^x in the dtype of x. float32: within 0.502 of the last place, 0 below -104, infinite above 88.723
     Reverse: e^x, written out where it is used.
     Oracle:  numpy.exp in float64; bitwise, expf of glibc.
     """
