@@ -180,10 +180,10 @@ _fill_kernel = jit(_fill_lists)
 def screen_boxes(
     projected: Projected, log_opacity: FloatArray, settings: RasterSettings, width: int, height: int
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Pixel boxes (N, 4) x0, x1, y0, y1 inclusive, and which Gaussians reach at least one pixel box (N,).
+    """Pixel boxes (N, 4) x0, x1, y0, y1 inclusive, and whose box contains a pixel of the image (N,).
 
     log_opacity  (N,) natural log of the opacity
-    Edges:       without an alpha cutoff the ellipse is unbounded: every Gaussian reaches every pixel
+    Edges:       without an alpha cutoff the ellipse is unbounded: every visible Gaussian reaches every pixel
     """
     support = settings.support if settings.alpha_cutoff > 0 or settings.support != "ellipse" else "everywhere"
     box = np.zeros((projected.depth.size, 4), np.int32)

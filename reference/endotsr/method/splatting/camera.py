@@ -71,7 +71,7 @@ def project(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray,
 def backproject(camera: Camera, column: FloatArray, row: FloatArray, depth: FloatArray) -> FloatArray:
     """World positions of pixel centres at view depth `depth` (z > 0, scene units).
 
-    column, row   (M,) integer pixel indices
+    column, row   (M,) pixel indices, of whole pixels or between them
     returns       (3, M)
     """
     x = (column + 0.5 - camera.cx) / camera.fx * depth

@@ -76,7 +76,7 @@ class RenderGrads(NamedTuple):
     d_harmonics: FloatArray
     d_residual: FloatArray | None
     d_mean2d: FloatArray  # (2, N) dL/d(u, v) per px, for density control
-    visible: NDArray[np.bool_]  # (N,) reached at least one pixel box
+    visible: NDArray[np.bool_]  # (N,) the box contains a pixel of the image
     d_background: FloatArray | None
     d_camera: CameraGrads | None
 
