@@ -55,6 +55,7 @@ def run(words: list[str]) -> int:
     from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.sequence_file import MASKS
     from endotsr.clips.sequences.source_options import SourceOptions
+    from endotsr.training.runs.files import refuse_folder, refuse_read_only
     from endotsr.untrusted.writing import refuse_existing
 
     if options.margin < 0:
@@ -64,10 +65,12 @@ def run(words: list[str]) -> int:
     said: list[str] = []
     propose = None if options.keys is None else from_keys(options.keys, options.margin, said)
     if options.out is None:
+        refuse_read_only(options.sequence)
         proposal, place = enter_masks(options.sequence, options.replace, propose), options.sequence
     else:
         if not options.replace:
             refuse_existing(options.out)  # before the motion of the clip is computed
+        refuse_folder(options.out)
         clip = describe(options.sequence, SourceOptions(layout=options.layout))
         proposal, place = write_proposal(clip, options.out, propose, options.replace), options.out
     fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)

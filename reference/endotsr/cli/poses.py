@@ -49,8 +49,10 @@ class PosesOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(PosesOptions, words, "poses")
+    from endotsr.training.runs.files import refuse_read_only
     from endotsr.untrusted.writing import replace_text
 
+    refuse_read_only(options.sequence)
     written, lines, page = _structure(options) if options.sfm else _estimate(options)
     for line in lines:
         print(line)

@@ -4,6 +4,7 @@ In: a path, and a function or block that writes. Out: the file or folder, in pla
 """
 
 import contextlib
+import errno
 import glob
 import os
 import secrets
@@ -17,6 +18,8 @@ from endotsr.untrusted.names import plain_line
 
 OF_SYSTEMS = ("thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir")  # written by systems into folders of pictures
 MOST_NAMED = 5
+FULL = (errno.ENOSPC, errno.EDQUOT)  # errors of a full disk
+LINK = "is a link; allowed: a folder, or a name that is free"
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
@@ -31,8 +34,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     except BaseException as error:
         with contextlib.suppress(OSError):  # a missing parent, or one that is not a folder
             temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
-            error.filename = str(path)
+        _name(error, temporary, path)
         raise
 
 
@@ -42,30 +44,54 @@ def replace_text(path: Path, text: str) -> None:
 
 
 @contextlib.contextmanager
-def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
+def replacing_folder(path: Path, *, replace: bool = True, then: Callable[[], object] = lambda: None) -> Iterator[Path]:
     """A temporary folder next to `path`. It is renamed to `path` after the block, or removed if the block fails.
 
     replace   False: InputError is raised if a folder has appeared at `path` in the meantime; that folder is kept
+    then      called after the renaming, to write what describes the new folder; if it fails or is interrupted, the old
+              folder is put back
 
-    The old folder is deleted only after the new one has been renamed.
+    The old folder is deleted only after all this. Errors name `path` instead of the temporary folder.
     """
     if path.is_symlink():
-        raise InputError(f"{path}: is a link; allowed: a folder, or a name that is free")
-    temporary, old = _beside(path), _beside(path)
-    temporary.mkdir()
+        raise InputError(f"{path}: {LINK}")
+    temporary, old, placed = _beside(path), _beside(path), False
     try:
+        temporary.mkdir()
         yield temporary
         if not replace and os.path.lexists(path):
             raise InputError(f"{path}: exists already; choose another --out")
         if path.exists():
             rename(path, old)
         rename(temporary, path)
-    except BaseException:
-        if old.exists() and not path.exists():
-            rename(old, path)
+        placed = True
+        then()
+    except BaseException as error:
+        if placed or old.exists():
+            _put_back(path, temporary, old)
         shutil.rmtree(temporary, ignore_errors=True)
+        _name(error, temporary, path)
         raise
     shutil.rmtree(old, ignore_errors=True)
+
+
+def _put_back(path: Path, temporary: Path, old: Path) -> None:
+    """Undo the renamings of `replacing_folder`."""
+    if path.exists():
+        rename(path, temporary)
+    if old.exists():
+        rename(old, path)
+
+
+def _name(error: BaseException, temporary: Path, path: Path) -> None:
+    """Let an error name a file or folder as the user knows it, and not the temporary one that took its place."""
+    if isinstance(error, InputError):
+        error.args = tuple(str(part).replace(str(temporary), str(path)) for part in error.args)
+    elif isinstance(error, OSError):
+        if error.filename is None and error.errno in FULL:  # of writing to an open file
+            error.filename = str(path)
+        elif isinstance(error.filename, str | Path):
+            error.filename = str(error.filename).replace(str(temporary), str(path))
 
 
 @contextlib.contextmanager
@@ -117,6 +143,8 @@ def leftover_notes(path: Path) -> list[str]:
 
 def refuse_existing(path: Path) -> None:
     """Raises InputError if the path exists, unless it is an empty folder, which is removed."""
+    if path.is_symlink():
+        raise InputError(f"{path}: {LINK}")
     if path.is_dir() and not any(path.iterdir()):
         path.rmdir()
     if os.path.lexists(path):

@@ -177,11 +177,14 @@ def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = N
         proposal = proposal._replace(excluded=united, reason=f"{proposal.reason}; united with the mask of all frames")
     if not proposal.found:
         return proposal
-    with replacing_folder(folder / MASKS) as place:
-        _write_masks(place, clip.names, proposal)
     entry = MaskEntry(proposed=True, origin=origin_of(proposal, static))
-    found = msgspec.structs.replace(read_sequence_file(folder), masks=entry)
-    replace_text(folder / FILE_NAME, sequence_text(found))
+
+    def record() -> None:
+        found = msgspec.structs.replace(read_sequence_file(folder), masks=entry)
+        replace_text(folder / FILE_NAME, sequence_text(found))
+
+    with replacing_folder(folder / MASKS, then=record) as place:
+        _write_masks(place, clip.names, proposal)
     write_png(folder / OVERLAY, overlays(clip, proposal))
     return proposal
 

@@ -192,7 +192,13 @@ def write_depth(
     if (file.depth or (folder / DEPTH).exists()) and not replace:
         raise InputError(f"{folder}: has depth already; allowed: --replace")
     coverage, medians, step, clipped = [], [], 0.0, 0
-    with replacing_folder(folder / DEPTH) as place:
+
+    def record() -> None:
+        nonlocal file
+        file = _with_entry(folder, clip, made, step)
+        replace_text(folder / FILE_NAME, sequence_text(file))
+
+    with replacing_folder(folder / DEPTH, then=record) as place:
         for k, depth in enumerate(made.frames):
             known = depth[depth > 0]
             if known.size:
@@ -203,15 +209,18 @@ def write_depth(
             on_frame(k + 1, len(names))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
-    unit = ARBITRARY if made.assumed or (file.arbitrary and not _only_assumed(clip)) else "mm"
-    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
-    found = msgspec.structs.replace(
-        file, depth=entry, unit=unit if (unit == ARBITRARY) != file.arbitrary else file.unit
-    )
-    replace_text(folder / FILE_NAME, sequence_text(found))
     lost = f"{clipped} pixels are clipped at {65535 * step:g}, eight times the usual depth of the first frame"
     notes = [made.note] * bool(made.note) + [lost] * bool(clipped)
-    return DepthReport(found, coverage, float(np.median(medians)), "; ".join(notes))
+    return DepthReport(file, coverage, float(np.median(medians)), "; ".join(notes))
+
+
+def _with_entry(folder: Path, clip: Clip, made: MadeDepth, step: float) -> SequenceFile:
+    """`sequence.toml` as it is now, since other commands may have changed it meanwhile, with the new depth."""
+    file = read_sequence_file(folder)
+    unit = ARBITRARY if made.assumed or (file.arbitrary and not _only_assumed(clip)) else "mm"
+    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
+    stated = unit if (unit == ARBITRARY) != file.arbitrary else file.unit
+    return msgspec.structs.replace(file, depth=entry, unit=stated)
 
 
 def _only_assumed(clip: Clip) -> bool:

@@ -18,7 +18,7 @@ from endotsr.clips.poses.estimate import ADJUSTMENTS, APART, PathEstimate, estim
 from endotsr.clips.poses.matches import Matcher
 from endotsr.clips.poses.movement import FramePair, Movement, with_assumed_depth
 from endotsr.clips.poses.views import Views
-from endotsr.clips.prepare.pose_record import cameras_of, gap_lines, open_for_poses, pose_entry, resting_views
+from endotsr.clips.prepare.pose_record import as_now, cameras_of, gap_lines, open_for_poses, pose_entry, resting_views
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, sequence_text
 from endotsr.errors import InputError
@@ -107,7 +107,7 @@ def enter_poses(folder: Path, replace: bool = False, force: bool = False, watch:
         return PoseReport(False, known[2], None, unit)
     found = _resumed(folder, views, known, watch)
     entry = pose_entry(found.cameras, file.unit, ORIGIN, sorted(found.interpolated + found.held))
-    replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(file, poses=entry)))
+    replace_text(folder / FILE_NAME, sequence_text(msgspec.structs.replace(as_now(folder, file), poses=entry)))
     (folder / PARTIAL).unlink(missing_ok=True)
     return PoseReport(True, known[2], found, unit)
 

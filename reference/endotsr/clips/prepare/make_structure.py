@@ -22,7 +22,7 @@ from endotsr.clips.poses.structure import Structure, reconstructed, refuse_too_f
 from endotsr.clips.poses.views import Views, small_views
 from endotsr.clips.prepare.make_depth import write_depth
 from endotsr.clips.prepare.make_poses import SILENT, PoseProgress
-from endotsr.clips.prepare.pose_record import cameras_of, gap_lines, open_for_poses, pose_entry, resting_views
+from endotsr.clips.prepare.pose_record import as_now, cameras_of, gap_lines, open_for_poses, pose_entry, resting_views
 from endotsr.clips.prepare.relative_depth import MadeDepth
 from endotsr.clips.sequences.clip import Clip, Depth
 from endotsr.clips.sequences.layouts.common import describe_prepared
@@ -81,12 +81,13 @@ def enter_structure(
         raise InputError(f"{folder}: {_no_model(views)}")
     refuse_too_few(found)
     if moves is not None:
-        return _recorded(folder, file, _scaled(folder, found, views), views, moves)
+        scaled = _scaled(folder, found, views)
+        return _recorded(folder, as_now(folder, file), scaled, views, moves)
     views = views._replace(depth=np.stack([_depth_of(found, views, k) for k in range(views.count)]))
     moves = movement_of(views)[2]
     if moves.answer != "moving" and not force:
         return StructureReport(False, moves, clip.unit_in_words)
-    file = msgspec.structs.replace(file, unit=ARBITRARY, depth=None)
+    file = msgspec.structs.replace(as_now(folder, file), unit=ARBITRARY, depth=None)
     report = _recorded(folder, file, (found, None), views, moves)
     write_depth(folder, MadeDepth(iter(views.depth), METHOD, ""), replace=True)
     return report

@@ -7,6 +7,7 @@ for each frame, the section [poses], and sentences on the gaps.
 import dataclasses
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from endotsr.clips.formats.camera import scene_factor
@@ -15,7 +16,7 @@ from endotsr.clips.formats.trajectory import filled
 from endotsr.clips.poses.views import Views
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts.common import describe_prepared
-from endotsr.clips.sequences.sequence_file import PoseEntry, SequenceFile, read_sequence_file
+from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, SequenceFile, read_sequence_file
 from endotsr.clips.sequences.view_frames import views_of
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose
@@ -42,6 +43,20 @@ def open_for_poses(folder: Path, replace: bool) -> tuple[SequenceFile, Clip]:
             f" {LEAST_WIDTH}x{LEAST_HEIGHT}, with a larger endotsr prepare --scale"
         )
     return file, clip
+
+
+def as_now(folder: Path, opened: SequenceFile) -> SequenceFile:
+    """`sequence.toml` as it is after the estimate: another command may have added masks meanwhile, and nothing else.
+
+    Raises:  InputError, because poses fit the depth and the unit from which they were estimated.
+    """
+    now = read_sequence_file(folder)
+    if msgspec.structs.replace(now, masks=opened.masks) != opened:
+        raise InputError(
+            f"{folder / FILE_NAME}: was changed while the poses were estimated, hence they are not written; repeat the"
+            " command when no other one writes this folder"
+        )
+    return now
 
 
 def resting_views(clip: Clip) -> Views:

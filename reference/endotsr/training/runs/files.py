@@ -106,7 +106,7 @@ def _refuse_input(file: Path) -> None:
 
 def refuse_read_only(folder: Path) -> None:
     """Raises InputError if no file can be written in an existing folder."""
-    if not os.access(folder, os.W_OK | os.X_OK):
+    if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{folder}: cannot be written: no permission; allowed: a folder that can be, such as a copy")
 
 
