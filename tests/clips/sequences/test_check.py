@@ -91,6 +91,9 @@ def renamed(folder):
             (folder / name / f"{i:06d}.png").rename(folder / name / f"{i + 20:06d}.png")
 
 
+HELD_OUT = range(1, FRAMES, 8)
+TRAINING = sorted(set(range(FRAMES)) - set(HELD_OUT))
+
 # Name -> (damage, code of the finding, level, frame)
 WRONG = {
     "no masks folder": (lambda p: (p / "masks").rename(p / "m"), "masks-files", "refusal", None),
@@ -109,6 +112,10 @@ WRONG = {
     "one mask inverted": (lambda p: each(p, "masks", lambda x: 255 - x, [4]), "single-mask", "refusal", None),
     "one mask over everything": (lambda p: each(p, "masks", lambda x: x * 0 + 255, [4]), "frame-without-tissue",
                                  "warning", 4),
+    "held-out frames without tissue": (lambda p: each(p, "masks", lambda x: x * 0 + 255, HELD_OUT),
+                                       "nothing-to-evaluate", "warning", None),
+    "training frames without depth": (lambda p: each(p, "depth", lambda x: x * 0, TRAINING), "nothing-to-train",
+                                      "refusal", None),
     "one mask with a hole": (lambda p: each(p, "masks", holed, [4]), "unlike-mask", "warning", 4),
     "masks empty": (lambda p: each(p, "masks", lambda x: x * 0), "tissue-fraction", "refusal", None),
     "masks full": (lambda p: each(p, "masks", lambda x: x * 0 + 255), "tissue-fraction", "refusal", None),

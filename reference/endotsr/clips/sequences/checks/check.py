@@ -43,6 +43,7 @@ from endotsr.clips.sequences.checks.frames import (
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
+from endotsr.clips.sequences.checks.split_tissue import SplitTissue, split_findings
 from endotsr.clips.sequences.checks.stereo import PairViews
 from endotsr.clips.sequences.checks.still_parts import StillParts
 from endotsr.clips.sequences.clip import Clip, Picture, colour_picture, grey_plane
@@ -93,6 +94,7 @@ class _Pass:
         self.still = StillParts(count)
         self.depth: list[DepthFacts] = []
         self.steps = DepthSteps(count)
+        self.of_split = SplitTissue(count)
         self.views, self.against = PairViews(count), DepthPairs(clip)
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
@@ -222,6 +224,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         run.still.add(i, picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         run.steps.add(i, picture, found, tissue)
+        run.of_split.add(i, tissue, found)
         if i in sampled:
             if found is not None:
                 run.light.append(light_correlation(picture, found, tissue))
@@ -347,12 +350,16 @@ def _cost(clip: Clip, size: Size, config: Config, frames: Frames, speed: Speed, 
 def _of_length(clip: Clip, config: Config, run: _Pass) -> tuple[Config, Frames]:
     """The settings with the length of a training on these frames. An impossible split becomes a finding."""
 
-    def split() -> Frames:
+    def frames_and_tissue() -> Frames:
         chosen = parse_frame_range(config.sequence.frames, len(clip.images))
-        found = frames_of(*split_frames(len(chosen), config.sequence.split, config.sequence.block_length))
+        split = split_frames(len(chosen), config.sequence.split, config.sequence.block_length)
+        if not any(finding.level == "refusal" for finding in run.findings):  # which says the same of all frames
+            tissue, lifted = (part[list(chosen)] for part in (run.of_split.tissue, run.of_split.lifted))
+            run.findings += split_findings(tissue, lifted, split, str(clip.where))
+        found = frames_of(*split)
         return found.with_true_motion() if has_truth(clip.where) else found
 
-    frames = run.tried(split, "frames", clip.where)
+    frames = run.tried(frames_and_tissue, "frames", clip.where)
     if frames is None:
         return with_fixed_length(config), expected_frames(len(clip.images), config)
     return lengthened(config, frames.training), frames

@@ -17,6 +17,7 @@ from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_findi
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
 from endotsr.clips.sequences.checks.masks import mask_findings
+from endotsr.clips.sequences.checks.split_tissue import loaded_split_findings
 from endotsr.clips.sequences.checks.still_parts import loaded_still_findings
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.sequence import Sequence
@@ -43,6 +44,7 @@ def guarded(
     found += loaded_still_findings(sequence.images, sequence.masks, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
+    found += loaded_split_findings(sequence, folder)
     priors = str(clip.depth.files[0].parent)
     found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)
     found += scale_finding(loaded_steps(sequence), priors)

@@ -107,6 +107,10 @@ KINDS: dict[str, Kind] = {
     "frame-without-tissue": Kind("warning", "it contributes nothing to the training, and its tissue metrics are"
                                  " undefined",
                                  "inspect its mask; leave the frame out if the mask is right"),
+    "nothing-to-train": Kind("refusal", REFUSED,
+                             "check masks and depth of these frames, or choose another --sequence.split"),
+    "nothing-to-evaluate": Kind("warning", "every metric and comparison is undefined",
+                                "inspect their masks, or choose another --sequence.split"),
     "single-mask": Kind("refusal", REFUSED, "correct this mask"),
     "exchanged-masks": Kind("warning", "the masks hide tissue and show the instrument there",
                             "give each mask the number of its picture"),
