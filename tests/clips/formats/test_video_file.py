@@ -84,6 +84,16 @@ def test_a_stream_that_states_no_length_ends_where_it_ends(tmp_path):
     assert 0 < video_facts(file).count < 40
 
 
+def test_pictures_that_end_long_before_the_stated_length_are_named(tmp_path):
+    """Half of an interrupted copy was half of the operation, in silence."""
+    file = write(tmp_path / "a.mkv", pictures(40), codec="ffv1", layout="bgr0")
+    assert not video_facts(file).remarks
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    remarks = video_facts(file).remarks
+    assert len(remarks) == 1 and "states 1.6 seconds, but its pictures end after" in remarks[0]
+
+
 def test_a_file_without_pictures_is_no_video(tmp_path):
     with av.open(str(tmp_path / "a.mp4"), "w") as container:
         stream = container.add_stream("aac", rate=44100)

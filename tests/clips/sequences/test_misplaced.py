@@ -15,8 +15,10 @@ from endotsr.clips.sequences.checks.lens import lens_warnings
 from endotsr.clips.sequences.checks.masks import mask_findings
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.scenes import halves_finding
+from endotsr.clips.sequences.layouts import layout_of
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate
+from endotsr.errors import InputError
 
 MATRIX = np.array([[280.0, 0, 160], [0, 280, 128], [0, 0, 1]])
 
@@ -134,3 +136,15 @@ def test_black_bars_do_not_make_two_views():
     assert halves_finding(grey, "clip") == []
     pairs = [np.vstack([half, half]) for half in (picture[:20] for picture in grey)]
     assert "stacked" in halves_finding(pairs, "clip")[0].what
+
+
+@pytest.mark.parametrize("name", ["a.dcm", "IM0001"])
+def test_a_dicom_file_is_named_as_one(name, tmp_path):
+    """The layouts were listed, and nothing said what the file is or what to do with it."""
+    (tmp_path / "study").mkdir()
+    for file in (tmp_path / name, tmp_path / "study" / name):
+        file.write_bytes(b"\0" * 128 + b"DICM" + b"\0" * 64)
+    with pytest.raises(InputError, match="a DICOM file; export it as a video or as PNG pictures"):
+        layout_of(tmp_path / name)
+    with pytest.raises(InputError, match="it holds 1 DICOM file; export it"):
+        layout_of(tmp_path / "study")

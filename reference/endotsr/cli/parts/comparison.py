@@ -156,6 +156,7 @@ def _metrics(
     from endotsr.clips.formats.video_file import is_video
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
+    from endotsr.results.evaluation.turned import turned_remark
 
     if not path.is_dir() and not is_video(path):
         return cast("EvaluationRecord", read_json(path)), sequence
@@ -163,7 +164,10 @@ def _metrics(
     if sequence is None:
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
         sequence = shown_sequence("evaluate", run, asked.sequence, asked.settings)
-    return measure_pictures(find_pictures(path, sequence), sequence, label, load_lpips_weights(asked.lpips)), sequence
+    found, shape = find_pictures(path, sequence), sequence.images.shape[1:]
+    if remark := turned_remark(lambda i: found.read(i, shape), sequence):
+        print(f"{path}: {remark}")
+    return measure_pictures(found, sequence, label, load_lpips_weights(asked.lpips)), sequence
 
 
 def _refuse_earlier(path: Path, metrics: Keys) -> None:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.formats.camera import ARBITRARY, MILLIMETRES
 from endotsr.clips.formats.files import shortened
-from endotsr.clips.formats.video_file import VIDEO_ENDINGS
+from endotsr.clips.formats.video_file import LARGEST_FILE, VIDEO_ENDINGS
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
@@ -25,7 +25,8 @@ from endotsr.clips.sequences.sources import MASK_ENDINGS
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.files import open_regular
+from endotsr.untrusted.names import counted, plain_line
 
 # Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (
@@ -58,6 +59,8 @@ def layouts() -> tuple[Layout, ...]:
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
 OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd")
 JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
+DICOM_ENDINGS = (".dcm", ".dicom", "")  # recorders also write names without an ending
+EXPORT_DICOM = "export it as a video or as PNG pictures before, for example with the program that shows it"
 OTHER_VIDEOS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjpg", ".yuv")
 
 
@@ -81,12 +84,26 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
     raise InputError(f"{path}: no known layout{_held(path)}; allowed: {known}")
 
 
+def is_dicom(path: Path) -> bool:
+    """Whether a file is a regular one that has the mark of DICOM behind its preamble."""
+    try:
+        with open_regular(path, LARGEST_FILE) as file:
+            return file.read(132)[128:] == b"DICM"
+    except (OSError, InputError):
+        return False
+
+
 def _held(path: Path) -> str:
     """What a path in no known layout is, where a remedy follows from it."""
     if path.is_file():
         ending = path.suffix.lower()
+        if is_dicom(path):
+            return f": a DICOM file; {EXPORT_DICOM}"
         said = ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
         return ": an archive; unpack it first" if ending in ARCHIVES else said
+    dicom = sum(is_dicom(file) for file in path.iterdir() if file.suffix.lower() in DICOM_ENDINGS)
+    if dicom:
+        return f": it holds {counted(dicom, 'DICOM file')}; {EXPORT_DICOM}"
     endings = Counter(file.suffix.lower() for file in path.iterdir() if file.is_file() and file.suffix)
     ending, count = endings.most_common(1)[0] if endings else ("", 0)
     if ending in OTHER_PICTURES:
