@@ -55,8 +55,6 @@ def run(words: list[str]) -> int:
     from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.sequence_file import MASKS
     from endotsr.clips.sequences.source_options import SourceOptions
-    from endotsr.training.runs.files import refuse_folder, refuse_read_only
-    from endotsr.untrusted.writing import refuse_existing
 
     if options.margin < 0:
         raise InputError(f"masks: --margin {options.margin} is not allowed; use 0 or more pixels")
@@ -64,13 +62,10 @@ def run(words: list[str]) -> int:
         return _draw(options, options.draw)
     said: list[str] = []
     propose = None if options.keys is None else from_keys(options.keys, options.margin, said)
+    _refuse_place(options)
     if options.out is None:
-        refuse_read_only(options.sequence)
         proposal, place = enter_masks(options.sequence, options.replace, propose), options.sequence
     else:
-        if not options.replace:
-            refuse_existing(options.out)  # before the motion of the clip is computed
-        refuse_folder(options.out)
         clip = describe(options.sequence, SourceOptions(layout=options.layout))
         proposal, place = write_proposal(clip, options.out, propose, options.replace), options.out
     fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)
@@ -91,6 +86,18 @@ def run(words: list[str]) -> int:
         source, masks = shlex.quote(str(options.sequence)), shlex.quote(str(options.out / MASKS))
         print(f"next: endotsr prepare {source} --masks {masks} --out SEQUENCE")
     return 0
+
+
+def _refuse_place(options: MasksOptions) -> None:
+    """Raises InputError, before the motion of the clip is computed, for a place where no masks can be written."""
+    from endotsr.training.runs.files import refuse_folder, refuse_read_only
+    from endotsr.untrusted.writing import refuse_existing
+
+    if options.out is None:
+        return refuse_read_only(options.sequence)
+    if not options.replace:
+        refuse_existing(options.out)
+    refuse_folder(options.out)
 
 
 def _draw(options: MasksOptions, page: Path) -> int:
