@@ -1,10 +1,10 @@
 """What to run after a change: python tests/after.py [REVISION] [--run]
 
 Compares the working tree with REVISION (the last commit by default; with a clean tree, the commit before it), and
-prints the commands in order: lint, types of the changed files, the lists that have to name a new component, the
-programs whose output depends on the change, the tests of the rooms that it touches, and all other tests that import a
-changed module, which take longest. `--run` runs them and stops at the first that fails. It leaves out `golden/make.py
-write`: no run of tests rewrites its expected values.
+prints the commands in order: lint, types of the changed files, the golden cases to make again, the lists that have to
+name a new component, the other programs whose output depends on the change, the tests of the rooms that it touches, and
+all other tests that import a changed module, which take longest. `--run` runs them and stops at the first that fails.
+It leaves out `golden/make.py write`, because no run of tests rewrites its expected values: run that command first.
 """
 
 import argparse
@@ -139,13 +139,16 @@ def commands(paths: list[str]) -> list[str]:
         p for p in paths if p.endswith(".py") and p.startswith(("reference/", "golden/make", "docs/make", "docs/pages"))
     ]
     rooms = " ".join(FORMATTED)
+    programs = makers(paths)
+    written = [name for name in programs if name.startswith(WRITE)]
     return [
         f"ruff check {rooms}",
         f"ruff format --check {rooms}",
         "lint-imports",
         *([f"pyright {' '.join(typed)}"] if typed else []),
+        *written,  # a list below reads the stored cases, and refuses those of another VERSION
         *([f"pytest -q -n 0 {' '.join(LISTS)}"] if any(path.startswith(LISTED) for path in paths) else []),
-        *makers(paths),
+        *(name for name in programs if name not in written),
         *tested(paths),
     ]
 
@@ -161,8 +164,9 @@ def main(words: list[str]) -> int:
     except subprocess.CalledProcessError as error:
         parser.error(error.stderr.strip() or f"git ended with code {error.returncode}")
     for command in commands(paths):
-        print(command, flush=True)
-        if given.run and not command.startswith(WRITE):
+        left_out = given.run and command.startswith(WRITE)
+        print(f"{command}  (left out: run it first)" if left_out else command, flush=True)
+        if given.run and not left_out:
             code = subprocess.run(command.split(), cwd=ROOT, check=False).returncode
             if code:
                 return code

@@ -13,10 +13,10 @@ def test_a_kernel_reaches_its_room_its_gradients_and_its_twin():
     assert "tests/training/fitting/test_objective.py" in far - near and "tests/method/losses/test_depth.py" not in far
 
 
-def test_lists_that_lack_a_new_component_come_before_the_programs():
-    found = after.commands(["reference/endotsr/config.py"])
+def test_lists_that_lack_a_new_component_come_before_the_programs_but_after_the_cases_that_they_read():
+    found = after.commands(["reference/endotsr/config.py", "golden/makers/depth.toml"])
     lists = f"pytest -q -n 0 {' '.join(after.LISTS)}"
-    assert found.index(lists) < found.index(after.CONSTANTS)
+    assert found.index(f"{after.WRITE} depth") < found.index(lists) < found.index(after.CONSTANTS)
     assert lists in after.commands(["golden/makers/depth.toml"]) and lists not in after.commands(["README.md"])
     for path, _, test in (name.partition("::") for name in after.LISTS):
         assert f"def {test}" in (after.ROOT / path).read_text(encoding="utf-8")
@@ -51,6 +51,14 @@ def test_a_clean_tree_is_told(revision, edited, base, told, monkeypatch, capsys)
     monkeypatch.setattr(after, "git", lambda *words: asked.append(words[-1]) or (edited if words[-1] == "HEAD" else []))
     after.changed(revision)
     assert asked[-1] == base and ("nothing is changed" in capsys.readouterr().err) == told
+
+
+def test_golden_cases_that_a_run_leaves_out_are_said_to_be_left_out(monkeypatch, capsys):
+    monkeypatch.setattr(after, "changed", lambda revision: ["golden/makers/depth.toml"])
+    monkeypatch.setattr(after.subprocess, "run", lambda words, **_: after.subprocess.CompletedProcess(words, 1))
+    monkeypatch.setattr(after, "commands", lambda paths: [f"{after.WRITE} depth", "ruff check"])
+    assert after.main(["--run"]) == 1
+    assert capsys.readouterr().out.splitlines() == [f"{after.WRITE} depth  (left out: run it first)", "ruff check"]
 
 
 def test_an_unknown_revision_is_named_in_one_line(capsys):
