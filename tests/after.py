@@ -22,6 +22,7 @@ ALWAYS = ("tests/test_layout.py", "tests/test_conventions.py", "tests/docs/test_
 LISTS = (
     "tests/definition/test_door.py",
     "tests/port/judge/test_recognise.py::test_the_first_wrong_operation_is_that_of_the_method",
+    "tests/port/vectors/test_families.py::test_every_array_of_a_case_has_axes_for_the_request_to_a_port",
     "tests/port/vectors/test_hard_coded.py::test_every_setting_takes_two_values",
     "tests/training/fitting/test_objective.py::test_every_term_of_the_objective_is_in_this_file",
     "tests/training/fitting/test_zero_cost.py::test_every_term_of_the_objective_is_switched_off_here",

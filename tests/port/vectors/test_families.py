@@ -3,9 +3,11 @@
 import msgspec
 import pytest
 
+from endotsr.errors import InputError
 from endotsr.port.contract import all_operations
+from endotsr.port.judge.about import axes_of
 from endotsr.port.judge.format import Manifest, read_struct
-from endotsr.port.judge.store import golden_folder
+from endotsr.port.judge.store import golden_folder, read_golden
 from makers import registry
 from makers.files import fresh_files, rendered_files
 from makers.generate import solve_these
@@ -30,6 +32,29 @@ def test_every_operation_is_in_a_family():
 def test_the_cases_are_those_of_the_manifest():
     published = {f"{family}/{case}" for family, cases in PUBLISHED.families.items() for case in cases}
     assert {spec.name for spec in all_specs()} == published
+
+
+def test_every_array_of_a_case_has_axes_for_the_request_to_a_port():
+    lacking = {}
+    for case in read_golden(golden_folder(), verify=False).cases:
+        for name, array in (*case.inputs.items(), *case.outputs.items()):
+            try:
+                axes_of(name, len(array.shape))
+            except KeyError as error:
+                lacking[name] = error.args[0]
+    assert not lacking
+
+
+def test_an_array_without_axes_is_named_with_the_table_that_lacks_it():
+    with pytest.raises(KeyError, match=r"'haze' with 2 axes is not in `_AXES` of .*port/judge/about\.py"):
+        axes_of("d_haze", 2)
+
+
+def test_another_version_than_that_of_the_files_is_refused_with_the_remedy(tmp_path):
+    (tmp_path / "manifest.json").write_bytes((golden_folder() / "manifest.json").read_bytes())
+    (tmp_path / "VERSION").write_text("99.0.0\n")
+    with pytest.raises(InputError, match=r"VERSION says 99.0.0, .*; take both .*`python golden/make.py write`"):
+        read_golden(tmp_path)
 
 
 def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):

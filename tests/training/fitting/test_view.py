@@ -20,7 +20,7 @@ from endotsr.config import (
     TrainingConfig,
 )
 from endotsr.training.fitting.adam import adam_update
-from endotsr.training.fitting.objective import LossWeights, full_weights
+from endotsr.training.fitting.objective import full_weights
 from endotsr.training.fitting.sampling import drawn_view
 from endotsr.training.fitting.schedules import learning_rates
 from endotsr.training.fitting.state import new_training, training_constants
@@ -113,7 +113,7 @@ def test_a_step_of_training_equals_the_view_gradients_put_to_adam_bitwise(sequen
 
 def view_of(state, constants, edges=None):
     targets, camera = constants.targets_of(0), constants.sequence.cameras[0]
-    weights = LossWeights(0.1, 1.0, 0.5, 0.8)
+    weights = full_weights(constants.config.loss, 0.8)._replace(smoothness=0.5)
     return view_gradients(state.gaussians, constants.spectral, targets, weights, constants.config, camera, 0.2, edges)
 
 

@@ -18,6 +18,7 @@ from endotsr.training.fitting.objective import (
     LossWeights,
     depth_term,
     frame_targets,
+    full_weights,
     image_loss,
     laplacian_term,
     smoothness_term,
@@ -129,7 +130,7 @@ def test_a_loss_that_is_off_equals_the_loss_of_weight_zero_bitwise(name, monkeyp
     rendered, _ = view(*made_up({}))
     frame = workload.sequence(WIDTH, HEIGHT, frames=4).frame(0)
     config = with_setting(PAPER, key, value)
-    weights = LossWeights(0.1, 1.0, 0.5, 0.8)._replace(**{name: 0.0})
+    weights = full_weights(PAPER.loss, 0.8)._replace(**{"smoothness": 0.5, name: 0.0})
     whole, bare = frame_targets(frame, PAPER), frame_targets(frame, config)
     assert sum(target is None for target in bare) == (name != "smoothness")  # edges are found as they are needed
     zero = _terms_of_weight_zero(rendered, whole)

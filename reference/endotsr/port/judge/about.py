@@ -73,6 +73,8 @@ def axes_of(name: str, count: int) -> str:
 
     `d_x`, `final_x`, `x_after` and `x_at_t` have the axes of `x`. "row column Gaussian" of `rotation` are the two axes
     of the matrix; "axis axis" is a single matrix.
+
+    Raises:  KeyError for an array that `_AXES` lacks.
     """
     if count == 0:
         return ""
@@ -83,4 +85,6 @@ def axes_of(name: str, count: int) -> str:
     for suffix in ("_after", "_at_t", "_1", "_2"):
         if (name, count) not in _BY_NAME:
             name = name.removesuffix(suffix)
+    if (name, count) not in _BY_NAME:
+        raise KeyError(f"{name!r} with {count} axes is not in `_AXES` of endotsr/port/judge/about.py: add the name there")
     return _BY_NAME[name, count]

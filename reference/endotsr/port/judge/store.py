@@ -80,7 +80,10 @@ def read_golden(folder: Path, *, verify: bool = True) -> Golden:
     except (OSError, msgspec.DecodeError) as error:
         raise InputError(f"{folder / 'manifest.json'}: cannot be read: {error}") from None
     if version != manifest.version:
-        raise InputError(f"{folder}: VERSION says {version}, manifest.json {manifest.version}")
+        raise InputError(
+            f"{folder}: VERSION says {version}, manifest.json {manifest.version}; take both from one release, or after"
+            " a change of the cases run `python golden/make.py write`"
+        )
     if verify:
         for entry in manifest.files:
             _verify(folder, entry)
