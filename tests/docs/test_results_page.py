@@ -80,7 +80,9 @@ def test_the_readme_states_the_minutes_that_were_timed():
     assert "| flow | - | 41.61 | 0.0125 | - |" in made and "| flow | - | - | - | 41.61 |" in presets.recorded()
     assert f"| {rows['quick'][0]['seconds'] / 60:.1f} |" in made and "another one of this name took longer" in made
     waited = json.loads((RESULTS / "waiting.json").read_text(encoding="utf-8"))["rows"]
-    (other,) = [row for row in waited if (row["clip"], row["preset"], row["clock"]) == ("endonerf_pulling", "sharp", "wall")]
+    (other,) = [
+        row for row in waited if (row["clip"], row["preset"], row["clock"]) == ("endonerf_pulling", "sharp", "wall")
+    ]
     assert other["processor"] == rows["sharp"][0]["processor"]
     assert other["trained"] - other["curve"][0]["seconds"] > rows["sharp"][0]["seconds"], "nine tenths of it"
 

@@ -86,5 +86,7 @@ def axes_of(name: str, count: int) -> str:
         if (name, count) not in _BY_NAME:
             name = name.removesuffix(suffix)
     if (name, count) not in _BY_NAME:
-        raise KeyError(f"{name!r} with {count} axes is not in `_AXES` of endotsr/port/judge/about.py: add the name there")
+        raise KeyError(
+            f"{name!r} with {count} axes is not in `_AXES` of endotsr/port/judge/about.py: add the name there"
+        )
     return _BY_NAME[name, count]
