@@ -57,7 +57,11 @@ MORE = {
     f"{PACKAGE}api.py": ("tests/test_api.py",),
     f"{PACKAGE}cli/": ("tests/cli",),
     "golden/": ("tests/port/vectors", "tests/port/judge/test_profiles.py", "tests/docs/test_equation_map.py"),
-    "docs/specification/": ("tests/test_specification.py", "tests/docs/test_derivations.py"),
+    "docs/specification/": (
+        "tests/test_specification.py",
+        "tests/docs/test_derivations.py",
+        "tests/test_notebooks.py::test_displays_are_those_of_the_specification",
+    ),
     "docs/": ("tests/docs",),
     "README.md": ("tests/docs/test_readme.py",),
 }
@@ -127,7 +131,7 @@ def importing(paths: list[str]) -> list[str]:
 def tested(paths: list[str]) -> list[str]:
     """The tests of the rooms, then the other tests that import a changed module; a folder stands for its files."""
     tests = dict.fromkeys([*ALWAYS, *(test for path in paths for test in tests_of(path))])
-    folders = {test for test in tests if not test.endswith(".py")}
+    folders = {test for test in tests if not test.partition("::")[0].endswith(".py")}
     outside = lambda test: not any(str(up) in folders for up in Path(test).parents)
     near = filter(outside, tests)
     far = (test for test in importing(paths) if outside(test) and test not in tests)

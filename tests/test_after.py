@@ -29,6 +29,11 @@ def test_a_record_reaches_the_pages_that_read_it():
     assert after.makers(["golden/makers/depth.toml"]) == ["python golden/make.py write depth"]
 
 
+def test_a_page_of_the_specification_reaches_the_notebooks_that_repeat_its_displays():
+    displays = "tests/test_notebooks.py::test_displays_are_those_of_the_specification"
+    assert displays in " ".join(after.tested(["docs/specification/06_objective.md"])).split()
+
+
 def test_a_folder_takes_the_place_of_its_files():
     path = "reference/endotsr/clips/sequences/splits.py"
     words = " ".join(after.tested([path, "tests/clips/sequences/test_splits.py"])).split()
@@ -39,7 +44,7 @@ def test_every_path_of_the_tables_exists():
     tests = {test for names in after.MORE.values() for test in names} | {*after.ALWAYS, *after.FORMATTED}
     starts = {*after.MAKERS, *after.MORE}
     programs = {command.split()[1] for commands in after.MAKERS.values() for command in commands}
-    assert not [path for path in tests | starts | programs if not (after.ROOT / path).exists()]
+    assert not [path for path in tests | starts | programs if not (after.ROOT / path.partition("::")[0]).exists()]
 
 
 @pytest.mark.parametrize(("revision", "edited", "base", "told"), [
