@@ -39,6 +39,15 @@ def test_a_log_file_that_cannot_be_written_is_refused(tmp_path, capsys):
         assert_refused(capsys, ["check", "--log-file", "a.txt", *other], "a.txt: the command names this file elsewhere")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is a device of Linux")
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_a_log_on_a_full_disk_ends_with_one_warning_and_the_command_goes_on(quiet, capsys):
+    assert main([*quiet, "--log-file", "/dev/full", "render", "--help"]) == 0
+    said = capsys.readouterr()
+    assert ("usage: endotsr render" in said.out) == (not quiet)
+    assert said.err == "endotsr: warning: /dev/full: the disk is full; the log ends here, the command goes on\n"
+
+
 def test_no_output_replaces_a_recording_a_clip_or_a_run(run_copy, tmp_path, capsys):
     recording, clip = tmp_path / "a.mp4", tmp_path / "sequence.toml"
     recording.write_bytes(b"\0\0\0 ftypisom")

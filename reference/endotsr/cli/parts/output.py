@@ -6,12 +6,13 @@ always printed. A log file contains all standard output and standard error, also
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.training.runs.files import refuse_no_text
+from endotsr.training.runs.files import os_error_line, refuse_no_text
+from endotsr.untrusted.names import plain_line
 
 QUIET, LOG_FILE = ("-q", "--quiet"), "--log-file"
 
@@ -53,7 +54,9 @@ def redirected(output: OutputOptions) -> Iterator[None]:
     Raises: InputError if the log file cannot be written, or would replace another kind of file.
     """
     with contextlib.ExitStack() as stack:
-        log = stack.enter_context(_opened(output.log_file)) if output.log_file else None
+        log = _Log(output.log_file) if output.log_file else None
+        if log is not None:
+            stack.callback(log.close)
         if output.quiet or log is not None:
             stack.enter_context(contextlib.redirect_stdout(_Tee(None if output.quiet else sys.stdout, log)))
         if log is not None:
@@ -61,18 +64,50 @@ def redirected(output: OutputOptions) -> Iterator[None]:
         yield
 
 
-def _opened(file: Path) -> IO[str]:
-    try:
-        refuse_no_text(file)
-        return file.open("w", encoding="utf-8", newline="\n", buffering=1)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+class _Log:
+    """The log file. If a line cannot be written, as on a full disk, the log ends and the command goes on."""
+
+    def __init__(self, file: Path) -> None:
+        """Open the file. Raises InputError as `redirected`."""
+        self._file = file
+        try:
+            refuse_no_text(file)
+            self._stream: IO[str] | None = file.open("w", encoding="utf-8", newline="\n", buffering=1)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+        self._shown = sys.stderr  # before it is redirected
+
+    def write(self, text: str) -> None:
+        """Write the text, or end the log with one warning."""
+        self._try(lambda stream: stream.write(text))
+
+    def flush(self) -> None:
+        """As `TextIO.flush`."""
+        self._try(lambda stream: stream.flush())
+
+    def close(self) -> None:
+        """As `TextIO.close`."""
+        self._try(lambda stream: stream.close())
+        self._stream = None
+
+    def _try(self, act: Callable[[IO[str]], object]) -> None:
+        stream = self._stream
+        if stream is None:
+            return
+        try:
+            act(stream)
+        except OSError as error:
+            self._stream = None
+            with contextlib.suppress(OSError):
+                stream.close()  # fails once more on the rest of the text
+            line = plain_line(os_error_line(error, self._file))
+            print(f"endotsr: warning: {line}; the log ends here, the command goes on", file=self._shown, flush=True)
 
 
 class _Tee:
     """A text stream that writes to a shown stream, a log, both or neither."""
 
-    def __init__(self, shown: Any, log: IO[str] | None) -> None:
+    def __init__(self, shown: Any, log: _Log | None) -> None:
         self._shown, self._log = shown, log
         self.encoding = "utf-8"
 
