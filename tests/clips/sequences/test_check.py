@@ -25,6 +25,7 @@ from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, SequenceConfig, config_from_dict
 from endotsr.errors import InputError
+from endotsr.training.fitting.state import new_training
 
 FRAMES = 9
 SIXTY = expected_frames(60, PAPER)
@@ -234,7 +235,7 @@ def test_a_wrong_input_gives_its_finding_and_a_training_judges_alike(case, seque
     assert all(f.what and f.why and f.remedy and str(tmp_path) in f.where for f in checked.findings)
     if checked.refused:
         with pytest.raises(InputError):
-            read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near)
+            new_training(read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near), PAPER)
         return
     notes = read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near).notes
     said = [found[1] for note in notes if (found := re.match(r"(?:warning|note): ([\w-]+): ", note))]

@@ -23,7 +23,8 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 
-SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
+# In other notes, or in refusals that come later and know more: on the polarity of masks, and on the first Gaussians.
+SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue", "nothing-to-train")
 COMMON = "common"  # the layout that `prepare` writes once the poses agree with the pictures
 MOST = 5  # notes of one kind
 
