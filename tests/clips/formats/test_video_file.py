@@ -94,6 +94,43 @@ def test_pictures_that_end_long_before_the_stated_length_are_named(tmp_path):
     assert len(remarks) == 1 and "states 1.6 seconds, but its pictures end after" in remarks[0]
 
 
+def write_after(seconds, file, sound=0):
+    """A Matroska file whose clock begins at `seconds`, with `sound` packets of sound, 23 ms each."""
+    with av.open(str(file), "w") as container:
+        stream = container.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        heard = container.add_stream("aac", rate=44100) if sound else None
+        for i, shown in enumerate(pictures(10)):
+            frame = av.VideoFrame.from_ndarray(shown, format="rgb24")
+            frame.pts = 25 * seconds + i
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+        for k in range(sound):
+            frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+            frame.sample_rate, frame.pts = 44100, 1024 * k
+            container.mux(heard.encode(frame))
+        container.mux(heard.encode() if heard else [])
+    return file
+
+
+@pytest.mark.parametrize("tag", [b"DURATION", b"DURATIOX"])  # without the tag, the length of the file counts
+@pytest.mark.parametrize(("seconds", "sound"), [(0, 0), (60, 0), (0, 200)])
+def test_a_late_clock_or_a_longer_sound_does_not_make_a_video_truncated(tag, seconds, sound, tmp_path):
+    """The end was held against the length from the first picture: a clock that begins at 60 s missed a minute."""
+    file = write_after(seconds, tmp_path / "a.mkv", sound)
+    file.write_bytes(file.read_bytes().replace(b"DURATION", tag))
+    assert not video_facts(file).remarks
+
+
+def test_a_twentieth_that_is_missing_is_named(tmp_path):
+    """Three minutes of an hour; a tenth was allowed to be missing in silence."""
+    file = write(tmp_path / "a.mkv", pictures(100), codec="ffv1", layout="bgr0")
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) * 19 // 20])
+    (said,) = video_facts(file).remarks
+    assert said.startswith("states 4 seconds, but its pictures end after 3.")
+
+
 def test_a_file_without_pictures_is_no_video(tmp_path):
     with av.open(str(tmp_path / "a.mp4"), "w") as container:
         stream = container.add_stream("aac", rate=44100)

@@ -8,6 +8,7 @@ and the rows of the second are interpolated. A stated rotation is reported, not 
 
 import contextlib
 import itertools
+import re
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -37,7 +38,8 @@ WIDE_RANGE = {8: "linear light", 9: "logarithm", 10: "logarithm", 16: "PQ", 18: 
 BT2020 = 9  # of the primaries
 UNSTATED, HIGH_DEFINITION = 2, 576  # colour matrix not stated; rows above which players assume BT.709
 MOST_DECODED = 5000  # pictures of a file that is decoded for its time stamps: a minute at high definition
-MISSING = 0.1  # of the stated length
+LENGTH = re.compile(r"(\d{1,4}):(\d\d):(\d\d(?:\.\d+)?)")  # a tag of Matroska: hours, minutes, seconds
+MISSING, MISSING_STEPS = 0.01, 3  # of the stated length, and times between two pictures, that may be missing
 PROBED = 3  # pictures decoded to find properties that are missing in the header
 
 
@@ -88,7 +90,7 @@ def video_facts(path: Path) -> VideoFacts:
     with _opened(path) as (container, stream):
         codec, context = stream.codec_context.name, stream.codec_context
         shape = float(stream.sample_aspect_ratio or 1) or 1.0
-        seconds = (container.duration or 0) / 1e6
+        ends = _stated_end(container, stream)
         stated, rate = int(stream.frames or 0), float(stream.average_rate or 0)
         first = list(itertools.islice(_decoded(container.decode(stream), path), PROBED))
         if not first:
@@ -107,28 +109,41 @@ def video_facts(path: Path) -> VideoFacts:
             f" whole file (`ffmpeg -i {path.name} -c copy whole{path.suffix}` keeps what is left)"
         )
     stamps, hidden = _stamps(path, packets, by_decoding=interlaced or codec in HIDDEN)
-    ends = "" if stated else _ends_early(stamps, seconds)
-    remarks = (*remarks, *filter(None, (hidden, ends)))
+    early = "" if stated else _ends_early(stamps, ends)
+    remarks = (*remarks, *filter(None, (hidden, early)))
     if turn % 90:
         raise InputError(f"{path}: the file states a rotation of {turn} degrees; allowed: 0, 90, 180 and 270")
     clock = clock_of(stamps, rate if np.isfinite(rate) and rate > 0 else None)
     return VideoFacts(width, height, len(stamps), clock, turn, interlaced, codec, shape, remarks, views)
 
 
-def _ends_early(stamps: NDArray[np.float64], seconds: float) -> str:
+def _stated_end(container: Any, stream: Any) -> float:
+    """Second of the clock of the file at which the pictures end by its header; 0: unknown.
+
+    Matroska and WebM state no number of pictures, but a length of the stream as a tag, or of the file alone. The latter
+    counts only for a file without sound, which may last longer.
+    """
+    stated = LENGTH.fullmatch(str(stream.metadata.get("DURATION", "")))
+    if stated:
+        hours, minutes, seconds = map(float, stated.groups())
+        return 3600 * hours + 60 * minutes + seconds
+    alone = "matroska" in container.format.name and len(container.streams) == 1
+    return (container.duration or 0) / 1e6 if alone else 0.0
+
+
+def _ends_early(stamps: NDArray[np.float64], stated: float) -> str:
     """A remark on pictures that end long before the stated end, as in an interrupted copy of Matroska or WebM.
 
     stamps   (n,) seconds of the pictures, NaN where unknown
-    seconds  stated length of the file; 0: not stated
+    stated   of the same clock, which need not begin at 0; 0: unknown
     """
     if len(stamps) < 2 or not np.isfinite(stamps).all():
         return ""
     step = float(np.median(np.diff(np.sort(stamps))))
-    covered = float(np.ptp(stamps)) + step
-    if seconds - covered <= max(MISSING * seconds, 3 * step):
+    end = float(stamps.max()) + step
+    if stated - end <= max(MISSING * stated, MISSING_STEPS * step):
         return ""
-    ends = f"its pictures end after {covered:.4g}"
-    return f"states {seconds:.4g} seconds, but {ends}: it is truncated, or its sound is longer"
+    return f"states {stated:.4g} seconds, but its pictures end after {end:.4g}: it is truncated; copy it again"
 
 
 def _remarks(frame: Any, streams: int) -> tuple[str, ...]:
