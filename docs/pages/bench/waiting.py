@@ -134,7 +134,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         threads = [] if wall else ["--threads", "1"]
         commands.said("train", clip, "--out", run, *words, *threads)
         whole, metrics = watch.now(), commands.loaded(run / "metrics.json")
-    about = metrics["run"]
+    about, here = metrics["run"], machine()
     return {
         "clip": clip.resolve().name, "frames": about["input"]["frames"],
         "size": f"{about['input']['width']}x{about['input']['height']}", "preset": about["settings"]["preset"],
@@ -145,7 +145,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "forecast_after": progress.FORECAST_AFTER, "curve": spoken.curve,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
-        "processor": machine().get("processor"), "machine": machine(), "date": now()[:10],
+        "processor": here.get("processor"), "machine": here, "date": now()[:10],
     }  # fmt: skip
 
 
