@@ -5,7 +5,7 @@ import threading
 
 import numpy as np
 import pytest
-from tiny import assert_refused
+from tiny import assert_refused, run_line, train_words
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
@@ -87,3 +87,18 @@ def test_a_training_names_what_a_killed_one_left_beside_its_folder(tmp_path, cap
     monkeypatch.setattr(folder.msgspec, "to_builtins", lambda record: {})
     create_run(tmp_path / "run", None, {}, None)
     assert ".partial-0a1b2c3d-run" in capsys.readouterr().err and (tmp_path / ".partial-0a1b2c3d-run").is_dir()
+
+
+def test_a_signal_during_the_evaluation_of_a_training_says_what_is_done(tmp_path, capsys, monkeypatch):
+    """Before, it said "interrupted" alone, as if the training were lost."""
+
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("endotsr.results.evaluation.run.measure_folder", stopped)
+    code, said = run_line(capsys, *train_words(tmp_path / "run", "--iterations", "1"))
+    command = f"endotsr evaluate {tmp_path / 'run'}"
+    told = f"endotsr: interrupted: the training is finished, its evaluation is not: `{command}` makes it"
+    assert code == 130 and said.strip().splitlines()[-1] == told
+    monkeypatch.undo()
+    assert main(command.split()[1:]) == 0

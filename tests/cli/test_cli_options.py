@@ -269,3 +269,12 @@ def test_a_key_of_an_earlier_version_with_another_value_is_refused(section, key,
     said = str(refused.value)
     assert said.startswith(f"old.toml: {section}.{key} = {value!r} is not allowed") and allowed in said
     assert "or no such key" in said
+
+
+def test_a_folder_whose_name_begins_with_a_dash_is_told_to_be_written_otherwise(tmp_path, monkeypatch, capsys):
+    (tmp_path / "-clip").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert_refused(
+        capsys, ["check", "-clip"], "-clip: no such option; for the file or folder of this name, write ./-clip"
+    )
+    assert_refused(capsys, ["check", "-" + "x" * 5000], "no such option")

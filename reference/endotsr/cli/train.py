@@ -1,6 +1,7 @@
 """`endotsr train`: train on a sequence and write a run folder."""
 
 import math
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -96,7 +97,11 @@ def run(words: list[str]) -> int:
     if options.evaluate:
         from endotsr.cli.evaluate import evaluate_run
 
-        found = evaluate_run(folder, sequence, options.lpips, source=options.sequence or None, wait=True)
+        try:
+            found = evaluate_run(folder, sequence, options.lpips, source=options.sequence or None, wait=True)
+        except KeyboardInterrupt:
+            command = f"endotsr evaluate {shlex.quote(str(folder.path))}"
+            raise KeyboardInterrupt(f"the training is finished, its evaluation is not: `{command}` makes it") from None
         shown.remember_evaluation()
         write_result(options.json, **found)
     return 0

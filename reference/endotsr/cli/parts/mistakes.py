@@ -1,6 +1,7 @@
 """Errors for unknown words of a command line: one line with the likely option, or the keys of the section."""
 
 import difflib
+import os
 
 from endotsr.cli.parts.fields import Field
 from endotsr.errors import InputError
@@ -16,6 +17,8 @@ def unknown_word(fields: list[Field], words: list[str], command: str) -> InputEr
     option = next((word.split("=")[0] for word in words if word.startswith("-")), None)
     if option is None:
         return InputError(f"{words[0]!r}: unexpected argument; `endotsr {command} --help` lists the options")
+    if os.path.lexists(option):
+        return InputError(f"{option}: no such option; for the file or folder of this name, write ./{option}")
     unknown_key = _unknown_key(fields, option)
     if unknown_key:
         return InputError(f"command line: {unknown_key}")
