@@ -258,6 +258,18 @@ def test_a_right_sequence_has_no_finding(sequence, tmp_path):
     assert checked.facts["frames"] == FRAMES and checked.facts["cost"]["minutes"] > 0
 
 
+@pytest.mark.parametrize("scale", [0.25, 2.0])
+def test_a_size_that_a_training_refuses_is_found(scale, sequence, tmp_path):
+    """16x12 pixels, and more pixels than there are. Before, `check` said that the clip was ready."""
+    write_endonerf(sequence, tmp_path / "clip")
+    config = msgspec.structs.replace(PAPER, sequence=SequenceConfig(scale=scale))
+    (found,) = check_sequence(tmp_path / "clip", config).findings
+    assert found.code == "picture-size" and found.level == "refusal"
+    with pytest.raises(InputError) as error:
+        read_sequence(tmp_path / "clip", config.sequence, 0.2)
+    assert str(error.value) == found.what
+
+
 def test_the_time_is_that_of_a_training_on_these_frames(sequence, tmp_path):
     write_endonerf(sequence, tmp_path / "sequence")
     training = msgspec.structs.replace(PAPER.training, visits_per_frame=1500)  # 8 training frames: 12000 iterations

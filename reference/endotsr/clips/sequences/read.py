@@ -28,7 +28,7 @@ from endotsr.clips.sequences.layouts import describe_for_training, without_fault
 from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_masks
 from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.smaller import smaller
+from endotsr.clips.sequences.smaller import smaller, trained_size
 from endotsr.clips.sequences.splits import normalised_times, selected_frames, split_frames
 from endotsr.clips.sequences.world import fitting_world, moved_cameras, world_note
 from endotsr.config import PERCENTILES, SequenceConfig, enclose_median
@@ -37,7 +37,6 @@ from endotsr.method.splatting.camera import camera_centre
 from endotsr.untrusted.files import in_threads
 
 NEAR = 0.2  # near plane of every preset, scene units
-LEAST_SIDE = 16  # pixels; the three-level pyramid needs this many
 NO_MASKS = "no masks: every pixel counts as tissue, instruments included"
 NOT_METRIC = "not metric: "  # a note on assumed depth begins so
 EVERYTHING = (0.0, 100.0)  # percentiles that clip nothing
@@ -84,13 +83,9 @@ def sequence_of(clip: Clip, config: SequenceConfig, near: float = NEAR) -> Seque
         notes += check_single_masks(
             sequence.masks, sequence.depth, sequence.images, names, config.allow_tissue_fraction
         )
+    size = trained_size(sequence.width, sequence.height, config.scale, clip.where)
     if config.scale != 1.0:
-        sequence = _scaled(sequence, clip, config)
-    if min(sequence.width, sequence.height) < LEAST_SIDE:
-        raise InputError(
-            f"{clip.where}: images of {sequence.width}x{sequence.height} pixels: allowed: at least {LEAST_SIDE} on each"
-            " side"
-        )
+        sequence = _scaled(sequence, size, clip, config)
     return sequence
 
 
@@ -254,17 +249,9 @@ def _mask_notes(sequence: Sequence, clip: Clip, config: SequenceConfig) -> list[
     return [f"{where.name}: {excluded} = excluded; tissue fraction {fraction:.4f}; {evidence}"]
 
 
-def _scaled(sequence: Sequence, clip: Clip, config: SequenceConfig) -> Sequence:
-    """The sequence at `config.scale`, with a note. Raises InputError for a scale outside (0, 1] and small pictures."""
-    scale, where = config.scale, str(clip.where)
-    if scale > 1:
-        raise InputError(f"{where}: scale {scale:g}: images can only be reduced; allowed: values in (0, 1]")
-    width, height = round(sequence.width * scale), round(sequence.height * scale)
-    if min(width, height) < LEAST_SIDE:
-        raise InputError(
-            f"{where}: scale {scale:g} makes {width}x{height} pixels of {sequence.width}x{sequence.height};"
-            f" allowed: at least {LEAST_SIDE} on each side"
-        )
+def _scaled(sequence: Sequence, size: tuple[int, int], clip: Clip, config: SequenceConfig) -> Sequence:
+    """The sequence at `config.scale`, of this width and height, with a note."""
+    scale, where, (width, height) = config.scale, str(clip.where), size
     if (width, height) == (sequence.width, sequence.height):
         sequence.notes.append(f"scale {scale:g} changes nothing: pictures of {width}x{height} pixels keep their size")
         return sequence

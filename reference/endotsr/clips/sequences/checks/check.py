@@ -55,6 +55,7 @@ from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_m
 from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.pairing import matching_files
+from endotsr.clips.sequences.smaller import trained_size
 from endotsr.clips.sequences.splits import even_frames, parse_frame_range, split_frames
 from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.config import Config, lengthened, with_fixed_length
@@ -155,6 +156,8 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     config, frames = _of_length(clip, config, run)
     if size:
         facts |= {"frames": frames.total, "width": size[1], "height": size[0]}
+        scale = config.sequence.scale
+        run.tried(lambda: trained_size(size[1], size[0], scale, clip.where), "picture-size", clip.where)
         if not any(fault.code == "cameras" for fault in clip.faults):
             facts |= _check_cameras(clip, run, size)
         facts["cost"] = _cost(clip, size, config, frames, speed, run)._asdict()

@@ -34,6 +34,7 @@ KINDS: dict[str, Kind] = {
     "pairing": Kind("refusal", REFUSED, "supply or delete the file"),
     "size": Kind("refusal", "all files of a sequence have one size", "export it again"),
     "frames": Kind("refusal", REFUSED, "more frames, or another split"),
+    "picture-size": Kind("refusal", REFUSED, "another endotsr prepare --scale or --sequence.scale"),
     "number-gap": Kind("warning", "frames count as evenly spaced in time",
                        "supply the missing frames, or cut the clip there"),
     "order-of-names": Kind("warning", "frames are in the order of the numbers in their names",
