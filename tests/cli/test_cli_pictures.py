@@ -59,6 +59,16 @@ def test_pictures_on_a_named_sequence(tmp_path, capsys):
     assert_refused(capsys, words, f"{pictures}", "a picture of 36x24")
 
 
+def test_pictures_that_are_the_frames_themselves_are_named(finished_run, tmp_path, capsys):
+    """Before, their PSNR was empty, and nothing said why."""
+    sequence = load_run_sequence(open_run(finished_run))
+    for i in sequence.test_index:
+        np.save(tmp_path / f"{sequence.names[i]}.npy", sequence.images[i].astype(np.float32) / np.float32(255))
+    for words in (["--pictures", str(tmp_path)], [str(tmp_path)]):
+        assert main(["evaluate", str(finished_run), *words]) == 0
+        assert f"{tmp_path}: warning: 1 of 1 pictures equal the recorded frames" in capsys.readouterr().out
+
+
 def test_evaluate_refuses_what_it_cannot_measure(finished_run, flow_pictures, tmp_path, capsys):
     run, pictures = str(finished_run), str(flow_pictures)
     assert_refused(capsys, ["evaluate"], "evaluate: RUN is missing", "--pictures FOLDER")

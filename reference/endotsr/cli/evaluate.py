@@ -65,9 +65,9 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
 
 def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of a folder of pictures."""
+    from endotsr.results.evaluation.doubts import doubt
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
-    from endotsr.results.evaluation.turned import turned_remark
     from endotsr.results.report.run_text import held_out_table
 
     assert options.pictures is not None
@@ -75,7 +75,7 @@ def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     sequence = shown_sequence("evaluate", options.run, options.sequence, options.settings)
     found = find_pictures(options.pictures, sequence)
     print(f"{options.pictures}: {len(found.files)} pictures, paired {found.pairing}")
-    if remark := turned_remark(lambda i: found.read(i, sequence.images.shape[1:]), sequence):
+    if remark := doubt(sequence, lambda i: found.read(i, sequence.images.shape[1:])):
         print(f"{options.pictures}: {remark}")
     metrics = measure_pictures(found, sequence, options.label, weights)
     print(held_out_table(metrics))

@@ -81,7 +81,7 @@ def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
     ):
         find_pictures(tmp_path / "a.mp4", sequence)
     write_video(tmp_path / "b.mp4", [np.zeros((16, 48, 3), np.uint8)] * 2, 25.0, lossless=True)
-    with pytest.raises(InputError, match=r"an array of 3x16x48; allowed: a picture of 48x32"):
+    with pytest.raises(InputError, match=r"a picture of 48x16; allowed: a picture of 48x32"):
         measure_pictures(find_pictures(tmp_path / "b.mp4", sequence), sequence)
 
 
@@ -124,7 +124,7 @@ def test_folders_that_cannot_be_paired_are_refused(names, said, sequence, tmp_pa
 @pytest.mark.parametrize(
     ("array", "said"),
     [
-        (np.zeros((3, 32, 47), np.float32), "3x32x47; allowed: a picture of 48x32"),
+        (np.zeros((3, 32, 47), np.float32), "a picture of 47x32; allowed: a picture of 48x32"),
         (np.zeros((32, 48, 3), np.uint8), "uint8; allowed: an array of float32 or float64"),
         (np.full((3, 32, 48), 128.0), "128; allowed: display units, from 0 to 1"),
         (np.full((3, 32, 48), np.nan), "not finite"),

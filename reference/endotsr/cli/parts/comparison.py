@@ -154,9 +154,9 @@ def _metrics(
             _refuse_earlier(path, metrics)
         return cast("EvaluationRecord", metrics), sequence
     from endotsr.clips.formats.video_file import is_video
+    from endotsr.results.evaluation.doubts import doubt
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
-    from endotsr.results.evaluation.turned import turned_remark
 
     if not path.is_dir() and not is_video(path):
         return cast("EvaluationRecord", read_json(path)), sequence
@@ -165,7 +165,7 @@ def _metrics(
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
         sequence = shown_sequence("evaluate", run, asked.sequence, asked.settings)
     found, shape = find_pictures(path, sequence), sequence.images.shape[1:]
-    if remark := turned_remark(lambda i: found.read(i, shape), sequence):
+    if remark := doubt(sequence, lambda i: found.read(i, shape)):
         print(f"{path}: {remark}")
     return measure_pictures(found, sequence, label, load_lpips_weights(asked.lpips)), sequence
 

@@ -162,7 +162,9 @@ def _of_shape(picture: Array, shape: tuple[int, ...], file: Path) -> FloatArray:
         picture = picture.transpose(2, 0, 1)
     if picture.shape != shape:
         size = "x".join(map(str, picture.shape))
-        raise InputError(f"{file}: an array of {size}; allowed: a picture of {shape[2]}x{shape[1]} in 3 channels")
+        is_picture = picture.ndim == len(shape) and picture.shape[0] == CHANNELS
+        found = f"a picture of {picture.shape[2]}x{picture.shape[1]}" if is_picture else f"an array of {size}"
+        raise InputError(f"{file}: {found}; allowed: a picture of {shape[2]}x{shape[1]} in 3 channels")
     return np.ascontiguousarray(picture)
 
 
