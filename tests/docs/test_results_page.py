@@ -142,6 +142,14 @@ def test_a_table_of_cutting_has_the_means_without_its_two_frames():
     assert copy.startswith("| Copy | 35.00 (40.00) | - |") and published.startswith("| as published | 40.96 | - |")
 
 
+def test_older_records_show_the_baselines_that_obey_the_masks_of_the_same_held_out_frames():
+    runs = record.stored("pulling")
+    shown = interpolation.PROGRAM.read()["clips"]["endonerf_pulling"]["every eighth frame"]["baselines"]
+    mean = sum(shown["flow_interpolation_tissue"]["psnr_tissue"]) / 8
+    assert f"| Optical-flow interpolation (DIS), tissue only | 39.99 | {mean:.2f} |" in record.table(runs)
+    assert interpolation.tissue_only("endonerf_pulling", "every eighth frame", frames=[0, 8]) == {}
+
+
 def test_the_seeds_that_are_not_measured_are_named():
     records = {"cutting_quick_seed0": made_up("quick", 0, (40.0, 30.0))}
     said = "This table lacks runs on cutting: `paper` 0 of 5 seeds, `quick` 1 of 3 seeds, `sharp` 0 of 3 seeds. "

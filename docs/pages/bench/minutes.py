@@ -18,6 +18,9 @@ from endotsr.errors import InputError
 from endotsr.results.report.style import BLUE, INK, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.log import log_until
+from pages.full_size.interpolation import tissue_only
+from pages.full_size.record import EVERY_EIGHTH
+from pages.full_size.text import LABELS
 from pages.store import figures
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, RUNS, Program
@@ -72,7 +75,8 @@ def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
 def levels(result: dict[str, Any]) -> dict[str, Any]:
     """Levels without a training: the baselines, and the numbers published for this clip."""
     published = next((row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]), None)
-    return result["baselines"] | ({"as published": published} if published else {})
+    obeying = {LABELS[name]: row for name, row in tissue_only(result["clip"]["name"], EVERY_EIGHTH).items()}
+    return result["baselines"] | obeying | ({"as published": published} if published else {})
 
 
 def label(name: str) -> str:

@@ -16,6 +16,7 @@ from pages.bench.waiting_text import CLOCKS, processor
 from pages.book import running_clip
 from pages.full_size import page as full_size
 from pages.full_size import record
+from pages.full_size.interpolation import TISSUE_ONLY, tissue_only
 from pages.full_size.text import LABELS, PREDICTIONS, mean_psnr
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, Program
@@ -52,7 +53,9 @@ def table(columns: Columns = MEASURED) -> str:
         ]
         for seconds, name, of in rows
     ]
-    for name, values_of in found["baselines"].items():
+    obeying = tissue_only(found["clip"]["name"], record.EVERY_EIGHTH)
+    baselines = found["baselines"] | {LABELS[name]: row for name, row in obeying.items()}
+    for name, values_of in baselines.items():
         cells.append([name, "-", *values([values_of], columns), "-"])
     runs = [run for of in presets.values() for run in of]
     machines, threads = sorted({run["processor"] for run in runs}), sorted({run["threads"] for run in runs})
@@ -114,7 +117,7 @@ def cutting() -> str:
         for name, of in rows.items()
     ]  # fmt: skip
     first = runs["quick"][0]
-    for key in PREDICTIONS[1:]:
+    for key in (*PREDICTIONS[1:], *TISSUE_ONLY):
         cells.append([LABELS[key], "-", "-", *values([first["baselines"][key]["mean"]], columns), "-"])
     source = first["run"]["input"]
     size = f"{source['width']}x{source['height']}"

@@ -34,6 +34,7 @@ SPLITS: dict[str, dict[str, Any]] = {
 
 LEFT_OUT = {"endonerf_cutting": (73, 74)}  # in these frames the masks differ from those of their neighbours
 NAMES = [name for name in EVERY_BASELINE if name != "temporal_mean"]
+TISSUE_ONLY = ("two_neighbours_tissue", "flow_interpolation_tissue")
 COLUMNS = (("psnr_full", 2), ("psnr_tissue", 2), ("ssim_full", 4), ("lpips", 4))
 HEADS = ("PSNR full, dB", "PSNR tissue, dB", "SSIM full", "LPIPS [0,1]")
 
@@ -60,6 +61,19 @@ def mean(part: dict[str, Any], name: str, key: str, without: tuple[int, ...] = (
     pairs = zip(part["frames"], part["baselines"][name][key])
     values = [value for frame, value in pairs if frame not in without and value is not None]
     return float(np.mean(values)) if values else float("nan")
+
+
+def tissue_only(
+    clip: str, split: str, without: tuple[int, ...] = (), frames: list[int] | None = None
+) -> dict[str, dict[str, float]]:
+    """Baseline that obeys the masks -> metric -> mean over the held-out frames, some of them left out.
+
+    frames   those that have to be the held-out ones, if given. Empty if they are others, or not measured
+    """
+    part = PROGRAM.read()["clips"].get(clip, {}).get(split)
+    if part is None or frames not in (None, part["frames"]):
+        return {}
+    return {name: {key: mean(part, name, key, without) for key, _ in COLUMNS} for name in TISSUE_ONLY}
 
 
 def half_width(part: dict[str, Any], name: str, key: str) -> float:

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from endotsr.results.evaluation.evaluate import EVERY_BASELINE
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.files import write_json
-from pages.full_size.interpolation import LEFT_OUT, frames_text
+from pages.full_size.interpolation import LEFT_OUT, frames_text, tissue_only
 from pages.store.commands import loaded
 from pages.store.intervals import interval
 from pages.store.program import RESULTS, RUN, Program
@@ -86,6 +87,9 @@ def rows(records: dict[str, dict], without: tuple[int, ...] = ()) -> list[tuple[
     out = [(f"endotsr, preset `{name}`{counted(runs)}", runs) for name, runs in presets.items()]
     out += [(f"blend of the own renders of `{name}`{counted(of)}", of) for name, of in faded.items()]
     out += [(baseline["label"], [means(baseline, without)]) for baseline in first["baselines"].values()]
+    held_out = [row["frame"] for row in first["held_out"]["per_frame"]]
+    kept = tissue_only(clip_of(first), split_of(first), without, held_out)  # records older than these lack them
+    out += [(EVERY_BASELINE[name][0], [row]) for name, row in kept.items() if name not in first["baselines"]]
     published = first["published"] if split_of(first) == EVERY_EIGHTH else []
     both = [row | {"lpips_symmetric": row.get("lpips")} for row in published]  # the paper does not state the range
     return out + [(row["label"], [{} if without else row]) for row in both]

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 
 from endotsr.results.report.tables import markdown
 from pages.full_size.against_flow import KINDS
+from pages.full_size.interpolation import tissue_only
 from pages.store.commands import loaded
 from pages.store.intervals import blocks, paired
 from pages.store.program import RESULTS
 from pages.store.tables import where_with_cores
 
 PREDICTIONS = ("model", "nearest_frame", "two_neighbours", "flow_interpolation")
-LABELS = {"model": "model", "nearest_frame": "copy", "two_neighbours": "blend", "flow_interpolation": "flow"}
+LABELS = {"model": "model", "nearest_frame": "copy", "two_neighbours": "blend", "flow_interpolation": "flow",
+          "two_neighbours_tissue": "blend, tissue only", "flow_interpolation_tissue": "flow, tissue only"}  # fmt: skip
 SPLITS = {"eighth": "every eighth frame held out", "blocks8": "blocks of 8 frames held out"}
 RECORDED = {"every_eighth": "every eighth frame", "blocks 4": "blocks of 4", "blocks 8": "blocks of 8",
             "blocks 16": "blocks of 16"}  # fmt: skip
@@ -129,14 +131,16 @@ def clip_table(runs: dict[str, Any]) -> str:
         if same:
             of_models = [f"{mean_psnr(same[name], 'model'):.2f}" if name in same else "-" for name in PRESETS]
             without = [f"{mean_psnr(next(iter(same.values())), name):.2f}" for name in PREDICTIONS[1:]]
-            rows.append(["simulated", words.removesuffix(" held out"), *of_models, *without])
+            rows.append(["simulated", words.removesuffix(" held out"), *of_models, *without, "-", "-"])
     groups = recorded()
     for split, words in RECORDED.items():
         same = {preset: means(records) for (of, preset), records in groups.items() if of == split}
         of_models = [f"{same[name]['model']:.2f}" if name in same else "-" for name in PRESETS]
         without = [f"{next(iter(same.values()))[LABELS[name]]:.2f}" for name in PREDICTIONS[1:]]
-        rows.append(["recorded", words, *of_models, *without])
-    return markdown(("Clip", "Held out", *PRESETS, "copy", "blend", "flow"), rows)
+        part = words if split == "every_eighth" else f"{words} frames"
+        obeying = [f"{row['psnr_tissue']:.2f}" for row in tissue_only("endonerf_pulling", part).values()]
+        rows.append(["recorded", words, *of_models, *without, *obeying])
+    return markdown(("Clip", "Held out", *PRESETS, *list(LABELS.values())[1:]), rows)
 
 
 def noise_table(runs: dict[str, Any]) -> str:
