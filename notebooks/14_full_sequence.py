@@ -519,8 +519,8 @@ plt.show()
 # %% [markdown]
 # At the small size the model is worse even than a copy of the nearest frame. A thumbnail of 48x38 pixels and 240
 # iterations are no fair trial. At full size a defeat is possible too: `paper` is 1.5 dB<!--=paper.below_blend--> below
-# the blend on a recorded clip with little noise ({doc}`/full_size`). Its worst frame on a simulated clip shows how.
-# Every vessel appears twice, as in the blend: the model fades one training frame into the next.
+# the blend on a recorded clip with little noise ({doc}`/full_size`). Its worst frame on a simulated clip looks like the
+# blend: every vessel appears twice, as if the model faded one training frame into the next.
 #
 # ![The worst held-out frame of paper: truth, model, copy, blend and flow](/results/full_size/paper_eighth_worst.webp)
 #
@@ -583,18 +583,17 @@ found = {name: psnr_tissue(p, clip.image, clip.mask) for name, p in predictions.
 assert found["model"] > found["blend"] + 4 > found["copy"] + 6
 
 # %% [markdown]
-# The blend shows every moved vessel twice, so its error has the shape of the vessels. The error of the model consists
-# of noise, some fine vessels, and a moving highlight, which the model fits as a colour of the surface
-# ({doc}`17_effects`).
+# The blend shows every moved vessel twice, so its error has the shape of the vessels. In the error of the model one
+# sees noise, some fine vessels, and a moving highlight ({doc}`17_effects`).
 #
-# On this clip the model is better than the blend and level with flow, which needs no model. Unlike flow, the model
-# also gives depth, motion and other views. `endotsr simulate pulling --out CLIP` and
-# `endotsr train CLIP --preset quick --out RUN` repeat a run.
+# On this clip the model is better than the blend and level with flow, which needs no model. The model is also one scene
+# with depth, motion and other views; {doc}`/interpolation` names simpler means for each of them.
+# `endotsr simulate pulling --out CLIP` and `endotsr train CLIP --preset quick --out RUN` repeat a run.
 #
-# ## From Python, in ten lines
+# ## From Python
 #
-# Users need none of these internals. After `import endotsr`, ten lines give the same training with a callback, a
-# picture at a time between two frames, the metrics of the held-out frames, and a run folder for the commands.
+# Users need none of these internals. The next cell trains with a callback, and has a picture at a time between two
+# frames, the metrics of the held-out frames, and a run folder for the commands.
 
 # %% tags=["open"]
 import tempfile

@@ -93,8 +93,8 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 #
 # A needle of $1000$ pixels, seen at an angle, has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
 # $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$. At a distance of $1000$ pixels its three products are $2.5\cdot10^{11}$,
-# $5\cdot10^{11}$ and $2.5\cdot10^{11}$, and $\det$ is about $3\cdot10^5$, while $q$ should be about 1. In float32 the difference of such products has lost its
-# digits. The specification writes a sum of squares:
+# $5\cdot10^{11}$ and $2.5\cdot10^{11}$, and $\det$ is about $3\cdot10^5$, while $q$ should be about 1. In float32 each
+# product is wrong by some $10^4$, which leaves one or two digits of $q$. The specification writes a sum of squares:
 #
 # $$
 # \begin{aligned}
@@ -176,8 +176,9 @@ shuffled = Scene(*(part[..., shuffle].copy() for part in many[:5]))
 assert np.array_equal(render(many, small)[0].colour, render(shuffled, small)[0].colour)
 
 # %% [markdown]
-# **Crossing depths.** When two Gaussians cross in depth, the image jumps by $\alpha_1\alpha_2(rgb_1-rgb_2)$. The
-# derivative does not contain this jump. The gradient check therefore refuses differences across a change of order.
+# **Crossing depths.** When two Gaussians cross in depth, the image jumps by $\alpha_1\alpha_2(rgb_1-rgb_2)$, times the
+# transmittance in front of them. The derivative does not contain this jump. The gradient check therefore refuses
+# differences across a change of order.
 
 
 # %%

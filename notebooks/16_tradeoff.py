@@ -13,8 +13,8 @@
 # %% [markdown]
 # # 16. Accuracy against time
 #
-# A Gaussian has unbounded support, and the transmittance behind an opaque stack never reaches 0. A fast renderer
-# truncates both. This chapter measures the error and the gain in time: first on a scene small enough to render
+# A Gaussian has unbounded support, and no number of Gaussians with $\alpha<1$ makes the transmittance 0. A fast
+# renderer truncates both. This chapter measures the error and the gain in time: first on a scene small enough to render
 # exactly, then on the running clip. The symbols are those of {doc}`09_compositing`. In addition,
 # $\alpha_{\mathrm{cut}}$ is called the *cutoff* and $T_{\mathrm{stop}}$ the *stop*.
 #
@@ -135,8 +135,8 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 #
 # The condition $\alpha\ge\alpha_{\mathrm{cut}}$ holds on the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
 # $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow at most with the **logarithm** of the
-# accuracy: each factor of ten adds the same area. In this small picture a factor of ten adds fewer visits each time;
-# the ellipses grow beyond the border, where there are no pixels.
+# accuracy: each factor of ten adds the same area to a Gaussian. In this small picture the last factor of ten adds fewer
+# visits than the first one; the ellipses grow beyond the border, where there are no pixels.
 
 # %%
 cutoffs = 10.0 ** -np.arange(2, 11)
@@ -220,9 +220,9 @@ print("\n".join(lines))
 print(f"the brightest colour of a Gaussian: {brightest:.2f}")
 
 # %% [markdown]
-# The bound of the error is $T_{\mathrm{stop}}/(1-\alpha_{\max})$ of the brightest colour. A stop of $10^{-4}$ loses more
-# than a quarter of the range of colours at some pixels. The Gaussian before which a pixel ends may be the opaque one that
-# fills the pixel. With $\alpha=0.9999$ and $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the weight
+# The bound of the error is $T_{\mathrm{stop}}/(1-\alpha_{\max})$ of the brightest colour. Almost without a clamp, with
+# $\alpha_{\max}=1-2^{-20}$, a stop of $10^{-4}$ loses more than a quarter of the range of colours at some pixels. The
+# Gaussian before which a pixel ends may be the opaque one that fills the pixel. With $\alpha=0.9999$ and $T_k=0.5$, the product $T_k(1-\alpha)$ is below the stop, and the weight
 # $\alpha T_k$ is lost. In general $T_k<T_{\mathrm{stop}}/(1-\alpha_{\max})$ where a pixel ends. With the clamp
 # $\alpha_{\max}=0.99$ of the preset `paper`, at most a hundred times $T_{\mathrm{stop}}$ is lost. If you raise the stop
 # or the clamp, lower the other one.
