@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[4] / "golden"))
 import hand_port
+from tqdm import tqdm
 
 from endotsr.errors import InputError
 from endotsr.port.judge.compare import judged
@@ -74,7 +75,7 @@ def refusing(golden, edits) -> list[str]:
 def rows_of_constants(golden) -> list[tuple[str, str, str]]:
     """Name, equation and what refuses another value; a constant that nothing refuses and that is not free is a gap."""
     rows = []
-    for entry in constants():
+    for entry in tqdm(constants(), "constants", leave=False, disable=None):
         if "free" in entry:
             rows.append((entry["name"], entry["equation"], f"none: {entry['free']}"))
             continue
