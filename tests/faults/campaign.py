@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "cli")]
+sys.path[:0] = [str(HERE), str(HERE.parent / "cli"), str(HERE.parent)]
 
 from file_layer import disk_full, killed, operations, read_only  # noqa: E402
 from tiny import assert_same_run, train_words, written_folder  # noqa: E402
