@@ -88,12 +88,6 @@ def test_hard_D6_depths_above_255_are_not_wrapped():
     assert two == 64 * one
 
 
-def test_equal_neighbours_have_subgradient_zero():
-    depth, rendered, mask, edges = np.ones((12, 17)), np.zeros((3, 12, 17)), tool_mask(), np.zeros((12, 17), bool)
-    _, grads = loss_and_gradients(depth, rendered, mask, edges)
-    assert not grads.d_rendered.any()
-
-
 def test_float32_and_threads():
     depth, rendered, mask, edges = case((40, 33))
     depth, rendered = depth.astype(np.float32), rendered.astype(np.float32)
