@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from input_kinds import (
     depth_files,
     depth_is_true,
     folder_of,
+    frames_changed,
     half_excluded,
     mask,
     masked,
@@ -25,6 +25,8 @@ from input_kinds import (
     prepare,
     public,
     raw,
+    reworded,
+    tiff,
     trajectory,
 )
 from made_videos import HEIGHT, files, picture, pictures, write
@@ -42,8 +44,7 @@ def steps_per_metre(steps: int, key: str = "DepthMapFactor"):
 
     def change(folder: Path) -> None:
         of_orb_slam(folder)
-        settings = folder / "TUM1.yaml"
-        settings.write_text(settings.read_text().replace("DepthMapFactor: 5000", f"{key}: {steps}"))
+        reworded("TUM1.yaml", lambda text: text.replace("DepthMapFactor: 5000", f"{key}: {steps}"))(folder)
 
     return raw(raw_sources.tum, change=change)
 
@@ -105,18 +106,6 @@ def numbers(factor: float, blur: int = 0):
     return save
 
 
-def tiff(path: Path, plane: np.ndarray, black_is_zero: int, bits: int, sign: int = 1) -> None:
-    """A TIFF written by hand, with 0 as white if `black_is_zero` is 0."""
-    height, width = plane.shape
-    data = np.packbits(plane, axis=1).tobytes() if bits == 1 else plane.astype(f"<u{bits // 8}").tobytes()
-    tags = [(256, 4, width), (257, 4, height), (258, 3, bits), (259, 3, 1), (262, 3, black_is_zero), (273, 4, 8),
-            (277, 3, 1), (278, 4, height), (279, 4, len(data)), (339, 3, sign)]  # fmt: skip
-    directory = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
-    path.write_bytes(
-        b"II*\0" + struct.pack("<I", 8 + len(data)) + data + struct.pack("<H", len(tags)) + directory + bytes(4)
-    )
-
-
 def wide_tiff(path: Path, plane: np.ndarray, black_is_zero: int = 1) -> None:
     """Hundredths of a millimetre."""
     stored = np.round(plane * 100).astype(np.uint16)
@@ -169,28 +158,9 @@ def numbered_from_1(folder: Path) -> list[str]:
     return words
 
 
-def with_fields(**more):
-    """Fields of newer programs in every entry of transforms.json."""
-
-    def change(folder: Path) -> None:
-        file = folder / "transforms.json"
-        data = json.loads(file.read_text())
-        for entry in data["frames"]:
-            entry |= more
-        file.write_text(json.dumps(data))
-
-    return public("nerfstudio", change=change)
-
-
 def other_matrices(right: np.ndarray):
-    def change(folder: Path) -> None:
-        file = folder / "transforms.json"
-        data = json.loads(file.read_text())
-        for entry in data["frames"]:
-            entry["transform_matrix"] = (np.array(entry["transform_matrix"]) @ right).tolist()
-        file.write_text(json.dumps(data))
-
-    return public("nerfstudio", change=change)
+    matrix = lambda frame: (np.array(frame["transform_matrix"]) @ right).tolist()
+    return public("nerfstudio", change=frames_changed(transform_matrix=matrix))
 
 
 def frames_last(folder: Path) -> list[str]:
@@ -282,9 +252,11 @@ EXPORTED_ROWS = [
         "carry the same frame number"),
     Row("names of a counter that begins again", named(lambda k: f"IMG_{(9994 + k) % 10000:04d}.png"), "told",
         "between IMG_0005.png and IMG_9994.png"),
-    Row("nerfstudio, fields of newer programs", with_fields(normal_file_path="n.png", original_fps=30), "told",
+    Row("nerfstudio, fields of newer programs", public("nerfstudio", change=frames_changed(
+        normal_file_path="n.png", original_fps=30)), "told",
         "unknown here: normal_file_path, original_fps"),
-    Row("nerfstudio, one time for all frames", with_fields(time=0.0), "refused", "two frames have one time"),
+    Row("nerfstudio, one time for all frames", public("nerfstudio", change=frames_changed(time=0.0)),
+        "refused", "two frames have one time"),
     Row("nerfstudio, left-handed matrices", other_matrices(np.diag([1.0, 1, -1, 1])), "refused", "a mirror image"),
     Row("nerfstudio, scaled rotations", other_matrices(np.diag([2.0, 2, 2, 1])), "refused",
         "not perpendicular unit vectors"),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from field_inputs import FRAMES, HEIGHT, WIDTH, Format, Keys, pictures, result
+from input_kinds import exif
 
 from endotsr.clips.formats import picture_fields, pose_fields
 from endotsr.clips.formats.colmap_model import MODELS
@@ -153,15 +154,6 @@ def write_png_chunks(folder: Path, keys: Keys) -> None:
     data = b"".join(chunk(name, keys[name]) for name in order if keys.get(name) is not None)
     for k in range(2):
         (folder / f"{k}.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)
-
-
-def exif(orientation: int = 1, space: int = 1) -> bytes:
-    from PIL import Image
-
-    made = Image.Exif()
-    made[0x0112] = orientation
-    made.get_ifd(0x8769)[0xA001] = space
-    return made.tobytes()
 
 
 PIXELS = bytes((b"\0" + bytes(range(WIDTH))) * HEIGHT)

@@ -1,5 +1,7 @@
 """How the inputs of `inputs_tried.py` are made, and how an outcome is checked."""
 
+import json
+import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -367,6 +369,45 @@ def with_files(*names: str):
             (folder / name).write_text("1")
 
     return change
+
+
+def reworded(name: str, change):
+    """A text file of a folder, changed."""
+
+    def done(folder: Path) -> None:
+        (folder / name).write_text(change((folder / name).read_text()))
+
+    return done
+
+
+def first_to_last(first: int, last: int | None = None, step: int = 1):
+    """Some of the lines of a text."""
+    return lambda text: "\n".join(text.splitlines()[first:last:step]) + "\n"
+
+
+def frames_changed(**changes):
+    """Every entry of the frames of transforms.json, with keys that are computed from it or added."""
+
+    def entry(frame):
+        return frame | {key: value(frame) if callable(value) else value for key, value in changes.items()}
+
+    def change(text: str) -> str:
+        data = json.loads(text)
+        return json.dumps(data | {"frames": [entry(frame) for frame in data["frames"]]})
+
+    return reworded("transforms.json", change)
+
+
+def tiff(path: Path, plane: np.ndarray, black_is_zero: int = 1, bits: int = 16, sign: int = 1) -> None:
+    """A TIFF written by hand, with 0 as white if `black_is_zero` is 0; `sign`: 2 signed, 3 real numbers."""
+    height, width = plane.shape
+    data = np.packbits(plane, axis=1).tobytes() if bits == 1 else plane.astype(f"<u{bits // 8}").tobytes()
+    tags = [(256, 4, width), (257, 4, height), (258, 3, bits), (259, 3, 1), (262, 3, black_is_zero), (273, 4, 8),
+            (277, 3, 1), (278, 4, height), (279, 4, len(data)), (339, 3, sign)]  # fmt: skip
+    directory = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
+    path.write_bytes(
+        b"II*\0" + struct.pack("<I", 8 + len(data)) + data + struct.pack("<H", len(tags)) + directory + bytes(4)
+    )
 
 
 def each(name, change):

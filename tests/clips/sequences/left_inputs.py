@@ -16,6 +16,7 @@ from input_kinds import (
     depth_files,
     depth_is_true,
     files,
+    first_to_last,
     folder_of,
     half_excluded,
     mask,
@@ -24,6 +25,7 @@ from input_kinds import (
     prepare,
     public,
     rated,
+    reworded,
     sides,
     timed,
     video,
@@ -42,8 +44,7 @@ ALL = [scene_picture(i) for i in range(FRAMES)]
 def part_of(model: Path, out: Path, first: int, last: int) -> None:
     """A text model with some of the pictures of another one."""
     shutil.copytree(model, out)
-    lines = (model / "images.txt").read_text().splitlines()
-    (out / "images.txt").write_text("\n".join(lines[2 * first : 2 * last]) + "\n")
+    reworded("images.txt", first_to_last(2 * first, 2 * last))(out)
 
 
 def two_models(raw: Path) -> None:
@@ -51,12 +52,6 @@ def two_models(raw: Path) -> None:
     (raw / "sparse/0").rename(raw / "whole")
     part_of(raw / "whole", raw / "sparse/0", 0, 2)
     part_of(raw / "whole", raw / "sparse/1", 2, FRAMES)
-    shutil.rmtree(raw / "whole")
-
-
-def one_unregistered(raw: Path) -> None:
-    (raw / "sparse/0").rename(raw / "whole")
-    part_of(raw / "whole", raw / "sparse/0", 0, FRAMES - 1)
     shutil.rmtree(raw / "whole")
 
 
@@ -115,7 +110,8 @@ COLMAP_ROWS = [
         close(ALL[:2], 0.01)),
     Row("COLMAP, --model that is not there", colmap("--model", "3", change=two_models), "refused",
         "allowed: sparse/0, sparse/1"),
-    Row("COLMAP, a picture that is not registered", colmap(change=one_unregistered), "told",
+    Row("COLMAP, a picture that is not registered", colmap(change=reworded("sparse/0/images.txt",
+        first_to_last(0, -2))), "told",
         "1 pictures are not registered", close(ALL[:-1], 0.01)),
     Row("COLMAP, dense/0/sparse", colmap(change=moved("dense/0/images", "dense/0/sparse")), "right", "",
         close(ALL, 0.01)),
@@ -361,11 +357,6 @@ def objects(i: int) -> np.ndarray:
     return mask(1) + mask(1) * (np.arange(WIDTH) < 20).astype(np.uint8)
 
 
-def with_backslashes(raw: Path) -> None:
-    file = raw / "transforms.json"
-    file.write_text(file.read_text().replace("./images/", ".\\\\images\\\\"))
-
-
 def as_blender(raw: Path) -> None:
     """Field of view in place of the focal length, no endings, transforms_train.json."""
     file = raw / "transforms.json"
@@ -380,7 +371,8 @@ def as_blender(raw: Path) -> None:
 OTHER_ROWS = [
     Row("masks, numbers of objects, --excluded-value nonzero", masked([objects(0)] * 12, "--excluded-value", "nonzero"),
         "right", "", half_excluded),
-    Row("nerfstudio, separators of Windows", public("nerfstudio", change=with_backslashes), "told",
+    Row("nerfstudio, separators of Windows", public("nerfstudio", change=reworded("transforms.json",
+        lambda text: text.replace("./images/", ".\\\\images\\\\"))), "told",
         "unit of lengths unknown", centred),
     Row("nerfstudio, --trajectory-unit", public("nerfstudio", "--trajectory-unit", "m"), "told", "unit of lengths m",
         lambda folder: read_sequence_file(folder / "o").unit == "mm"),

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from input_kinds import Row, prepare
+from input_kinds import Row, first_to_last, prepare, reworded
 from left_inputs import matrices, squared, true_poses
 from scipy.spatial.transform import Rotation
 from silent_inputs import EUROC_HEAD, quaternions
@@ -106,28 +106,9 @@ def without(name: str):
     return change
 
 
-def rewritten(name: str, change):
-    def changed(raw: Path) -> None:
-        (raw / name).write_text(change((raw / name).read_text()))
-
-    return changed
-
-
 def last_picture(camera: str):
     """The last picture of a camera is missing, or its row."""
     return f"{camera}/data/{BEGIN + 13 * STEP}.png"
-
-
-def without_last_row(raw: Path) -> None:
-    lines = (raw / "cam0/data.csv").read_text().splitlines()
-    (raw / "cam0/data.csv").write_text("\n".join(lines[:-1]) + "\n")
-
-
-def later_truth(raw: Path) -> None:
-    """The ground truth begins after the third picture."""
-    file = raw / "state_groundtruth_estimate0/data.csv"
-    lines = file.read_text().splitlines()
-    file.write_text("\n".join([lines[0], *lines[1 + 12 :]]) + "\n")
 
 
 def further_sensors(raw: Path) -> None:
@@ -152,7 +133,8 @@ RIG_ROWS = [
         rig(change=further_sensors)(folder)], "told", "not read: imu0/, leica0/", true_rig),
     Row("EuRoC, a row without a picture", rig(depth=False, change=without(last_picture("cam0"))), "told",
         "without a picture, left out: 1403636580413555584.png", lambda folder: true_rig(folder, MISSING)),
-    Row("EuRoC, a picture without a row", rig(depth=False, change=without_last_row), "told",
+    Row("EuRoC, a picture without a row", rig(depth=False, change=reworded("cam0/data.csv",
+        first_to_last(0, -1))), "told",
         "without a line in data.csv, left out", lambda folder: true_rig(folder, MISSING)),
     Row("EuRoC, a right picture missing", rig(second=True, change=without(last_picture("cam1"))), "told",
         "cam0: without a picture of the other camera", lambda folder: true_rig(folder, MISSING, 4.0)),
@@ -160,15 +142,17 @@ RIG_ROWS = [
         "both cameras count as rectified", true_rig),
     Row("EuRoC, no ground truth", rig(change=without("state_groundtruth_estimate0")), "told",
         "the camera counts as static", lambda folder: read_sequence_file(folder / "o").poses is None),
-    Row("EuRoC, the ground truth begins later", rig(change=later_truth), "refused", "3 of 14 frames have no pose"),
-    Row("EuRoC, the ground truth has another clock", rig(change=rewritten("state_groundtruth_estimate0/data.csv",
+    Row("EuRoC, the ground truth begins later", rig(change=reworded("state_groundtruth_estimate0/data.csv",
+        lambda text: text.splitlines()[0] + "\n" + first_to_last(1 + 12)(text))), "refused",
+        "3 of 14 frames have no pose"),
+    Row("EuRoC, the ground truth has another clock", rig(change=reworded("state_groundtruth_estimate0/data.csv",
         lambda text: text.replace("\n1403", "\n1503"))), "refused", "no pose at the time of any picture"),
-    Row("EuRoC, no T_BS", rig(change=rewritten("cam0/sensor.yaml", lambda text: text.replace("T_BS", "pose"))),
+    Row("EuRoC, no T_BS", rig(change=reworded("cam0/sensor.yaml", lambda text: text.replace("T_BS", "pose"))),
         "refused", "T_BS is missing"),
-    Row("EuRoC, fisheye", rig(change=rewritten("cam0/sensor.yaml", lambda text: text.replace("radial-tangential",
+    Row("EuRoC, fisheye", rig(change=reworded("cam0/sensor.yaml", lambda text: text.replace("radial-tangential",
         "equidistant"))), "refused", "distortion_model 'equidistant'"),
-    Row("EuRoC, stamps in microseconds", rig(change=rewritten("cam0/data.csv", in_microseconds)), "refused",
+    Row("EuRoC, stamps in microseconds", rig(change=reworded("cam0/data.csv", in_microseconds)), "refused",
         "stamps in nanoseconds"),
-    Row("EuRoC, two rows of one stamp", rig(change=rewritten("cam0/data.csv", lambda text: text + f"{BEGIN},a.png\n")),
+    Row("EuRoC, two rows of one stamp", rig(change=reworded("cam0/data.csv", lambda text: text + f"{BEGIN},a.png\n")),
         "refused", "occurs twice"),
 ]  # fmt: skip

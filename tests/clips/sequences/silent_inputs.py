@@ -1,6 +1,5 @@
 """Rows of `inputs_tried.py` about fields that a reader passed over: columns, rows of matrices, lines, models, marks."""
 
-import json
 import shutil
 import struct
 import zlib
@@ -22,12 +21,15 @@ from input_kinds import (
     depth_files,
     depth_is_true,
     exif,
+    first_to_last,
     folder_of,
+    frames_changed,
     named,
     pair,
     prepare,
     public,
     raw,
+    reworded,
     sides,
     timed,
     trajectory,
@@ -114,11 +116,6 @@ def backwards(make):
     return lambda folder: [*make(folder), "--trajectory-direction", "world_to_camera"]
 
 
-def without_lines_of_points(raw: Path) -> None:
-    file = raw / "sparse/0/images.txt"
-    file.write_text("\n".join(file.read_text().splitlines()[::2]) + "\n")
-
-
 def longer(name: str):
     """A binary file with bytes behind its last entry, as another version of its format has."""
 
@@ -160,14 +157,6 @@ def flat_depth(folder: Path) -> bool:
     return bool((seen > 0).mean() > 0.2 and np.ptp(seen[seen > 0]) <= 1)
 
 
-def transposed_matrices(raw: Path) -> None:
-    file = raw / "transforms.json"
-    data = json.loads(file.read_text())
-    for entry in data["frames"]:
-        entry["transform_matrix"] = np.array(entry["transform_matrix"]).T.tolist()
-    file.write_text(json.dumps(data))
-
-
 def kitti_pair() -> str:
     across = [100.0, 0, 63.5, -0.4, 0, 101, 47.5, 0, 0, 0, 1, 0]
     own = across[:3] + [0.0] + across[4:]
@@ -192,11 +181,13 @@ POSES = [
         "its head line names 9 columns"),
     Row("trajectory, order of the quaternion not stated",
         trajectory([f"{i} 0 0 0 0 0 0 1" for i in range(12)]), "told", "quaternions are read as x y z w"),
-    Row("nerfstudio, transposed matrices", public("nerfstudio", change=transposed_matrices), "refused",
+    Row("nerfstudio, transposed matrices", public("nerfstudio", change=frames_changed(
+        transform_matrix=lambda frame: np.array(frame["transform_matrix"]).T.tolist())), "refused",
         "is the matrix transposed?"),
 ]  # fmt: skip
 MODELS = [
-    Row("COLMAP, images.txt without lines of points", colmap(change=without_lines_of_points), "refused",
+    Row("COLMAP, images.txt without lines of points", colmap(change=reworded(
+        "sparse/0/images.txt", first_to_last(0, step=2))), "refused",
         "every picture has two lines"),
     *(Row(f"COLMAP, bytes behind the last entry of {name}.bin", colmap(binary=True, change=longer(name)), "refused",
           "bytes behind the last entry") for name in ("cameras", "images", "points3D")),
@@ -262,11 +253,6 @@ def public_endonerf(*names: str):
         return prepare("clip", camera=())(folder)
 
     return make
-
-
-def few_points(raw: Path) -> None:
-    file = raw / "sparse/0/points3D.txt"
-    file.write_text("\n".join(file.read_text().splitlines()[:-3]) + "\n")
 
 
 def one_more_picture(raw: Path) -> None:
@@ -375,7 +361,8 @@ PICTURES = [
         "not read: 5 files .jp2"),
     Row("pictures named by their seconds", named(lambda k: f"{1305031102 + k * k / 10:.6f}.png", pictures(4)), "told",
         "read as seconds", timed([0, 100, 400, 900])),
-    Row("COLMAP, points that points3D lacks", colmap(change=few_points), "told", "are not in points3D"),
+    Row("COLMAP, points that points3D lacks", colmap(change=reworded("sparse/0/points3D.txt",
+        first_to_last(0, -3))), "told", "are not in points3D"),
     Row("nerfstudio, pictures that the file does not list", public("nerfstudio", change=one_more_picture), "told",
         "not listed in transforms.json and are left out"),
     Row("TUM, trajectory and settings of ORB-SLAM", raw(raw_sources.tum, change=of_orb_slam), "told",

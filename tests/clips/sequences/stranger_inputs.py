@@ -1,6 +1,5 @@
 """Rows of `inputs_tried.py` about folders of a user who knows none of the conventions here."""
 
-import struct
 import zipfile
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from input_kinds import (
     named,
     prepare,
     ros_text,
+    tiff,
     trajectory,
     video,
 )
@@ -92,18 +92,6 @@ def zipped(folder: Path) -> list[str]:
         for file in (folder / "clip").iterdir():
             archive.write(file, file.name)
     return prepare("clip.zip")(folder)
-
-
-def half_tiff(path: Path, plane) -> None:
-    """A TIFF of 16-bit floating-point numbers, written by hand: Pillow has no such mode."""
-    height, width = plane.shape
-    data = plane.astype("<f2").tobytes()
-    tags = [(256, 4, width), (257, 4, height), (258, 3, 16), (259, 3, 1), (262, 3, 1), (273, 4, 8), (277, 3, 1),
-            (278, 4, height), (279, 4, len(data)), (339, 3, 3)]  # fmt: skip
-    directory = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
-    path.write_bytes(
-        b"II*\0" + struct.pack("<I", 8 + len(data)) + data + struct.pack("<H", len(tags)) + directory + bytes(4)
-    )
 
 
 def exr(path: Path, plane) -> None:
@@ -185,7 +173,8 @@ STRANGER_ROWS = [
     Row("pictures, letterbox", folder_of(letterbox()), "told", "--crop 0 16 128 64 keeps the rest"),
     Row("video, interlaced, side by side", video("a.mp4", INTERLACED_PAIR, "--stereo", "side_by_side", "--baseline",
         "4", options={"flags": "+ildct+ilme", "x264-params": "interlaced=1:tff=1"}), "told", "is interlaced"),
-    Row("depth, half-float TIFF", depth_files(half_tiff, ".tiff"), "refused",
+    Row("depth, half-float TIFF", depth_files(lambda path, plane: tiff(path,
+        plane.astype("<f2").view("<u2"), sign=3), ".tiff"), "refused",
         "numbers of 16 or 64 bits"),
     Row("depth, EXR", depth_files(exr, ".exr"), "refused", "OpenEXR is not read; convert it"),
     Row("depth, half-float npy", depth_files(npy(np.float16), ".npy"), "right", ""),
