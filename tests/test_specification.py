@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import msgspec
+import pytest
 from pages.book import settings
 
 from endotsr.config import DEMO, PAPER, PRESETS, SHARP, Config, with_iterations
@@ -156,24 +157,21 @@ def test_run_presets_equal_the_table():
             assert documented_value(text) == settings_by_key(PRESETS[name])[key]
 
 
-def test_the_quick_preset_is_sharp_with_another_length_and_a_budget():
-    stretched, quick = settings_by_key(with_iterations(SHARP, 1600)), settings_by_key(PRESETS["quick"])
-    assert {key: quick[key] for key in quick if quick[key] != stretched[key]} == {
-        "preset": "quick",
-        "density.growth": "budget",
-        "density.maximum": 22_000,
-        "initialisation.first_frame_points": 14_000,
-        "initialisation.other_frame_points": 2000,
-        "training.coarse_start": True,
-        "training.visits_per_frame": 29,
-    }
+OF_SHARP = {  # what differs from `sharp` of the same length
+    "quick": (1600, {
+        "preset": "quick", "density.growth": "budget", "density.maximum": 22_000,
+        "initialisation.first_frame_points": 14_000, "initialisation.other_frame_points": 2000,
+        "training.coarse_start": True, "training.visits_per_frame": 29,
+    }),
+    "demo": (1500, {
+        "preset": "demo", "density.gradient_threshold": 7e-4,
+        "initialisation.first_frame_points": 6000, "initialisation.other_frame_points": 1500,
+    }),
+}  # fmt: skip
 
 
-def test_the_demo_preset_is_sharp_with_another_length_and_size():
-    stretched, demo = settings_by_key(with_iterations(SHARP, 1500)), settings_by_key(DEMO)
-    assert {key: demo[key] for key in demo if demo[key] != stretched[key]} == {
-        "preset": "demo",
-        "density.gradient_threshold": 7e-4,
-        "initialisation.first_frame_points": 6000,
-        "initialisation.other_frame_points": 1500,
-    }
+@pytest.mark.parametrize("name", OF_SHARP)
+def test_a_short_preset_is_sharp_with_another_length_and_size(name):
+    length, changes = OF_SHARP[name]
+    stretched, found = settings_by_key(with_iterations(SHARP, length)), settings_by_key({**PRESETS, "demo": DEMO}[name])
+    assert {key: found[key] for key in found if found[key] != stretched[key]} == changes

@@ -9,6 +9,7 @@ import json
 import random
 import struct
 import zlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -309,46 +310,46 @@ def riff(rng: random.Random, data: bytes) -> bytes:
     return changed(data, 0)
 
 
-def packets(rng: random.Random, data: bytes) -> bytes:
-    """Packets of a transport stream removed, repeated, exchanged, or changed behind their first byte."""
-    found = [data[k : k + 188] for k in range(0, len(data), 188)]
+def rearranged(
+    rng: random.Random, found: list[bytes], first: int, kinds: int, changed: Callable[[bytes, int], bytes]
+) -> list[bytes]:
+    """Pieces from `first` on removed, repeated, exchanged, or changed in one of `kinds` - 3 ways."""
     for _ in range(rng.choice((1, 1, 2, 4))):
-        k, other = rng.randrange(len(found)), rng.randrange(len(found))
-        kind = rng.randrange(6)
-        if kind == 0 and len(found) > 1:
+        k, other = rng.randrange(first, len(found)), rng.randrange(first, len(found))
+        kind = rng.randrange(kinds)
+        if kind == 0 and len(found) > first + 1:
             del found[k]
         elif kind == 1:
             found.insert(other, found[k])
         elif kind == 2:
             found[k], found[other] = found[other], found[k]
         else:
-            at = rng.randrange(1, rng.choice((5, 24, 188)))
-            found[k] = (found[k][:at] + bytes([rng.choice((0, 1, 0x40, 0x7F, 0xFF, rng.randrange(256)))]))[
-                :188
-            ] + found[k][at + 1 :]
-    return b"".join(found)
+            found[k] = changed(found[k], kind)
+    return found
+
+
+def packets(rng: random.Random, data: bytes) -> bytes:
+    """Packets of a transport stream removed, repeated, exchanged, or changed behind their first byte."""
+
+    def changed(packet: bytes, _: int) -> bytes:
+        at = rng.randrange(1, rng.choice((5, 24, 188)))
+        return (packet[:at] + bytes([rng.choice((0, 1, 0x40, 0x7F, 0xFF, rng.randrange(256)))]))[:188] + packet[
+            at + 1 :
+        ]
+
+    return b"".join(rearranged(rng, [data[k : k + 188] for k in range(0, len(data), 188)], 0, 6, changed))
 
 
 def parts(rng: random.Random, data: bytes) -> bytes:
     """Parts of an MPEG stream, which begin with 0 0 1, removed, repeated, exchanged, renumbered or changed."""
-    found = data.split(b"\0\0\1")
-    for _ in range(rng.choice((1, 1, 2, 4))):
-        k, other = rng.randrange(1, len(found)), rng.randrange(1, len(found))
-        kind = rng.randrange(5)
-        if kind == 0 and len(found) > 2:
-            del found[k]
-        elif kind == 1:
-            found.insert(other, found[k])
-        elif kind == 2:
-            found[k], found[other] = found[other], found[k]
-        elif kind == 3:
-            found[k] = (
-                bytes([rng.choice((0, 1, 0xB3, 0xB5, 0xB8, 0xB9, 0xBA, 0xBB, 0xBC, 0xBD, 0xBE, 0xE0, 0xFF))])
-                + found[k][1:]
-            )
-        else:
-            found[k] = plain(rng, found[k][:24]) + found[k][24:]
-    return b"\0\0\1".join(found)
+
+    def changed(part: bytes, kind: int) -> bytes:
+        if kind == 3:
+            number = rng.choice((0, 1, 0xB3, 0xB5, 0xB8, 0xB9, 0xBA, 0xBB, 0xBC, 0xBD, 0xBE, 0xE0, 0xFF))
+            return bytes([number]) + part[1:]
+        return plain(rng, part[:24]) + part[24:]
+
+    return b"\0\0\1".join(rearranged(rng, data.split(b"\0\0\1"), 1, 5, changed))
 
 
 def ply(rng: random.Random, data: bytes) -> bytes:

@@ -109,6 +109,12 @@ def deinterlaced(frames):
     return check
 
 
+def turned_clockwise(degrees: int):
+    """The written pictures are turned, and the camera has their size."""
+    frames = [np.rot90(shown, -degrees // 90) for shown in pictures()]
+    return both(close(frames), size(frames[0].shape[1], frames[0].shape[0]))
+
+
 def scratched(path: Path) -> None:
     """Bytes in the middle of the pictures are overwritten."""
     data = bytearray(path.read_bytes())
@@ -274,10 +280,12 @@ ROWS = [
             "--orientation turned")
         for degrees in (90, 180, 270)
     ),
-    Row("video, rotation, --orientation turned", video("a.mp4", None, "--orientation", "turned",
-        change=lambda p: turn(p, 90)), "told", "states a rotation", size(HEIGHT, WIDTH)),
-    Row("video, rotation, --orientation stored", video("a.mp4", None, "--orientation", "stored",
-        change=lambda p: turn(p, 90)), "told", "states a rotation", size(WIDTH, HEIGHT)),
+    *(
+        Row(f"video, rotation of {degrees} degrees, --orientation {way}", video("a.mp4", None, "--orientation", way,
+            change=lambda p, d=degrees: turn(p, d)), "told", "states a rotation",
+            turned_clockwise(degrees if way == "turned" else 0))
+        for degrees in (90, 180, 270) for way in ("turned", "stored")
+    ),
     Row("video, pixels that are not square", video("a.mkv", shape=Fraction(16, 15)), "told", "times as wide as high"),
     Row("video, high dynamic range (PQ)", video("a.mkv", codec="libx265", layout="yuv420p10le", transfer=16),
         "refused", "high dynamic range (PQ)"),

@@ -65,13 +65,6 @@ def test_equals_the_definition_and_scipy(noise):
     assert value == pytest.approx(scipy_ssim(rendered, observed, mask), abs=1e-11)
 
 
-def test_gradient_equals_complex_steps():
-    rendered, observed = images((2, 8, 13))
-    mask = tool_mask((8, 13))
-    expected = complex_steps(rendered, observed, mask)
-    np.testing.assert_allclose(ssim(rendered, observed, mask)[1], expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-
-
 def test_large_image_equals_skimage_inside():
     """Away from the border skimage's Gaussian SSIM is the same map (its window reaches 5 pixels as well)."""
     from skimage.metrics import structural_similarity

@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from dask_cluster import Cluster, in_the_middle
 from tiny_sweep import (
-    BASE,
-    CONFIGURATIONS,
     assert_same_checkpoints,
     iterations,
     kill,
@@ -24,6 +22,7 @@ from endotsr.cli.main import main
 
 pytest.importorskip("distributed", reason="Dask is not installed (pip install 'endotsr[cluster]')")
 
+NOWHERE = "tcp://127.0.0.1:9"
 LENGTH = 100  # iterations, enough to kill a worker in the middle
 
 
@@ -34,10 +33,11 @@ def cluster(tmp_path) -> Iterator[Cluster]:
     made.end()
 
 
-def refused(capsys, *words: str) -> str:
-    """What a command says that ends with exit code 2 and one line."""
+def refused(capsys, folder: Path, address: str) -> str:
+    """What a sweep with this scheduler says, which ends with exit code 2 and one line."""
     capsys.readouterr()
-    assert main(list(words)) == 2
+    words = ["sweep", str(write_spec(folder)), "--out", str(folder / "out"), "--scheduler", address]
+    assert main(words) == 2
     said = capsys.readouterr().err.splitlines()
     lines = [line for line in said if line.startswith("endotsr: error: ")]
     assert len(lines) == 1, said
@@ -76,29 +76,22 @@ def test_a_killed_worker_loses_nothing_and_results_equal_the_local_pool(cluster,
 
 
 def test_no_scheduler_is_one_line(capsys, tmp_path):
-    spec = write_spec(tmp_path)
-    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9")
-    assert "tcp://127.0.0.1:9: no Dask scheduler answers; allowed: " in said
+    assert f"{NOWHERE}: no Dask scheduler answers; allowed: " in refused(capsys, tmp_path, NOWHERE)
 
 
 def test_a_worker_of_another_version_is_one_line(cluster, capsys, tmp_path):
     (tmp_path / "other_version.py").write_text("import endotsr\nendotsr.__version__ = '9.9'\n")
     cluster.worker("other", "--preload", str(tmp_path / "other_version.py"))
-    spec = write_spec(tmp_path)
-    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", cluster.address)
+    said = refused(capsys, tmp_path, cluster.address)
     assert "endotsr 9.9 (here " in said and "allowed: those of this machine" in said
     assert not list((tmp_path / "out" / "runs").iterdir())
 
 
 def test_a_worker_that_takes_several_runs_is_one_line(cluster, capsys, tmp_path):
     cluster.worker("wide", "--nthreads", "3")
-    spec = write_spec(tmp_path)
-    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", cluster.address)
-    assert "has 3 threads; allowed: --nthreads 1" in said
+    assert "has 3 threads; allowed: --nthreads 1" in refused(capsys, tmp_path, cluster.address)
 
 
 def test_no_scheduler_option_without_dask_is_one_line(capsys, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    spec = write_spec(tmp_path, BASE + CONFIGURATIONS)
-    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9")
-    assert "endotsr[cluster]" in said
+    assert "endotsr[cluster]" in refused(capsys, tmp_path, NOWHERE)

@@ -16,6 +16,12 @@ from endotsr.studies.windows.survey import SurveyedFrame
 FRAMES = 56
 SIZE = SimulatorSettings(width=48, height=40, frames=FRAMES)
 WANTED = Wanted(32, 8, 1)  # frames 0:32 and 24:56
+COLD, WARM = 1500, 600  # iterations of the windows of a chain
+CHAIN = (
+    "--windows", "32", "--chain", "2", "--preset", "demo", "--iterations", f"{COLD}", "--no-evaluate",
+    "--initialisation.first-frame-points", "300", "--initialisation.other-frame-points", "100",
+    "--density.maximum", "600",
+)  # fmt: skip
 
 
 def settings(iterations: int = 20, **sections: dict) -> Config:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from small_recording import write_recording
+from small_recording import CHAIN, COLD, WARM, write_recording
 
 from endotsr.cli.main import main
 
@@ -15,12 +15,7 @@ from tiny_sweep import assert_same_arrays, iterations, kill, start, wait_until
 
 pytest.importorskip("distributed", reason="Dask is not installed (pip install 'endotsr[cluster]')")
 
-COLD, WARM = 1500, 600  # iterations
-SMALL = [
-    "--windows", "32", "--chain", "2", "--preset", "demo", "--iterations", f"{COLD}", "--no-evaluate",
-    "--initialisation.first-frame-points", "300", "--initialisation.other-frame-points", "100",
-    "--density.maximum", "600", "--training.checkpoint-every", "20", "--threads", "1",
-]  # fmt: skip
+SMALL = [*CHAIN, "--training.checkpoint-every", "20", "--threads", "1"]
 
 
 @pytest.mark.faults

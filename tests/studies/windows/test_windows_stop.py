@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from small_recording import write_recording
+from small_recording import CHAIN, WARM, write_recording
 
 from endotsr.cli.main import main
 from endotsr.training.runs.log import last_iteration
@@ -13,12 +13,7 @@ from endotsr.training.runs.log import last_iteration
 sys.path.insert(0, str(Path(__file__).parents[2] / "studies" / "sweeps"))
 from tiny_sweep import assert_same_arrays, iterations, start, wait_until
 
-COLD, WARM = 1500, 600  # iterations
-SMALL = [
-    "--windows", "32", "--chain", "2", "--preset", "demo", "--iterations", f"{COLD}", "--no-evaluate",
-    "--initialisation.first-frame-points", "300", "--initialisation.other-frame-points", "100",
-    "--density.maximum", "600", "--threads", "1", "--workers", "1",
-]  # fmt: skip
+SMALL = [*CHAIN, "--threads", "1", "--workers", "1"]
 
 
 @pytest.mark.faults
