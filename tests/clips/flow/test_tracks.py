@@ -34,6 +34,18 @@ def breathing():
     return simulate(with_effects(SimulatorSettings(**SIZE), "breathing"))
 
 
+@pytest.fixture(scope="module")
+def still():
+    return simulate(with_effects(SimulatorSettings(**SIZE))).sequence
+
+
+def from_the_start(sequence, change=lambda position: None):
+    """Points of the first training frame, changed in place, and where they are followed to."""
+    position, *_ = lifted(sequence, 0)
+    change(position)
+    return position, follow(sequence, np.zeros(position.shape[1], int), position)
+
+
 @pytest.mark.parametrize("place", [0, 4, 7])
 def test_points_follow_the_tissue_forwards_and_backwards(breathing, place):
     position, column, row = lifted(breathing.sequence, place)
@@ -46,28 +58,23 @@ def test_points_follow_the_tissue_forwards_and_backwards(breathing, place):
     np.testing.assert_array_equal(found.position[place], position.astype(np.float32))
 
 
-def test_points_of_different_frames_do_not_affect_one_another_while_all_are_followed():
-    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
-    first, *_ = lifted(sequence, 0)
-    third, *_ = lifted(sequence, 2)
+def test_points_of_different_frames_do_not_affect_one_another_while_all_are_followed(still):
+    first, third = (lifted(still, place)[0] for place in (0, 2))
     start = np.repeat([0, 2], [first.shape[1], third.shape[1]])
-    both = follow(sequence, start, np.concatenate([first, third], axis=1))
+    both = follow(still, start, np.concatenate([first, third], axis=1))
     assert both.followed.all()
-    alone = follow(sequence, np.full(third.shape[1], 2), third)
+    alone = follow(still, np.full(third.shape[1], 2), third)
     np.testing.assert_array_equal(both.position[:, :, first.shape[1] :], alone.position)
 
 
-def test_points_of_a_scene_that_does_not_move_stay():
-    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
-    position, *_ = lifted(sequence, 0)
-    found = follow(sequence, np.zeros(position.shape[1], int), position)
+def test_points_of_a_scene_that_does_not_move_stay(still):
+    position, found = from_the_start(still)
     assert np.abs(found.position - position).max() < 1e-3  # mm; the prior depth is float32 and sampled between pixels
 
 
 def test_a_moving_camera_does_not_move_the_points():
     sequence = simulate(with_effects(SimulatorSettings(**SIZE), "camera_motion")).sequence
-    position, *_ = lifted(sequence, 0)
-    found = follow(sequence, np.zeros(position.shape[1], int), position)
+    position, found = from_the_start(sequence)
     travelled = max(np.linalg.norm(c.translation - sequence.cameras[0].translation) for c in sequence.cameras)
     assert travelled > 2 and np.median(np.linalg.norm(found.position - position, axis=1)) < 0.1
 
@@ -100,40 +107,34 @@ def test_a_lost_point_without_points_around_it_stays(breathing):
     np.testing.assert_array_equal(found.position[4], found.position[1])
 
 
-def test_a_jump_of_the_depth_loses_a_point():
-    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
-    depth = sequence.depth.copy()
-    depth[sequence.train_index[1]] *= 1.5
-    position, *_ = lifted(sequence, 0)
-    found = follow(dataclasses.replace(sequence, depth=depth), np.zeros(position.shape[1], int), position)
+def test_a_jump_of_the_depth_loses_a_point(still):
+    depth = still.depth.copy()
+    depth[still.train_index[1]] *= 1.5
+    _, found = from_the_start(dataclasses.replace(still, depth=depth))
     assert not found.followed[1].any() and found.followed[2].all()
     np.testing.assert_array_equal(found.position[1], found.position[0])
 
 
 def test_no_held_out_frame_is_read(breathing):
     sequence = breathing.sequence
-    position, *_ = lifted(sequence, 0)
-    start = np.zeros(position.shape[1], int)
     images, depth = sequence.images.copy(), sequence.depth.copy()
     images[sequence.test_index], depth[sequence.test_index] = 0, 1
     changed = dataclasses.replace(sequence, images=images, depth=depth)
-    np.testing.assert_array_equal(follow(changed, start, position).position, follow(sequence, start, position).position)
+    np.testing.assert_array_equal(from_the_start(changed)[1].position, from_the_start(sequence)[1].position)
 
 
-def test_a_point_behind_a_camera_is_not_followed():
-    sequence = simulate(with_effects(SimulatorSettings(**SIZE))).sequence
-    position, *_ = lifted(sequence, 0)
-    position[2, 0] = -position[2, 0]
-    found = follow(sequence, np.zeros(position.shape[1], int), position)
+def test_a_point_behind_a_camera_is_not_followed(still):
+    def behind(position):
+        position[2, 0] *= -1
+
+    _, found = from_the_start(still, behind)
     assert not found.followed[1:, 0].any() and np.isfinite(found.position).all()
 
 
 def test_one_training_frame_needs_no_flow(monkeypatch, breathing):
-    sequence = breathing.sequence
     monkeypatch.setattr(tracks, "flows_between", lambda *a: pytest.fail("no pair of frames"))
-    only = dataclasses.replace(sequence, train_index=sequence.train_index[:1])
-    position, *_ = lifted(sequence, 0)
-    found = follow(only, np.zeros(position.shape[1], int), position)
+    sequence = breathing.sequence
+    position, found = from_the_start(dataclasses.replace(sequence, train_index=sequence.train_index[:1]))
     np.testing.assert_array_equal(found.position, position[None].astype(np.float32))
 
 

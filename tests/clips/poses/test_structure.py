@@ -66,6 +66,13 @@ def reconstruction(monkeypatch):
     return found
 
 
+def depth_error(folder, views, factor, where=True):
+    """The fraction of the pixels that have both depths, and how far the scaled depth is off in the median."""
+    depth = endotsr.load_sequence(folder, allow_tissue_fraction=True, depth_percentiles=(0.0, 100.0)).depth
+    both = (depth > 0) & (views.depth > 0) & where
+    return both.mean(), np.median(np.abs(factor * depth[both] / views.depth[both] - 1))
+
+
 def test_without_pycolmap_the_extra_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "pycolmap", None)
     folder = written(tmp_path / "clip", moving_views()[0], depth=False)
@@ -93,10 +100,8 @@ def test_without_depth_the_option_is_named_and_the_unit_becomes_arbitrary(tmp_pa
     assert main(["poses", str(folder), "--sfm", "--replace"]) == 0
     error, factor = path_error_up_to_scale(poses_of(folder), true)
     assert error < 1e-3
-    depth = endotsr.load_sequence(folder, allow_tissue_fraction=True, depth_percentiles=(0.0, 100.0)).depth
-    both = (depth > 0) & (views.depth > 0)
-    assert both.mean() > 0.7
-    assert np.median(np.abs(factor * depth[both] / views.depth[both] - 1)) < 0.01
+    covered, apart = depth_error(folder, views, factor)
+    assert covered > 0.7 and apart < 0.01
     capsys.readouterr()
     assert main(["check", str(folder), "--sequence.allow-tissue-fraction", "--json", str(data)]) == 0
     assert "poses, depth and pictures agree (" in data.read_text("utf-8") and "pose-" not in capsys.readouterr().out
@@ -149,9 +154,7 @@ def test_relative_depth_of_a_network_is_fitted_to_the_points(tmp_path, reconstru
     file = read_sequence_file(folder)
     assert file.unit == "arbitrary" and file.depth.assumed == "" and "relative inverse depth" in file.depth.method
     factor = path_error_up_to_scale(poses_of(folder), true)[1]
-    depth = endotsr.load_sequence(folder, allow_tissue_fraction=True, depth_percentiles=(0.0, 100.0)).depth
-    both = (depth > 0) & (views.depth > 0) & views.tissue
-    assert np.median(np.abs(factor * depth[both] / views.depth[both] - 1)) < 0.01
+    assert depth_error(folder, views, factor, views.tissue)[1] < 0.01
 
 
 def test_frames_without_a_pose_are_interpolated_and_named(tmp_path, capsys, reconstruction):
@@ -218,9 +221,8 @@ def test_the_path_of_a_hand_held_clip_without_depth(tmp_path):
     assert report.structure.without == [] and report.structure.error < 1.0
     error, factor = path_error_up_to_scale(poses_of(folder), true)
     assert error < 0.15
-    depth = endotsr.load_sequence(folder, allow_tissue_fraction=True, depth_percentiles=(0.0, 100.0)).depth
-    both = (depth > 0) & (views.depth > 0)
-    assert both.mean() > 0.5 and np.median(np.abs(factor * depth[both] / views.depth[both] - 1)) < 0.02
+    covered, apart = depth_error(folder, views, factor)
+    assert covered > 0.5 and apart < 0.02
 
 
 @needs_pycolmap

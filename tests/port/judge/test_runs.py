@@ -58,23 +58,22 @@ def test_the_seconds_are_those_of_every_run(golden, tmp_path, monkeypatch):
     assert called(golden, tmp_path, [0.0]).seconds >= 0.3
 
 
-def test_bits_that_differ_by_nothing_have_their_place(golden, tmp_path):
-    """Two zeros of other signs: before, the place was empty."""
-    spread = joined(RunDifference(frozenset(), 0.0, ""), RunDifference(frozenset({"a/b/c"}), 0.0, "a/b/c"))
-    assert lines(2, [], spread)[0].endswith("0 of the tolerance at most (a/b/c)")
+@pytest.mark.parametrize(
+    ("name", "share", "said"),
+    [
+        ("a/b/c", 0.0, "0 of the tolerance at most (a/b/c)"),  # two zeros of other signs: before, the place was empty
+        ("density/full/count", float("inf"), "other bits in another run, a decision differs (density/full/count)"),
+    ],
+)
+def test_a_difference_of_bits_has_its_size_and_place(name, share, said):
+    spread = joined(RunDifference(frozenset(), 0.0, ""), RunDifference(frozenset({name}), share, name))
+    assert lines(2, [], spread)[0].endswith(said)
 
 
 def test_the_program_of_the_judge_has_the_option(tmp_path, capsys):
     words = ["run", "--port", racing(tmp_path, [0.0, 1e-3]), "--runs", "2", "--level", "2", "--only", "motion"]
     assert main(words) == 1
     assert "1 of 2 runs are wrong (2)" in capsys.readouterr().out
-
-
-def test_a_decision_that_differs_is_said_as_such():
-    spread = RunDifference(frozenset({"density/full/count"}), float("inf"), "density/full/count")
-    assert lines(4, [], spread)[0].endswith(
-        "1 outputs have other bits in another run, a decision differs (density/full/count)"
-    )
 
 
 @pytest.mark.parametrize("option", ["--json", "--html", "--certificate", "--badge"])

@@ -85,20 +85,22 @@ def test_a_stage_ends_when_its_work_fails():
     assert watch.repeats[0][clock.REST] > watch.repeats[0]["binning"]
 
 
-def test_nested_stages_are_counted_once(monkeypatch):
+@pytest.fixture
+def watch(monkeypatch):
+    """A clock whose six readings are 1, 2, 4, 8 and 16 s apart."""
     now = iter([0.0, 1.0, 3.0, 7.0, 15.0, 31.0])
     monkeypatch.setattr(clock.time, "perf_counter", lambda: next(now))
-    watch = clock.StageClock()
+    return clock.StageClock()
+
+
+def test_nested_stages_are_counted_once(watch):
     with watch.iteration(), watch.stage("projection"), watch.stage("binning"):
         pass
     found = watch.repeats[0]
     assert (found["projection"], found["binning"], found[clock.REST]) == (2.0 + 8.0, 4.0, 1.0 + 16.0)
 
 
-def test_stages_of_two_threads_divide_the_time(monkeypatch):
-    now = iter([0.0, 1.0, 3.0, 7.0, 15.0, 31.0])
-    monkeypatch.setattr(clock.time, "perf_counter", lambda: next(now))
-    watch = clock.StageClock()
+def test_stages_of_two_threads_divide_the_time(watch):
     with watch.iteration(), watch.stage("projection"):
         other = threading.Thread(target=timed(watch, "binning", lambda: None))
         other.start()
