@@ -1,4 +1,4 @@
-"""docs/guides/simulate.md: its table of times is what the committed measurement says, and names every scene."""
+"""docs/guides/simulate.md: its table of times is what the committed measurement says, of every scene."""
 
 import importlib
 
@@ -13,8 +13,6 @@ def test_what_the_scenes_have_in_common():
     assert [name for name, effects in SCENES.items() if "highlights" not in effects] == ["still"]
 
 
-def test_every_scene_has_its_row_of_the_guide():
+def test_every_scene_was_measured():
+    """The guide has the rows of the measurement: `test_generated_pages.py`."""
     assert set(made.PROGRAM.read()["scenes"]) == set(SCENES)
-    text = made.PROGRAM.pages[0].read_text(encoding="utf-8")
-    for name in SCENES:
-        assert f"| `{name}` |" in text, name

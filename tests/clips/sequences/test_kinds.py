@@ -2,7 +2,6 @@
 
 import ast
 import re
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ from endotsr.clips import sequences
 from endotsr.clips.sequences.checks.kinds import KINDS, finding, worst_first
 
 SOURCES = [ast.parse(path.read_text(encoding="utf-8")) for path in Path(sequences.__path__[0]).rglob("*.py")]
-GUIDE = Path(__file__).parents[3] / "docs" / "guides" / "prepare.md"
 
 
 def test_every_kind_can_be_found():
@@ -38,15 +36,3 @@ def test_a_finding_reads_as_one_line(code):
 def test_worst_first_keeps_the_order_within_a_level():
     found = [finding(code, "x", "") for code in ("grey-pictures", "black-frame", "size", "white-frame")]
     assert [entry.code for entry in worst_first(found)] == ["size", "black-frame", "white-frame", "grey-pictures"]
-
-
-def test_the_guide_lists_every_kind():
-    text = GUIDE.read_text(encoding="utf-8")
-    for code, kind in KINDS.items():
-        assert f"| `{code}` | {kind.level} | {kind.why} | {kind.remedy} |" in text, code
-
-
-def test_the_guide_states_how_many_findings_there_are():
-    levels = Counter(kind.level for kind in KINDS.values())
-    numbers = f"{levels['refusal']} refusals, {levels['warning']} warnings and {levels['note']} notes"
-    assert f"There are {len(KINDS)} findings: {numbers}." in " ".join(GUIDE.read_text(encoding="utf-8").split())
