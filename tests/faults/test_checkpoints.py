@@ -205,24 +205,22 @@ def test_numbers_that_no_training_has_are_refused_by_name(fault, run, capsys):
     assert_refused(capsys, ["train", "--out", str(run), *RESUME], "checkpoint.npz: ")
 
 
-@pytest.mark.parametrize("weight", [-1.0, "0.83", [1]])
-def test_a_laplacian_weight_that_is_no_weight_is_refused(weight, run, capsys):
-    rewrite(run / "checkpoint.npz", lambda entries, header: header["header"].update(lambda_lap=weight))
-    assert_refused(capsys, ["train", "--out", str(run), *RESUME], "checkpoint.npz: header.lambda_lap: ")
+ENTRIES = [  # of the header
+    *(("header", {"lambda_lap": weight}, "header.lambda_lap: ") for weight in (-1.0, "0.83", [1])),
+    *(("rng_state", state, "") for state in (
+        {},
+        {"bit_generator": "PCG64", "state": 5},
+        {"bit_generator": "PCG64", "state": {"state": -1, "inc": 1}, "has_uint32": 0, "uinteger": 0},
+        {"bit_generator": "PCG64", "state": {"state": 1, "inc": 1 << 190}, "has_uint32": 0, "uinteger": 0},
+    )),
+]  # fmt: skip
 
 
-RANDOM_STATES = [
-    {},
-    {"bit_generator": "PCG64", "state": 5},
-    {"bit_generator": "PCG64", "state": {"state": -1, "inc": 1}, "has_uint32": 0, "uinteger": 0},
-    {"bit_generator": "PCG64", "state": {"state": 1, "inc": 1 << 190}, "has_uint32": 0, "uinteger": 0},
-]
-
-
-@pytest.mark.parametrize("state", RANDOM_STATES, ids=range(len(RANDOM_STATES)))
-def test_a_random_state_that_is_none_is_refused(state, run, capsys):
-    rewrite(run / "checkpoint.npz", lambda entries, header: header.update(rng_state=state))
-    assert_refused(capsys, ["train", "--out", str(run), *RESUME], "checkpoint.npz: ")
+@pytest.mark.parametrize(("key", "entry", "said"), ENTRIES, ids=range(len(ENTRIES)))
+def test_a_laplacian_weight_or_a_random_state_that_is_none_is_refused(key, entry, said, run, capsys):
+    before = (lambda header: header["header"]) if key == "header" else (lambda header: {})
+    rewrite(run / "checkpoint.npz", lambda _, header: header.update({key: before(header) | entry}))
+    assert_refused(capsys, ["train", "--out", str(run), *RESUME], f"checkpoint.npz: {said}")
 
 
 def test_a_killed_save_leaves_files_that_the_next_resume_removes(trained, run):
