@@ -164,11 +164,27 @@ def _check_options(options: PrepareOptions, words: list[str]) -> None:
     from endotsr.clips.sequences.layouts import layout_of
     from endotsr.untrusted.writing import refuse_existing
 
+    _refuse_nested(options.source, options.out)
     if not options.replace:
         refuse_existing(options.out)
     _check_numbers(options)
     layout = layout_of(options.source, options.layout).name
     check_relations("prepare", PREPARE, options, given_names(PrepareOptions, words), {"layout": layout})
+
+
+def _refuse_nested(source: Path, out: Path) -> None:
+    """Raises InputError if one folder is inside the other; with --replace they may be the same one."""
+    from endotsr.clips.sequences.sequence_file import WRITTEN
+    from endotsr.training.runs.files import refuse_inside
+
+    inner, outer = source.resolve(), out.resolve()
+    if inner == outer:
+        return
+    refuse_inside(out, source, "the source")
+    if inner.is_relative_to(outer) and inner.relative_to(outer).parts[0] in WRITTEN:  # `new_folder` refuses all others
+        raise InputError(
+            f"{source}: is inside {out}, which would be replaced; choose another --out, or the source {out}"
+        )
 
 
 def _refuse_two_baselines(options: PrepareOptions, of_pair: bool) -> None:

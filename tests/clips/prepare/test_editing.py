@@ -150,6 +150,19 @@ def test_what_prepare_did_not_write_is_never_lost(tmp_path, capsys):
     assert (tmp_path / "clip/raw/sequence.toml").is_file() and (tmp_path / "clip/notes.txt").read_text() == "mine"
 
 
+def test_neither_folder_is_inside_the_other(tmp_path, capsys):
+    """A clip inside its source blocked --replace of the source; pictures of a clip replaced its depth and masks."""
+    written(tmp_path / "raw")
+    clip, inside = tmp_path / "clip", tmp_path / "raw/clip"
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(inside)]) == 2
+    assert f"{inside}: is inside the source {tmp_path / 'raw'}; choose an --out outside" in capsys.readouterr().err
+    assert not inside.exists() and main(["prepare", str(tmp_path / "raw"), "--out", str(clip)]) == 0
+    words = ["prepare", str(clip / "images"), "--out", str(clip), "--replace", "--camera", "60", "60", "16", "12"]
+    assert main(words) == 2
+    said = f"is inside {clip}, which would be replaced; choose another --out, or the source {clip}"
+    assert said in capsys.readouterr().err and (clip / "depth").is_dir()
+
+
 def test_an_empty_folder_is_replaced_as_it_is_used_without_replace(tmp_path):
     written(tmp_path / "raw")
     (tmp_path / "clip").mkdir()
