@@ -17,6 +17,7 @@ import numpy as np
 
 from endotsr.clips.opencv import decode_png, decoded, opaque, write_encoded
 from endotsr.clips.opencv.library import cv2_library
+from endotsr.clips.opencv.other_kinds import scaled
 from endotsr.clips.opencv.picture_marks import ORIENTATION, marks_of, picture_marks
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
@@ -127,8 +128,9 @@ def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
     except Exception as error:  # Pillow passes on any error of its metadata parsers
         if "unknown pixel mode" in str(error) and kind == "TIFF":
             raise InputError(
-                f"{path}: a TIFF of a kind that is not read, such as numbers of 16 or 64 bits with a point; allowed:"
-                " whole numbers of 8 or 16 bits, or floating-point numbers of 32 bits"
+                f"{path}: a TIFF of a kind that is not read, such as colours of floating-point numbers, or numbers of"
+                " 16 or 64 bits with a point; allowed: whole numbers of 8 or 16 bits, or one channel of floating-point"
+                f" numbers of 32 bits; of frames, {scaled()}"
             ) from None
         raise InputError(f"{path}: damaged {kind}: {plain_line(str(error))}") from None
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.camera import ARBITRARY, Intrinsics, StereoCalibration
+from endotsr.clips.opencv.other_kinds import remedy
 from endotsr.clips.sequences.checks.kinds import Finding
 from endotsr.clips.sequences.crop import Crop
 from endotsr.clips.sequences.mask_values import MaskLevels
@@ -167,8 +168,6 @@ def grey_plane(pixels: NDArray[Any], where: object) -> NDArray[Any]:
 
 def colour_picture(pixels: NDArray[Any], where: object) -> Picture:
     """An 8-bit RGB picture. Raises InputError for a grey picture or one of another type."""
-    if pixels.dtype != np.uint8:
-        raise InputError(f"{where}: {8 * pixels.dtype.itemsize}-bit picture; images must have 8 bits per channel")
-    if pixels.ndim == 2:
-        raise InputError(f"{where}: grey picture; images must be RGB")
+    if pixels.dtype != np.uint8 or pixels.ndim == 2:
+        raise InputError(f"{where}: {remedy(pixels)}")
     return pixels
