@@ -192,7 +192,7 @@ def test_no_pair_of_options_of_render_is_silent(finished_run, tmp_path):
         "rate": ["5"], "slow": ["2"], "npy": [], "without": ["appearance"], "sequence": ["elsewhere"],
     }  # fmt: skip
     options = {name: [f"--{name}", *words] for name, words in values.items()}
-    assert _names(RenderOptions) - set(options) == {"out", "film", "json", "threads"}
+    assert _names(RenderOptions) - set(options) == {"out", "film", "json", "threads", "replace"}
     for name in ("pictures", "film.gif"):
         to = ["--film" if name == "film.gif" else "--out", str(tmp_path / name)]
         assert silent(["render", str(finished_run), *to], options, tmp_path / name) == []
@@ -205,7 +205,7 @@ def test_no_pair_of_options_of_export_is_silent(finished_run, tmp_path):
         "sequence": ["elsewhere"],
     }  # fmt: skip
     options = {name: [f"--{name}", *words] for name, words in values.items()}
-    assert _names(ExportOptions) - {*options, "held-out"} == {"out", "json", "threads"}
+    assert _names(ExportOptions) - {*options, "held-out"} == {"out", "json", "threads", "replace"}
     for name in ("a.ply", "folder", "a.npz", "a.glb", "page.html"):
         assert silent(["export", str(finished_run), "--out", str(tmp_path / name)], options, tmp_path / name) == [], (
             name

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import JsonFile
+from endotsr.cli.parts.result import JsonFile, write_marked
 from endotsr.cli.sweep import ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
@@ -66,22 +66,23 @@ class AblateOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.studies.sweeps.ablation_page import ablation_markdown, write_ablation
+    from endotsr.studies.sweeps.ablation_page import FILES, ablation_markdown, write_ablation
     from endotsr.studies.sweeps.place import Place, check_place
     from endotsr.studies.sweeps.spec import spec_of
-    from endotsr.training.runs.files import refuse_folder, write_json
+    from endotsr.studies.sweeps.sweep import refuse_tables
+    from endotsr.training.runs.files import refuse_folder
 
     options = parse(AblateOptions, words, "ablate")
     place = Place(options.workers, options.threads, options.scheduler)
     check_place("ablate", place)
     spec = spec_of(spec_data(options), "ablate", Path.cwd())
+    refuse_tables(options.out, FILES)
     records: list[AblationRecord] = []  # the latest record
     command = ["endotsr", "ablate", *map(without_folders, words)]
 
     def on_rows(rows: "Rows") -> None:
         records[:] = [write_ablation(options.out, rows, command)]
-        if options.json is not None:
-            write_json(options.json, records[0])
+        write_marked(options.json, records[0])
 
     if options.collect:
         from endotsr.studies.sweeps.sweep import Inputs, lacking, planned

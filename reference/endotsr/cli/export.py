@@ -8,7 +8,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.related_options import EXPORT
 from endotsr.cli.parts.relations import check_relations
-from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
 
 # The fact `format` of related_options: what --out writes, by its ending.
 FORMATS = {".htm": "page", ".html": "page", ".npz": "slim model", ".glb": "animated points", ".ply": "one time"}
@@ -54,6 +54,8 @@ class ExportOptions:
     """for a page: show held-out frames and error; needs the sequence of the run"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """for a page: current location of the sequence of the run (default: the recorded one)"""
+    replace: Annotated[bool, REPLACE] = False
+    """replace an existing file that endotsr did not write"""
     json: JsonFile = None
     """also write a record of the output as JSON"""
     threads: int = 0
@@ -66,12 +68,17 @@ def run(words: list[str]) -> int:
     from endotsr.results.export.files import Content, export
     from endotsr.results.export.times import Times
     from endotsr.studies.windows.scene import open_any, refuse_one_set
+    from endotsr.training.runs.files import refuse_unwritable
+    from endotsr.untrusted.marks import refuse_foreign
 
     options = parse(ExportOptions, words, "export")
     kind = FORMATS.get(options.out.suffix.lower(), "folder")
     check_relations("export", EXPORT, options, given_names(ExportOptions, words), {"format": kind})
     use_threads(options.threads)
     refuse_one_set(options.scene, options.out)
+    if kind != "folder":
+        refuse_unwritable(options.out)
+        refuse_foreign(options.out, options.replace, "--out")
     times = Times(options.times, options.frames, options.count)
     content = Content(options.content, options.opacity, options.without, options.voxel)
     if kind == "page":
@@ -92,13 +99,11 @@ def _write_page(options: ExportOptions) -> None:
     from endotsr.results.views.page import KEYS, check_page, write_page
     from endotsr.studies.windows.page import WINDOW_KEYS
     from endotsr.studies.windows.record import is_windowed
-    from endotsr.training.runs.files import refuse_unwritable
     from endotsr.training.runs.sources import load_run_sequence
 
     usual = WINDOW_KEYS if is_windowed(options.scene) else KEYS
     keys = usual if options.keys is None else options.keys
     check_page(options.out, keys)
-    refuse_unwritable(options.out)
     title = options.title or options.scene.absolute().name
     if is_windowed(options.scene):
         _write_windows_page(options, title, keys)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
 
 
 @dataclass
@@ -52,6 +52,8 @@ class RenderOptions:
     """components to omit"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """current location of the sequence of the run, for truth and error (default: the recorded one)"""
+    replace: Annotated[bool, REPLACE] = False
+    """replace an existing film or JSON file that endotsr did not write"""
     json: JsonFile = None
     """also write a record of the output as JSON"""
     threads: int = 0
@@ -67,11 +69,13 @@ def run(words: list[str]) -> int:
     from endotsr.results.views.plan import ViewRequest
     from endotsr.studies.windows.scene import open_any, shown_frames
     from endotsr.training.runs.sources import refuse_inside_data
+    from endotsr.untrusted.marks import refuse_foreign
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
     request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate, options.slow)
+    refuse_foreign(options.film, options.replace, "--film")
     use_threads(options.threads)
     scene = open_any(options.scene)
     for note in scene.notes:

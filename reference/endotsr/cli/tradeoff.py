@@ -13,6 +13,7 @@ from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import FOLDER, is_windowed
 from endotsr.training.runs.files import refuse_folder, refuse_read_only, write_json
+from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def _measure(options: TradeoffOptions) -> "DatedMeasurement":
     refuse_folder(out)
     if out.is_dir():
         refuse_read_only(out)
+    refuse_foreign(out / PAGE)
     scene = chosen_scene(options)
     out.mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:

@@ -50,12 +50,13 @@ def encoder_of(path: Path, lossless: bool = False) -> Encoder:
     return found
 
 
-def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bool = False) -> None:
+def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bool = False, comment: str = "") -> None:
     """Write a video file. The extension, .mp4 or .webm, selects the container.
 
     pictures  (H, W, 3) uint8 RGB, all of one size with even sides
     rate      pictures per second
     lossless  PNG pictures, which `video_pictures` returns exactly; few players support them
+    comment   that the file states
     Raises:   InputError without pictures or without an encoder for the format.
     """
     import av
@@ -65,6 +66,8 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bo
     options = {"movflags": "faststart"} if path.suffix.lower() == ".mp4" else {}  # plays while it loads
     try:
         with av.open(str(path), mode="w", options=options) as container:
+            if comment:
+                container.metadata["comment"] = comment
             for picture in pictures:
                 stream = stream or _stream(container, encoder, picture, rate)
                 frame: Any = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")

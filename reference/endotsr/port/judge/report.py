@@ -31,7 +31,8 @@ UNKNOWN = "looks like none of the known mistakes"
 def as_json(report: Report) -> bytes:
     """The report as JSON."""
     cases = [msgspec.structs.replace(case, evidence={}) for case in report.cases]
-    return msgspec.json.format(msgspec.json.encode(msgspec.structs.replace(report, cases=cases)), indent=1) + b"\n"
+    text = msgspec.json.encode(msgspec.structs.replace(report, cases=cases))
+    return msgspec.json.format(b'{"generator":"endotsr",' + text.removeprefix(b"{"), indent=1) + b"\n"
 
 
 def as_table(report: Report, *, everything: bool = False) -> str:
@@ -214,6 +215,7 @@ def as_html(report: Report, golden: Golden, outputs: Path) -> str:
 
 
 _PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
+<meta name="generator" content="endotsr">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{claim}</title><style>
 body{{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;color:#1c2430}}
 table{{border-collapse:collapse;width:100%}}td,th{{text-align:left;vertical-align:top;padding:.3em .6em;

@@ -20,6 +20,7 @@ from endotsr.method.kernels.arrays import Array, FloatArray
 from endotsr.results.export.placement import placed_scene
 from endotsr.results.export.ply import point_vertices
 from endotsr.results.export.scene import MovingScene
+from endotsr.untrusted.marks import GENERATOR
 from endotsr.untrusted.writing import replace_file
 
 LARGEST = 1 << 32  # bytes: the length of a .glb has 32 bits
@@ -88,7 +89,7 @@ def _glb(points: list[FloatArray], levels: Array, seconds: FloatArray, times: li
         },
     }
     mesh: dict[str, object] = {"name": "points", "primitives": [primitive]}
-    about: dict[str, object] = {"asset": {"version": "2.0", "generator": "endotsr", "extras": {"unit": unit}}}
+    about: dict[str, object] = {"asset": {"version": "2.0", **GENERATOR, "extras": {"unit": unit}}}
     if len(points) > 1:
         primitive["targets"] = [{"POSITION": buffer.positions(moved - points[0])} for moved in points[1:]]
         mesh |= {"weights": [0.0] * (len(points) - 1), "extras": {"targetNames": [f"t = {t:.6g}" for t in times[1:]]}}

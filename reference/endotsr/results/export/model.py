@@ -24,9 +24,9 @@ from endotsr.training.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, ar
 from endotsr.training.scene.parameters import FrameParameters, pose_at, trained
 from endotsr.untrusted.arrays import RefusedArray, open_npz
 from endotsr.untrusted.json import integer, listed, number, parsed
+from endotsr.untrusted.marks import SLIM
 from endotsr.untrusted.writing import replace_file
 
-FORMAT = "endotsr slim model"
 VERSION = 1
 HEADER = "header"
 LARGEST_FILE = 1 << 33  # bytes, sum over all arrays
@@ -49,7 +49,7 @@ def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
     """
     exposures = _exposures(model.frames)
     header = {
-        "format": FORMAT,
+        "format": SLIM,
         "version": VERSION,
         "iteration": model.iteration,
         "config": msgspec.to_builtins(model.config),
@@ -84,7 +84,7 @@ def load_slim_model(path: Path) -> SlimModel:
         header = parsed(entries.pop(HEADER).tobytes(), f"{path}: header")
     except (RefusedArray, KeyError) as error:
         raise InputError(f"{path}: not a slim model, or damaged: {error}") from None
-    if not isinstance(header, dict) or (header.get("format"), header.get("version")) != (FORMAT, VERSION):
+    if not isinstance(header, dict) or (header.get("format"), header.get("version")) != (SLIM, VERSION):
         raise InputError(
             f"{path}: not a slim model of version {VERSION}; `endotsr export RUN --out FILE.npz` writes one"
         )

@@ -10,6 +10,7 @@ from typing import Any
 
 from endotsr.results.report import figures
 from endotsr.results.report.figures import ByteImage
+from endotsr.untrusted.marks import HTML
 
 ABSENT = '<span class="absent" title="no value">&ndash;</span>'
 
@@ -121,7 +122,7 @@ def page(title: str, body: str, refresh: str = "") -> str:
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<meta name="color-scheme" content="light dark">{again}'
+        f'{HTML}<meta name="color-scheme" content="light dark">{again}'
         f"<title>{text(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 from endotsr.clips.sequences.record import UNKNOWN_RATE
 from endotsr.errors import InputError
 from endotsr.results.report.figures import ByteImage
+from endotsr.untrusted.marks import FILM
 from endotsr.untrusted.writing import replace_file
 
 KINDS = (".mp4", ".webm", ".gif")
@@ -103,7 +104,7 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     else:
         from endotsr.clips.formats.film_file import write_video
 
-        replace_file(file, lambda temporary: write_video(temporary, map(_even, counted()), rate))
+        replace_file(file, lambda temporary: write_video(temporary, map(_even, counted()), rate, comment=FILM))
     return count
 
 
@@ -122,7 +123,9 @@ def _write_gif(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
     palette = _palette(frames)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for frame in frames]
     milliseconds = 10 * _hundredths(rate)
-    frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
+    frames[0].save(
+        file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False, comment=FILM
+    )
 
 
 def _hundredths(rate: float) -> int:

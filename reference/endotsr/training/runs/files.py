@@ -12,6 +12,7 @@ from typing import Any
 from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.writing import replace_text
 
@@ -26,6 +27,11 @@ OF_A_RUN = frozenset(
         "sequence.json",
     )
 )  # files that commands read again
+PAGES = {  # a file that makes its folder one of results, and the names of its pages
+    "run.json": ("report.html", "view.html", "training.html"),
+    "windows.json": ("report.html", "view.html"),
+    "tradeoff.json": ("tradeoff.html",),
+}
 HEAD = 4096  # bytes; every format of pictures, video and arrays has a zero byte there, and no text has one
 
 
@@ -84,8 +90,11 @@ def refuse_no_text(file: Path) -> None:
                 raise InputError(f"{file}: would be replaced, but is no text file; allowed: another name")
 
 
-def refuse_texts(files: dict[str, Path | None]) -> None:
-    """Raises InputError if a file of text cannot be written, or two options (the keys) name one file."""
+def refuse_texts(files: dict[str, Path | None], replace: bool | None = None) -> None:
+    """Raises InputError if a file of text cannot be written, or two options (the keys) name one file.
+
+    replace   as in `refuse_foreign`
+    """
     options: dict[Path, str] = {}
     for option, file in files.items():
         if file is not None:
@@ -95,11 +104,15 @@ def refuse_texts(files: dict[str, Path | None]) -> None:
                 raise InputError(
                     f"{option} {file}: is also the file of {options[file.resolve()]}; allowed: another name"
                 )
+            refuse_foreign(file, replace, option)
 
 
 def _refuse_input(file: Path) -> None:
-    """Raises InputError if this file exists and makes its folder a clip or a run."""
+    """Raises InputError if this file exists and makes its folder a clip or a run, or is a page of its folder."""
     of_a_run = all((file.parent / name).is_file() for name in ("run.json", "config.toml"))
+    for mark, names in PAGES.items():
+        if file.is_file() and file.name in names and (file.parent / mark).is_file():
+            raise InputError(f"{file}: would be replaced, but belongs to the folder of {mark}; use another name")
     if file.is_file() and (file.name == "sequence.toml" or (of_a_run and file.name in OF_A_RUN)):
         raise InputError(f"{file}: would be replaced, but other commands read it; allowed: another name")
 
@@ -108,6 +121,15 @@ def refuse_read_only(folder: Path) -> None:
     """Raises InputError if no file can be written in an existing folder."""
     if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{folder}: cannot be written: no permission; allowed: a folder that can be, such as a copy")
+
+
+def refuse_linked(folder: Path) -> None:
+    """Raises InputError for a link in place of a folder that would be replaced."""
+    if folder.is_symlink():
+        raise InputError(
+            f"{folder}: is a link, and only a folder is replaced; put a copy of its folder in its place, or delete the"
+            " link"
+        )
 
 
 def write_json(path: Path, data: Any) -> None:
