@@ -1,8 +1,10 @@
 """Places where an output cannot be are refused before the work, and advice fits the command."""
 
+import os
 import sys
 
 import pytest
+from common_folder import written
 from tiny import SETTINGS, assert_refused, run_line, train_words
 
 from endotsr.training.runs import folder as runs
@@ -27,6 +29,28 @@ def test_an_output_inside_the_data_is_refused(inside, folder, capsys, monkeypatc
     before = sorted(folder.rglob("*"))
     assert_refused(capsys, ["train", str(folder), "--out", str(folder / inside), *SETTINGS], "is inside the sequence")
     assert sorted(folder.rglob("*")) == before
+
+
+def test_a_run_that_cannot_be_written_is_not_resumed(run, capsys, monkeypatch):
+    """The lock of the run was named, after the sequence was read."""
+    monkeypatch.setattr("os.access", lambda path, mode: mode & os.W_OK == 0 or run not in (path, *path.parents))
+    monkeypatch.setattr(sources, "load_sequence", never)
+    said = f"{run}: cannot be written: no permission; allowed: a folder that can be, such as a copy"
+    assert_refused(capsys, ["train", "--out", str(run), "--resume", "--iterations", "90"], said)
+
+
+@pytest.mark.parametrize(("name", "words"), [("masks", ["masks"]), ("depth", ["depth", "--flat"])])
+def test_a_link_in_place_of_a_part_is_refused_before_the_work(name, words, tmp_path, capsys, monkeypatch):
+    for module in ("cli.depth._made", "clips.masks.make_masks.enter_masks"):
+        monkeypatch.setattr(f"endotsr.{module}", never)
+    written(tmp_path / "clip")
+    part = tmp_path / "clip" / name
+    part.rename(tmp_path / "elsewhere")
+    part.symlink_to(tmp_path / "elsewhere")
+    said = (
+        f"{part}: is a link, and only a folder is replaced; put a copy of its folder in its place, or delete the link"
+    )
+    assert_refused(capsys, [words[0], str(tmp_path / "clip"), *words[1:], "--replace"], said)
 
 
 def test_pictures_inside_the_data_of_a_run_are_refused(folder, tmp_path, capsys):

@@ -65,9 +65,11 @@ def run(words: list[str]) -> int:
         raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
     _check_ratio(options)
     from endotsr.clips.sequences.checks.kinds import KINDS
-    from endotsr.training.runs.files import refuse_read_only
+    from endotsr.clips.sequences.sequence_file import DEPTH
+    from endotsr.training.runs.files import refuse_linked, refuse_read_only
 
     refuse_read_only(options.sequence)
+    refuse_linked(options.sequence / DEPTH)
 
     report = _made(options)
     assert report.file.depth is not None

@@ -90,10 +90,12 @@ def run(words: list[str]) -> int:
 
 def _refuse_place(options: MasksOptions) -> None:
     """Raises InputError, before the motion of the clip is computed, for a place where no masks can be written."""
-    from endotsr.training.runs.files import refuse_folder, refuse_read_only
+    from endotsr.clips.sequences.sequence_file import MASKS
+    from endotsr.training.runs.files import refuse_folder, refuse_linked, refuse_read_only
     from endotsr.untrusted.writing import refuse_existing
 
     if options.out is None:
+        refuse_linked(options.sequence / MASKS)
         return refuse_read_only(options.sequence)
     if not options.replace:
         refuse_existing(options.out)

@@ -19,6 +19,7 @@ from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.config import PAPER, PRESETS, Config, lengthened, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
+from endotsr.training.runs.files import refuse_read_only
 from endotsr.training.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.training.runs.records import RunRecord
 
@@ -88,6 +89,8 @@ def run(words: list[str]) -> int:
         return _calibrate(options, words)
     if options.evaluate:
         load_lpips_weights(options.lpips)  # raises for unusable weights before the training
+    if options.resume:
+        refuse_read_only(options.out)
     if options.windows is not None or (options.resume and is_windowed(options.out)):
         return _train_windows(options, words)
     if options.resume:
