@@ -117,6 +117,21 @@ def test_mistakes_are_one_line_with_key_and_allowed_values(tmp_path, line, said)
     assert said in str(refused.value) and "\n" not in str(refused.value) and str(file) in str(refused.value)
 
 
+def test_a_file_that_lacks_a_part_is_told_what_to_write(tmp_path):
+    """The remedies of the messages, one after the other, make a sweep of one run."""
+    file = tmp_path / "SPEC.toml"
+    text = "seeds = [3]\n"
+    for key, line in (("sequences", "sequences = ["), ("configurations", "[configurations.base]")):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=f"{key} is missing") as refused:
+            read_spec(file)
+        assert line in str(refused.value), refused.value
+        text += 'sequences = ["simulated"]\n' if line.startswith("s") else f"{line}\n"
+    file.write_text(text, encoding="utf-8")
+    (only,) = read_spec(file).configurations
+    assert only.name == "base" and only.config == PAPER
+
+
 def test_two_names_that_one_disk_cannot_tell_apart_are_refused(tmp_path):
     text = BASE + "[configurations.a]\n[configurations.A]\n"
     with pytest.raises(InputError, match="two runs have this name"):

@@ -32,6 +32,10 @@ from endotsr.untrusted.toml import by_key, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")
 SPLITS = get_args(next(field.type for field in msgspec.structs.fields(SequenceConfig) if field.name == "split"))
+NEEDED = {  # what a file lacks -> what to write
+    "sequences": 'allowed: a list of folders, such as sequences = ["my_sequence"]',
+    "configurations": "allowed: one or more, such as the line [configurations.base] for the settings without a change",
+}
 LONGEST_BLOCK = 1 << 20  # frames
 Seed = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
 Iteration = Annotated[int, msgspec.Meta(ge=1, le=1 << 53)]
@@ -109,6 +113,9 @@ def spec_of(data: Keys, where: str, folder: Path) -> Spec:
     Raises:  InputError naming `where`, the key and the allowed values.
     """
     refuse_unknown_keys(data, SpecFile, where)
+    for key, remedy in NEEDED.items():
+        if key not in data:
+            raise InputError(f"{where}: {key} is missing; {remedy}")
     file = checked(data, SpecFile, where)
     sequences = tuple(_source(word, where, folder) for word in file.sequences)
     splits = tuple(_split(word, where) for word in file.splits)
