@@ -10,6 +10,7 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import REPLACE, write_result
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 if TYPE_CHECKING:
     from endotsr.clips.sequences.checks.duration import Speed
@@ -50,9 +51,9 @@ def run(words: list[str]) -> int:
     cost = checked.facts.get("cost")
     if cost:
         print(
-            f"{checked.facts['frames']} frames of {checked.facts['width']}x{checked.facts['height']}: training needs"
-            f" about {cost['total_bytes'] / 1e9:.1f} GB and {in_words(60 * cost['command_minutes'])} with the"
-            f" evaluation, {in_words(60 * cost['minutes'])} of them for the iterations,"
+            f"{counted(checked.facts['frames'], 'frame')} of {checked.facts['width']}x{checked.facts['height']}:"
+            f" training needs about {cost['total_bytes'] / 1e9:.1f} GB and {in_words(60 * cost['command_minutes'])}"
+            f" with the evaluation, {in_words(60 * cost['minutes'])} of them for the iterations,"
             f" and ends with about {cost['gaussians']} Gaussians"
         )
     print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")

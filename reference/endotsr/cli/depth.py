@@ -1,6 +1,5 @@
 """`endotsr depth`: depth of a sequence, from its stereo pairs or from another program."""
 
-import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +63,7 @@ def run(words: list[str]) -> int:
     if not 0 < options.unit_scale < float("inf"):
         raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
     _check_ratio(options)
+    from endotsr.cli.parts.next_step import training_step
     from endotsr.clips.sequences.checks.kinds import KINDS
     from endotsr.clips.sequences.sequence_file import DEPTH
     from endotsr.training.runs.files import refuse_linked, refuse_read_only
@@ -89,7 +89,7 @@ def run(words: list[str]) -> int:
         print(f"not metric ({report.file.depth.assumed} of the depth assumed): {KINDS['assumed-depth'].why}")
     for line in depth_warnings(report, options) + _pair_warnings(options):
         print(line)
-    print(f"next: endotsr train {shlex.quote(str(options.sequence))} --out RUN")
+    print(training_step(options.sequence, report.file))
     write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
     return 0
 

@@ -13,6 +13,7 @@ from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
 from endotsr.training.runs.files import refuse_read_only
 from endotsr.training.runs.folder import RunFolder, open_run
+from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     weights = load_lpips_weights(options.lpips)
     sequence = shown_sequence("evaluate", options.run, options.sequence, options.settings)
     found = find_pictures(options.pictures, sequence)
-    print(f"{options.pictures}: {len(found.files)} pictures, paired {found.pairing}")
+    print(f"{options.pictures}: {counted(len(found.files), 'picture')}, paired {found.pairing}")
     if remark := doubt(sequence, lambda i: found.read(i, sequence.images.shape[1:])):
         print(f"{options.pictures}: {remark}")
     metrics = measure_pictures(found, sequence, options.label, weights)

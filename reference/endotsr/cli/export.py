@@ -9,6 +9,7 @@ from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.related_options import EXPORT
 from endotsr.cli.parts.relations import check_relations
 from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
+from endotsr.untrusted.names import counted
 
 # The fact `format` of related_options: what --out writes, by its ending.
 FORMATS = {".htm": "page", ".html": "page", ".npz": "slim model", ".glb": "animated points", ".ply": "one time"}
@@ -125,7 +126,7 @@ def _write_windows_page(options: ExportOptions, title: str, keys: int) -> None:
     frames = WindowFrames(scene, options.sequence) if options.held_out else None
     found = write_windows_page(options.out, scene, title, keys, frames)
     print(
-        f"{options.out}: {found.page / 1e6:.1f} MB, with {folder}: {len(found.windows)} windows of at most"
+        f"{options.out}: {found.page / 1e6:.1f} MB, with {folder}: {counted(len(found.windows), 'window')} of at most"
         f" {max(found.windows) / 1e6:.1f} MB; keep both together and open the page in a browser"
     )
     write_result(

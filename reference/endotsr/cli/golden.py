@@ -10,6 +10,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]
@@ -193,6 +194,6 @@ def _reference(words: list[str]) -> int:
         count = answer_requests(options.requests, options.outdir)
     else:
         count = answer_all(read_golden(golden_folder(options.golden)), options.outdir, options.precision)
-    print(f"golden: {count} cases answered in {options.outdir}")
+    print(f"golden: {counted(count, 'case')} answered in {options.outdir}")
     write_result(options.json, cases=count, folder=options.outdir)
     return 0

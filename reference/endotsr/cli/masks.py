@@ -120,7 +120,7 @@ def _draw(options: MasksOptions, page: Path) -> int:
         drawn=[frame.frame for frame in drawing.frames if frame.key], drafts=[frame.frame for frame in drafts],
     )  # fmt: skip
     kind = f" ({drafts[0].draft.origin})" if drafts and drafts[0].draft else ""
-    print(f"{page}: {len(drawing.frames)} frames to draw, {len(drafts)} of them with a draft{kind}")
+    print(f"{page}: {counted(len(drawing.frames), 'frame')} to draw, {len(drafts)} of them with a draft{kind}")
     return 0
 
 

@@ -1,6 +1,5 @@
 """`endotsr poses`: poses of a moving scope, from pictures and depth, or from pictures alone."""
 
-import shlex
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +48,8 @@ class PosesOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(PosesOptions, words, "poses")
+    from endotsr.cli.parts.next_step import training_step
+    from endotsr.clips.sequences.sequence_file import read_sequence_file
     from endotsr.training.runs.files import refuse_read_only
     from endotsr.untrusted.writing import replace_text
 
@@ -57,7 +58,7 @@ def run(words: list[str]) -> int:
     for line in lines:
         print(line)
     if written:
-        print(f"written: {options.sequence}; next: endotsr train {shlex.quote(str(options.sequence))} --out RUN")
+        print(f"written: {options.sequence}; {training_step(options.sequence, read_sequence_file(options.sequence))}")
     if options.html is not None:
         replace_text(options.html, page())
         print(f"report: {options.html}")

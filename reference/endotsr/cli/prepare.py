@@ -25,8 +25,10 @@ from endotsr.clips.formats.choices import (
     Unit,
 )
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 if TYPE_CHECKING:
+    from endotsr.clips.sequences.sequence_file import SequenceFile
     from endotsr.clips.sequences.source_options import SourceOptions
 
 
@@ -137,7 +139,7 @@ def run(words: list[str]) -> int:
         clip = united(clip, options.unite_masks, _stated(options))
     if options.crop:
         clip = cropped(clip, options.crop)
-    print(f"source: {options.source}, layout {clip.layout}, {clip.count} frames", flush=True)
+    print(f"source: {options.source}, layout {clip.layout}, {counted(clip.count, 'frame')}", flush=True)
     found, notes = prepare(clip, options.out, settings, replace=options.replace)
     if options.also:
         from endotsr.clips.prepare.for_others import describe_for
@@ -149,8 +151,8 @@ def run(words: list[str]) -> int:
     for note in notes:
         print(f"  {note}")
     camera = found.camera
-    print(f"written: {options.out}, {found.frames} frames of {camera.width}x{camera.height}")
-    print(_next_step(options.out, found.depth is not None, camera.baseline > 0, pair))
+    print(f"written: {options.out}, {counted(found.frames, 'frame')} of {camera.width}x{camera.height}")
+    print(_next_step(options.out, found, pair))
     write_result(
         options.json, source=options.source, layout=clip.layout, folder=options.out, frames=found.frames,
         width=camera.width, height=camera.height, stereo=camera.baseline > 0, depth=found.depth is not None,
@@ -221,10 +223,13 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
     )
 
 
-def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
-    folder = shlex.quote(str(out))  # as a shell takes it
-    if depth:
-        return f"next: endotsr train {folder} --out RUN"
+def _next_step(out: Path, found: "SequenceFile", pair: bool) -> str:
+    """The command that comes next, or why there is none; `pair`: the clip has right pictures."""
+    from endotsr.cli.parts.next_step import obstacle, training_step
+
+    folder, stereo = shlex.quote(str(out)), found.camera.baseline > 0  # as a shell takes it
+    if found.depth is not None or obstacle(found):
+        return training_step(out, found)
     if pair and not stereo:
         from endotsr.clips.sequences.sequence_file import FILE_NAME
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
+from endotsr.untrusted.names import counted
 
 
 @dataclass
@@ -93,13 +94,16 @@ def run(words: list[str]) -> int:
     def film(shown) -> None:
         if options.film and rate:
             count = write_film(options.film, pictures.film_pictures(shown, look, sequence), rate)
-            print(f"{options.film}: {count} pictures, {count / rate:.1f} s{speed_in_words(shown_at, duration, rate)}")
+            print(
+                f"{options.film}: {counted(count, 'picture')}, {count / rate:.1f} s"
+                f"{speed_in_words(shown_at, duration, rate)}"
+            )
         else:
             pictures.dropped(shown)
 
     if options.out:
         count = pictures.write_pictures(options.out, scene, made, look, options.npy, film)
-        print(f"{count} pictures in {options.out}: colour/, depth/, opacity/, render.json")
+        print(f"{counted(count, 'picture')} in {options.out}: colour/, depth/, opacity/, render.json")
     else:
         film(made)
     write_result(options.json, folder=options.out, film=options.film, rate=rate, times=shown_at)

@@ -17,6 +17,7 @@ from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.errors import InputError
 from endotsr.training.runs.files import os_error_line
 from endotsr.training.runs.folder import refuse_existing
+from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replacing_folder
 
 STILL = named_scene("still")
@@ -93,7 +94,9 @@ def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> 
         raise InputError("simulate: --lossless needs --layout stereomis; the other layout is always lossless")
     refuse_existing(out)
     check(settings)
-    print(f"{settings.frames} frames of {settings.width}x{settings.height}, seed {settings.seed}", flush=True)
+    print(
+        f"{counted(settings.frames, 'frame')} of {settings.width}x{settings.height}, seed {settings.seed}", flush=True
+    )
     print(f"effects: {', '.join(effects_on(settings))}", flush=True)
     try:
         out.absolute().parent.mkdir(parents=True, exist_ok=True)

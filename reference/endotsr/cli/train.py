@@ -22,6 +22,7 @@ from endotsr.studies.windows.record import is_windowed
 from endotsr.training.runs.files import refuse_read_only
 from endotsr.training.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.training.runs.records import RunRecord
+from endotsr.untrusted.names import counted
 
 if TYPE_CHECKING:
     from endotsr.clips.sequences.checks.duration import Standing
@@ -316,7 +317,7 @@ def _print_settings(config: Config, schedule_note: str) -> None:
 
 def _print_sequence(source: str, sequence: "Sequence") -> None:
     print(
-        f"sequence: {source}, {sequence.count} frames of {sequence.width}x{sequence.height}, "
+        f"sequence: {source}, {counted(sequence.count, 'frame')} of {sequence.width}x{sequence.height}, "
         f"{len(sequence.train_index)} for training, {len(sequence.test_index)} held out"
     )
     for note in (*sequence.notes, *sequence.not_read):

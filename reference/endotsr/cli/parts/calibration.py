@@ -7,6 +7,7 @@ from endotsr.cli.parts.result import write_marked
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.training.runs.folder import RunFolder
+from endotsr.untrusted.names import counted
 
 # Settings that affect equation (7).
 REPLACEABLE = (
@@ -42,7 +43,7 @@ def calibrate_run(folder: RunFolder, config: Config, source: str | None, json: P
         print(f"setting replaced: {line}")
     print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")
     print(found.table)
-    print(f"lambda_lap = {found.lambda_lap:.6g} ({len(found.ratios)} views)")
+    print(f"lambda_lap = {found.lambda_lap:.6g} ({counted(len(found.ratios), 'view')})")
     write_marked(json, {"iteration": model.iteration, **found._asdict()})
 
 

@@ -23,7 +23,7 @@ def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Sta
     }
     named = ", ".join(f"{name} {duration(seconds)}" for name, seconds in steps.items() if seconds >= 1)
     known = "at the speed of the last training" if unit is not None else "the speed of this machine is assumed"
-    whole = f"about {in_words(sum(steps.values()))} for {plan.frames.total} frames ({known})"
+    whole = f"about {in_words(sum(steps.values()))} for {counted(plan.frames.total, 'frame')} ({known})"
     return f"{whole}: {named}" if named else whole
 
 

@@ -11,7 +11,7 @@ from endotsr.clips.formats.colmap_model import registered_count
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.errors import InputError
-from endotsr.untrusted.names import relative_path
+from endotsr.untrusted.names import counted, relative_path
 
 # Folders with models, or with numbered folders of models; the first that has one counts.
 PLACES = (".", "sparse", "colmap/sparse", "dense", "distorted/sparse")
@@ -61,7 +61,7 @@ def choose_model(path: Path, name: str = "") -> ChosenModel:
             raise InputError(f"{path}: --model {name}: no such model; allowed: {', '.join(names.values())}")
     else:
         found = max(models, key=lambda folder: counts[folder])
-    others = [f"{names[folder]} ({counts[folder]} pictures)" for folder in models if folder != found]
+    others = [f"{names[folder]} ({counted(counts[folder], 'picture')})" for folder in models if folder != found]
     forms = [ending for ending in (".txt", ".bin") if (found / f"cameras{ending}").is_file()]
     notes = [f"{names[found]}: the text files are read, not the binary ones beside them"] if len(forms) > 1 else []
     if not others:

@@ -16,6 +16,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_bytes, read_text
+from endotsr.untrusted.names import counted
 
 LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations
 
@@ -185,7 +186,9 @@ class _Bytes:
         """The next values of a `struct` format, little-endian. Raises InputError at the end of the file."""
         size = struct.calcsize("<" + form)
         if self.place + size > len(self.data):
-            raise InputError(f"{self.path}: ends after {len(self.data)} bytes; {self.place + size} are needed")
+            raise InputError(
+                f"{self.path}: ends after {counted(len(self.data), 'byte')}; {self.place + size} are needed"
+            )
         values = struct.unpack_from("<" + form, self.data, self.place)
         self.place += size
         return values
@@ -194,7 +197,7 @@ class _Bytes:
         """A count of entries of at least `least` bytes each, checked against the size of the file."""
         (number,) = self.take("Q")
         if number * least > len(self.data) - self.place:
-            raise InputError(f"{self.path}: states {number} entries; the file has {len(self.data)} bytes")
+            raise InputError(f"{self.path}: states {number} entries; the file has {counted(len(self.data), 'byte')}")
         return number
 
     def end(self) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import open_regular
-from endotsr.untrusted.names import file_name
+from endotsr.untrusted.names import counted, file_name
 from endotsr.untrusted.png import LARGEST_FILE
 
 TRUTH = "truth"  # folder of a simulated sequence
@@ -181,7 +181,7 @@ def hash_files(root: Path, files: Iterable[Path]) -> dict[str, str]:
 
 
 def _counts(a: list[Path], b: list[Path]) -> str:
-    return f"{a[0].parent.name} holds {len(a)} files, {b[0].parent.name} {len(b)}"
+    return f"{a[0].parent.name} holds {counted(len(a), 'file')}, {b[0].parent.name} {len(b)}"
 
 
 def _text(number: tuple) -> str:

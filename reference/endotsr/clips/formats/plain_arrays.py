@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.untrusted import arrays as untrusted
 from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.names import counted
 
 LARGEST_FILE = 1 << 32  # bytes
 PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE][-+]?\d+)?)\s")
@@ -49,7 +50,7 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
         )
     if len(data) - header.end() != 4 * width * height:
         raise InputError(
-            f"{path}: {len(data) - header.end()} bytes of pixels, {width}x{height} need {4 * width * height}"
+            f"{path}: {counted(len(data) - header.end(), 'byte')} of pixels, {width}x{height} need {4 * width * height}"
         )
     plane = np.frombuffer(data, "<f4" if scale < 0 else ">f4", offset=header.end()).reshape(height, width)
     return np.ascontiguousarray(plane[::-1], np.float32)  # the format stores the bottom row first

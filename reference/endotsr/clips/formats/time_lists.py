@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from endotsr.clips.formats.files import visible_files
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_text
-from endotsr.untrusted.names import plain_line, relative_path
+from endotsr.untrusted.names import counted, plain_line, relative_path
 
 LISTS = ("*time*.txt", "*time*.csv", "*stamps.txt", "*stamps.csv")  # in lower case
 # The beginning of the name of a unit in a head line, seconds per step, and the unit in words.
@@ -126,7 +126,7 @@ def _seconds_of(path: Path, pictures: list[Path]) -> tuple[NDArray[np.float64], 
     else:
         found = [row[of_time] for row in rows]
         if len(found) != len(pictures):
-            raise _Unfit(f"{len(found)} lines for {len(pictures)} pictures")
+            raise _Unfit(f"{counted(len(found), 'line')} for {counted(len(pictures), 'picture')}")
     stamps = np.array([float(word) for word in found])
     if len(stamps) < 2 or not (np.diff(stamps) > 0).all():
         raise _Unfit("its times do not ascend")

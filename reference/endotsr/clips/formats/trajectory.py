@@ -16,6 +16,7 @@ from endotsr.clips.formats.trajectory_lines import stored_poses
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
+from endotsr.untrusted.names import counted
 
 # Seconds per step of a stamp, by the least stamp that has this unit: no recording is older than 1973 or begins in 5138.
 TICKS = (
@@ -96,7 +97,8 @@ def poses_of_frames(
     stamps = trajectory.stamps
     if not trajectory.stamped and len(stamps) != count:
         raise InputError(
-            f"{trajectory.path}: {len(stamps)} poses without stamps for {count} frames; allowed: one pose per frame"
+            f"{trajectory.path}: {len(stamps)} poses without stamps for {counted(count, 'frame')}; allowed: one pose"
+            " per frame"
         )
     if (named := _by_numbers(trajectory, numbers, rate)) is not None:
         return named, "stamps are the numbers in the names of the frames"
@@ -112,8 +114,8 @@ def poses_of_frames(
         return list(trajectory.poses), "one pose per frame, in order"
     if rate is None:
         raise InputError(
-            f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose per frame, frame"
-            " numbers as stamps, or a known frame rate"
+            f"{trajectory.path}: {len(stamps)} poses with times for {counted(count, 'frame')}; allowed: one pose per"
+            " frame, frame numbers as stamps, or a known frame rate"
         )
     wanted = timed.stamps[0] + (np.arange(count) / rate if times is None else times)
     how = f"stamps are {trajectory.tick[1]}; frames at {rate:g} Hz from the first one"

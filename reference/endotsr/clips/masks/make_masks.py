@@ -230,7 +230,7 @@ def origin_of(proposal: Proposal, given: BoolArray | None = None) -> str:
             fractions[name] = float((plane & ~covered).mean())
             covered = covered | plane
     for i, plane in enumerate(proposal.excluded):
-        name = f"drawn on {len(proposal.drawn)} frames" if i in proposal.drawn else proposal.kind
+        name = f"drawn on {counted(len(proposal.drawn), 'frame')}" if i in proposal.drawn else proposal.kind
         fractions[name] = fractions.get(name, 0.0) + float((plane & ~covered).mean()) / len(proposal.excluded)
     return ", ".join(f"{name} {fraction:.1%}" for name, fraction in fractions.items())
 

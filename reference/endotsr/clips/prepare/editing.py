@@ -64,7 +64,7 @@ def _numbers(part: str, count: int) -> list[int]:
         except InputError as error:
             raise InputError(f"{str(error).removeprefix('frames ')}; {ALLOWED}") from None
     if not -count <= number < count:
-        raise InputError(f"{part!r}: {number} is outside the {count} frames of the source")
+        raise InputError(f"{part!r}: {number} is outside the {counted(count, 'frame')} of the source")
     return [number % count]
 
 
@@ -201,7 +201,9 @@ def paired_by_time(clip: Clip, late: int) -> Clip:
     Raises:  InputError for a lag as long as the clip. A clip without right pictures is refused when one is read.
     """
     if abs(late) >= clip.count:
-        raise InputError(f"--right-late {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {clip.count} frames")
+        raise InputError(
+            f"--right-late {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {counted(clip.count, 'frame')}"
+        )
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         left: dict[int, Picture] = {}  # of wanted frames whose partner is still to come, and the other way round

@@ -21,6 +21,7 @@ from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
+from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replace_text
 
 KEPT, MODEL = "masks_kept", "sparse/0"
@@ -105,7 +106,10 @@ def _colmap(folder: Path, clip: Clip) -> str:
         for k, p in enumerate(points, 1)
     ]
     replace_text(place / "points3D.txt", "\n".join(rows) + "\n")
-    return f"{MODEL}: {len(poses)} images, {len(points)} points of the prior depth, in the unit of sequence.toml"
+    return (
+        f"{MODEL}: {counted(len(poses), 'image')}, {counted(len(points), 'point')} of the prior depth, in the unit of"
+        " sequence.toml"
+    )
 
 
 def _points(clip: Clip, intrinsics: Intrinsics, poses: list[CameraPose]) -> list[SeenPoint]:

@@ -16,6 +16,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from endotsr.errors import InputError
 from endotsr.method.kernels.memory import memory_limit, unknown_memory
+from endotsr.untrusted.names import counted
 
 PIXEL_BYTES = 3 + 1 + 4 + 1  # image, mask, depth, and the stored mask during reading
 
@@ -33,7 +34,7 @@ class FrameStore:
         self.needed = count * width * height * PIXEL_BYTES
         self.in_file = self.needed > memory_limit(memory) / 2
         self._unknown = unknown_memory() if self.in_file and not memory > 0 else ""
-        self._what = f"{where}: {count} frames of {width}x{height} need {self.needed / 1e9:.1f} GB"
+        self._what = f"{where}: {counted(count, 'frame')} of {width}x{height} need {self.needed / 1e9:.1f} GB"
         free = shutil.disk_usage(tempfile.gettempdir()).free
         if self.in_file and self.needed > free:
             raise InputError(

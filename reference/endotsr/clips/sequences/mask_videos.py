@@ -17,6 +17,7 @@ from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.mask_values import LEAST_WHITE, OBJECTS
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 MOST_BYTES = 1 << 31  # of the planes of a video that are held
 
@@ -30,8 +31,9 @@ def mask_files(path: Path) -> list[Path] | None:
     facts = video_facts(path)
     if facts.count * facts.width * facts.height > MOST_BYTES:
         raise InputError(
-            f"{path}: {facts.count} masks of {facts.width}x{facts.height} pixels; allowed: a video of at most"
-            f" {MOST_BYTES} pixels, or a folder of pictures (`ffmpeg -i {path.name} masks/%06d.png -start_number 0`)"
+            f"{path}: {counted(facts.count, 'mask')} of {facts.width}x{facts.height} pixels; allowed: a video of at"
+            f" most {MOST_BYTES} pixels, or a folder of pictures"
+            f" (`ffmpeg -i {path.name} masks/%06d.png -start_number 0`)"
         )
     return [path / f"{k:06d}" for k in range(facts.count)]
 

@@ -13,6 +13,7 @@ from endotsr.clips.formats.choices import Pairing
 from endotsr.clips.formats.files import check_pairing, frame_numbers, shortened
 from endotsr.clips.sequences.clip import Clip
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 WAYS = {
     "number": "the number in the name of each frame",
@@ -69,8 +70,8 @@ def every_frame(clip: Clip, files: list[Path], pairing: Pairing = "auto") -> tup
     found = paired(clip.images, files, pairing, clip.source_names)
     if lacking := [name for name, file in zip(clip.names, found.files) if file is None]:
         raise InputError(
-            f"{files[0].parent}: has no file for frame {shortened(lacking)}; {len(files)} files for {clip.count}"
-            " frames; allowed: one file per frame"
+            f"{files[0].parent}: has no file for frame {shortened(lacking)}; {counted(len(files), 'file')} for"
+            f" {counted(clip.count, 'frame')}; allowed: one file per frame"
         )
     return [file for file in found.files if file is not None], found.note
 
@@ -92,7 +93,10 @@ def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | N
 def _in_order(frames: list[Path] | int, files: list[Path]) -> Paired:
     where, count = files[0].parent, frames if isinstance(frames, int) else len(frames)
     if len(files) != count:
-        raise InputError(f"{where}: --pairing order: {len(files)} files for {count} frames; allowed: one per frame")
+        raise InputError(
+            f"{where}: --pairing order: {counted(len(files), 'file')} for {counted(count, 'frame')}; allowed: one"
+            " per frame"
+        )
     note = f"{where.name}: --pairing order pairs {files[0].name} with the first frame"
     return Paired(list(files), note + ("" if isinstance(frames, int) else _as_text(frames)))
 
@@ -143,7 +147,7 @@ def _chosen(
             return "number" if "number" in fitting else "source"
     lines = [
         f"by {WAYS[way]}, {found.count(None)} of {count} frames have no file and {len(set(files) - set(found))} of"
-        f" {len(files)} files no frame"
+        f" {counted(len(files), 'file')} no frame"
         for way, found in possible.items()
     ]
     others = [*possible, *(["order"] if len(files) == count else [])]

@@ -17,6 +17,7 @@ from endotsr.clips.formats.plain_arrays import read_npy
 from endotsr.clips.sequences.clip import REST, rests
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera, CameraPose, camera_centre
+from endotsr.untrusted.names import counted
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 LARGEST_POSES = 1 << 26  # bytes: half a million frames
@@ -42,7 +43,7 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     if rows.ndim != 2 or rows.shape[1] != 17:
         raise InputError(f"{path}: shape {rows.shape}, expected (frames, 17)")
     if len(rows) != count:
-        raise InputError(f"{path}: {len(rows)} poses for {count} images")
+        raise InputError(f"{path}: {counted(len(rows), 'pose')} for {counted(count, 'image')}")
     rows = rows.astype(np.float64)
     broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if broken.size:

@@ -12,7 +12,7 @@ import msgspec
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
 from endotsr.untrusted.json import Count, Fraction, Length, Positive, Side, Text, read_json, typed
-from endotsr.untrusted.names import file_name
+from endotsr.untrusted.names import counted, file_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -135,7 +135,9 @@ def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
     if len(set(names)) < len(names):
         raise InputError(f"{where}: names: two frames have one name; allowed: a name for each frame")
     if len(found.times) != len(names):
-        raise InputError(f"{where}: times: {len(found.times)} for {len(names)} frames; allowed: one per frame")
+        raise InputError(
+            f"{where}: times: {len(found.times)} for {counted(len(names), 'frame')}; allowed: one per frame"
+        )
     _check_split(found, where)
     _check_cameras(found, where)
     return found

@@ -52,7 +52,7 @@ from endotsr.clips.sequences.clip import Assumed
 from endotsr.clips.sequences.crop import stated_crop
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.untrusted.names import file_name
+from endotsr.untrusted.names import counted, file_name
 from endotsr.untrusted.sections import Section, checked, refuse_unknown_keys
 from endotsr.untrusted.toml import read_toml, toml_text
 
@@ -192,7 +192,9 @@ def _check_times(found: SequenceFile, path: Path) -> None:
     if found.times is None:
         return
     if len(found.times) != found.frames:
-        raise InputError(f"{path}: times: {len(found.times)} numbers for {found.frames} frames; allowed: one per frame")
+        raise InputError(
+            f"{path}: times: {len(found.times)} numbers for {counted(found.frames, 'frame')}; allowed: one per frame"
+        )
     steps = np.diff(found.times)
     if not np.isfinite(found.times).all() or (steps <= 0).any():
         wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
@@ -205,7 +207,10 @@ def _check_source_names(found: SequenceFile, path: Path) -> None:
     if names is None:
         return
     if len(names) != found.frames:
-        raise InputError(f"{path}: source_names: {len(names)} names for {found.frames} frames; allowed: one per frame")
+        raise InputError(
+            f"{path}: source_names: {counted(len(names), 'name')} for {counted(found.frames, 'frame')};"
+            " allowed: one per frame"
+        )
     for name in names:
         file_name(name, f"{path}: source_names")
     if len(set(names)) < len(names):
@@ -240,7 +245,7 @@ def read_poses(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None]
         return None, {}
     rows = found.poses.matrices
     if len(rows) != found.frames:
-        raise InputError(f"{path}: poses.matrices: {len(rows)} rows for {found.frames} frames")
+        raise InputError(f"{path}: poses.matrices: {len(rows)} rows for {counted(found.frames, 'frame')}")
     poses: list[CameraPose | None] = []
     faults = {}
     for i, row in enumerate(rows):

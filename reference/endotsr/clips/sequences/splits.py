@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import IndexArray
+from endotsr.untrusted.names import counted
 
 LEAST_FRAMES = 3
 LEAST_TRAINING_FRAMES = 2
@@ -78,7 +79,7 @@ def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
         held_out[start : start + length] = True
     if not held_out.any():
         raise InputError(
-            f"split blocks: no held-out block of {length} frames fits into {count} frames;"
+            f"split blocks: no held-out block of {length} frames fits into {counted(count, 'frame')};"
             f" at least {first + length + 1} frames are needed"
         )
     index = np.arange(count)
@@ -111,7 +112,8 @@ def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray,
     Raises:  InputError if there are fewer than 3 frames, fewer than 2 training frames, or no block fits.
     """
     if count < LEAST_FRAMES:
-        raise InputError(f"{count} frames are too few: at least {LEAST_FRAMES} are needed")
+        number = "1 frame is" if count == 1 else f"{count} frames are"
+        raise InputError(f"{number} too few: at least {LEAST_FRAMES} are needed")
     if split == "blocks":
         train, test = blocks(count, block_length)
     elif split == "end":
@@ -156,7 +158,7 @@ def parse_frame_range(text: str, count: int, least: int = LEAST_FRAMES) -> range
         raise InputError(f"frames {text!r}: the step must be 1 or more")
     for bound in (start, stop):
         if bound is not None and not -count <= bound <= count:
-            raise InputError(f"frames {text!r}: {bound} is outside the {count} frames of the sequence")
+            raise InputError(f"frames {text!r}: {bound} is outside the {counted(count, 'frame')} of the sequence")
     chosen = range(count)[slice(start, stop, step)]
     if len(chosen) < least:
         raise InputError(f"frames {text!r}: selects {len(chosen)} of {count} frames; at least {least} are needed")

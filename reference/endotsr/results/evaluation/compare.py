@@ -13,6 +13,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.results.evaluation.records import EvaluationRecord, FrameMetrics, RunEvaluation
 from endotsr.untrusted.json import number
+from endotsr.untrusted.names import counted
 
 RESAMPLES = 9999
 CONFIDENCE = 0.95
@@ -137,7 +138,7 @@ def _frames(method: Method) -> list[int]:
 
 def _about(method: Method) -> str:
     names = [row["name"] for row in method.per_frame]
-    return f"{len(names)} frames" + (f" from {names[0]} to {names[-1]}" if names else "")
+    return f"{counted(len(names), 'frame')}" + (f" from {names[0]} to {names[-1]}" if names else "")
 
 
 def _refuse_no_number(method: Method, where: object) -> None:

@@ -28,6 +28,7 @@ from endotsr.results.evaluation.evaluate import training_sample
 from endotsr.results.evaluation.metrics import psnr_tissue, ssim_tissue
 from endotsr.results.evaluation.records import Measured, MeasureRow
 from endotsr.training.runs.sources import SIMULATED
+from endotsr.untrusted.names import counted
 
 FOLDER = "images_right"
 MATCHED_FRAMES = 5  # number of frames for the stereo baseline
@@ -159,7 +160,9 @@ def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) 
     files, width, height = list_pictures(folder, PICTURE_ENDINGS), sequence.width, sequence.height
     files = [files[i] for i in parse_frame_range(settings.frames, len(files))]
     if len(files) != sequence.count:
-        raise InputError(f"{folder}: {len(files)} pictures for {sequence.count} frames; allowed: one per frame")
+        raise InputError(
+            f"{folder}: {counted(len(files), 'picture')} for {counted(sequence.count, 'frame')}; allowed: one per frame"
+        )
 
     def right(index: int) -> NDArray[np.uint8]:
         file = files[index]

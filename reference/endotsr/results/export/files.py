@@ -14,6 +14,7 @@ from endotsr.results.export.scene import MovingScene
 from endotsr.results.export.times import Times, chosen_times
 from endotsr.training.runs.files import refuse_unwritable
 from endotsr.training.runs.folder import refuse_existing
+from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replacing_folder
 
 FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
@@ -88,7 +89,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     kept = (scene.folder.checkpoint, scene.folder.previous) if scene.folder else ()
     whole = next((file.stat().st_size for file in kept if file.is_file()), None)  # one of them, or both, are there
     compared = f", {size / whole:.1%} of the checkpoint" if whole else ""
-    return f"{out}: {model.gaussians.count} Gaussians, {size / 1e6:.2f} MB{compared}"
+    return f"{out}: {counted(model.gaussians.count, 'Gaussian')}, {size / 1e6:.2f} MB{compared}"
 
 
 def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
@@ -97,7 +98,7 @@ def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> 
     wanted = [time for time, _, _, _ in chosen_times("export", times, scene.record, default="all")]
     refuse_unwritable(out)
     count = write_animated_points(out, scene, wanted, content.least_opacity, content.taken_out)
-    return f"{out}: {count} points at {len(wanted)} times, {out.stat().st_size / 1e6:.2f} MB"
+    return f"{out}: {counted(count, 'point')} at {counted(len(wanted), 'time')}, {out.stat().st_size / 1e6:.2f} MB"
 
 
 def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
@@ -118,7 +119,8 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
     with replacing_folder(out) as target:
         for k, (time, _, _, _) in enumerate(wanted):
             _write(scene, target / f"{k:05d}.ply", time, content)
-    return f"{out}: {len(wanted)} files of {content.kind}, 00000.ply to {len(wanted) - 1:05d}.ply"
+    names = "00000.ply" + (f" to {len(wanted) - 1:05d}.ply" if len(wanted) > 1 else "")
+    return f"{out}: {counted(len(wanted), 'file')} of {content.kind}, {names}"
 
 
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:

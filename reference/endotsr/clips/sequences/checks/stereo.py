@@ -168,7 +168,7 @@ def late_finding(rows: list[RowMatches], where: str) -> list[Finding]:
     what = (
         f"the right view is about {counted(whole, 'frame')} {side}: points that move up or"
         f" down lie where the left view {'showed' if frames > 0 else 'will show'} them (estimate"
-        f" {abs(frames):.1f}, from {len(moving)} frames)"
+        f" {abs(frames):.1f}, from {counted(len(moving), 'frame')})"
     )
     return [finding("late-right-view", where, what)]
 

@@ -24,6 +24,7 @@ from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_text
+from endotsr.untrusted.names import counted
 
 POSES, COLOUR, DEPTH = "pose.txt", "_color.png", "_depth.tif*"
 FILES = Inventory(
@@ -97,7 +98,9 @@ def describe_c3vd(path: Path, options: SourceOptions) -> Clip:
     files, planes = (sorted(visible_files(path, f"*{end}"), key=number) for end in (COLOUR, DEPTH))
     poses, maps = read_poses(path / POSES), pinhole_maps()
     if len(poses) != len(files):
-        raise InputError(f"{path / POSES}: {len(poses)} poses for {len(files)} pictures; allowed: one per picture")
+        raise InputError(
+            f"{path / POSES}: {len(poses)} poses for {counted(len(files), 'picture')}; allowed: one per picture"
+        )
     paired = matching_files(files, planes) if planes else []
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:

@@ -21,6 +21,7 @@ from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import pictures_from_files, stated_masks
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 
 def recognises(path: Path) -> bool:
@@ -38,7 +39,7 @@ def describe_colmap(path: Path, options: SourceOptions) -> Clip:
     files = files_of_model(path, folder, [image.name for image in registered])
     order = time_order(files)
     files, images = [files[i] for i in order], [registered[i] for i in order]
-    notes.insert(0, f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points")
+    notes.insert(0, f"{folder.name}: {len(files)} registered pictures, {counted(len(model.points), 'point')}")
     notes += _of_nerfstudio(path)
     intrinsics = shared_intrinsics([model.cameras[image.camera] for image in images], folder, notes)
     notes += picture_notes(files) + unregistered(files) + [found.line for found in gap_findings(files)]

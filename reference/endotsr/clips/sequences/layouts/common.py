@@ -28,6 +28,7 @@ from endotsr.clips.sequences.sequence_file import (
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import with_stated
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 STATES = f"{FILE_NAME} states"
 
@@ -45,7 +46,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         return Clip("common", path, [], folder.pictures, stated_in=where, faults=folder.faults)
     folder.list_pictures(IMAGES, RIGHT)
     if folder.images and len(folder.images) != found.frames:
-        what = f"{where}: frames = {found.frames}, but images/ holds {len(folder.images)} pictures"
+        what = f"{where}: frames = {found.frames}, but images/ holds {counted(len(folder.images), 'picture')}"
         folder.faults.append(finding("sequence-file", where, what))
     intrinsics = found.camera.intrinsics(where)
     folder.size, folder.size_said = (intrinsics.width, intrinsics.height), STATES

@@ -37,7 +37,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.json import Keys, integer, listed, number, read_json
-from endotsr.untrusted.names import relative_path
+from endotsr.untrusted.names import counted, relative_path
 from endotsr.untrusted.yaml import matrix
 
 FILES = ("transforms.json", "transforms_train.json")
@@ -163,7 +163,10 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         times=None if times is None else np.sort(times).astype(np.float64),
         read_here=_places(entries, data),
         inside=_inside(file, files, masked, planes, _places(entries, data)),
-        notes=[f"{file.name}: {len(files)} frames, unit of lengths {'unknown' if unit == ARBITRARY else unit}", *notes],
+        notes=[
+            f"{file.name}: {counted(len(files), 'frame')}, unit of lengths {'unknown' if unit == ARBITRARY else unit}",
+            *notes,
+        ],
     )
 
 
@@ -219,7 +222,7 @@ def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray
         return None
     cloud, unused = read_cloud(path)
     notes += unused
-    notes.append(f"{len(cloud)} points: the file does not state their visibility")
+    notes.append(f"{counted(len(cloud), 'point')}: the file does not state their visibility")
     return cloud
 
 

@@ -19,6 +19,7 @@ from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.arrays import read_npz
+from endotsr.untrusted.names import counted
 
 CAMERAS = "cameras_points.npz"
 LARGEST_FILE = 1 << 31  # bytes, of the arrays together as well
@@ -74,7 +75,7 @@ def describe_points(path: Path, options: SourceOptions) -> Clip:
         intrinsics=intrinsics_of_matrix(found["K"], width, height, where=where),
         poses=poses,
         rate=options.rate,
-        notes=[f"{CAMERAS}: {len(points)} points, on average {visible.sum(axis=0).mean():.0f} in a frame"],
+        notes=[f"{CAMERAS}: {counted(len(points), 'point')}, on average {visible.sum(axis=0).mean():.0f} in a frame"],
     )
 
 

@@ -30,6 +30,7 @@ from endotsr.clips.sequences.sources import (
     unit_of,
 )
 from endotsr.errors import InputError
+from endotsr.untrusted.names import counted
 
 SAME_RATE = 0.01  # relative difference of the frame rates of two videos of a pair
 
@@ -159,7 +160,8 @@ def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int
 
 def _notes(facts: VideoFacts, rate: float | None, path: Path, stereo: str) -> list[str]:
     found = [
-        f"{path.name}: {facts.count} pictures of {facts.width}x{facts.height}, {facts.codec}, {rate or 0:g} a second"
+        f"{path.name}: {counted(facts.count, 'picture')} of {facts.width}x{facts.height}, {facts.codec},"
+        f" {rate or 0:g} a second"
     ]
     found += [f"{path.name}: {remark}" for remark in facts.remarks]
     if facts.interlaced:
