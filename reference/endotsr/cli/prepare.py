@@ -166,10 +166,10 @@ def _check_options(options: PrepareOptions, words: list[str]) -> None:
     from endotsr.clips.sequences.layouts import layout_of
     from endotsr.untrusted.writing import refuse_existing
 
-    _refuse_nested(options.source, options.out)
     if not options.replace:
         refuse_existing(options.out)
     _check_numbers(options)
+    _refuse_nested(options.source, options.out)
     layout = layout_of(options.source, options.layout).name
     check_relations("prepare", PREPARE, options, given_names(PrepareOptions, words), {"layout": layout})
 

@@ -70,17 +70,14 @@ def run(words: list[str]) -> int:
     from endotsr.results.views.plan import ViewRequest
     from endotsr.studies.windows.scene import open_any, shown_frames
     from endotsr.training.runs.sources import refuse_inside_data
-    from endotsr.untrusted.marks import refuse_foreign
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
     request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
-    pictures.check_outputs(options.out, options.film, options.rate, options.slow)
-    refuse_foreign(options.film, options.replace, "--film")
+    pictures.check_outputs(options.out, options.film, options.rate, options.slow, options.replace)
     use_threads(options.threads)
     scene = open_any(options.scene)
-    for note in scene.notes:
-        print(f"  {note}")
+    print(*(f"  {note}\n" for note in scene.notes), sep="", end="")
     for path in filter(None, (options.out, options.film)):
         if scene.folder is not None:
             refuse_inside_data(path, scene.folder)
@@ -94,10 +91,8 @@ def run(words: list[str]) -> int:
     def film(shown) -> None:
         if options.film and rate:
             count = write_film(options.film, pictures.film_pictures(shown, look, sequence), rate)
-            print(
-                f"{options.film}: {counted(count, 'picture')}, {count / rate:.1f} s"
-                f"{speed_in_words(shown_at, duration, rate)}"
-            )
+            speed = speed_in_words(shown_at, duration, rate)
+            print(f"{options.film}: {counted(count, 'picture')}, {count / rate:.1f} s{speed}")
         else:
             pictures.dropped(shown)
 

@@ -1,4 +1,4 @@
-"""The marks by which endotsr recognises a file that it wrote: only such a file is replaced without being asked.
+"""The marks by which endotsr recognises a file that it wrote, and may replace without being asked.
 
 In: the path of a file. Out: whether its content has the mark that endotsr writes into files of this kind. The name of a
 file says nothing about its origin. CSV and pictures have no mark.

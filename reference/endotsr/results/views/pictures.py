@@ -31,6 +31,7 @@ from endotsr.results.views.plan import PlannedView, ViewRequest, check_request, 
 from endotsr.training.runs.files import refuse_unwritable, write_json
 from endotsr.training.runs.folder import refuse_existing
 from endotsr.training.runs.sources import load_run_sequence
+from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.writing import replacing_folder
 
 DepthKind = Literal["accumulated", "normalised"]
@@ -102,8 +103,13 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
     return views_of(request, wanted, scene.cameras, pivot_depth, scene.placement)
 
 
-def check_outputs(out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None) -> None:
-    """Raises InputError without an output, or if the folder or film cannot be written."""
+def check_outputs(
+    out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None, replace: bool = True
+) -> None:
+    """Raises InputError without an output, or if the folder or film cannot be written.
+
+    replace   whether a film that endotsr did not write may be replaced
+    """
     if out is None and film is None:
         raise InputError("render: --out DIR or --film FILE is missing; allowed: one or both")
     if out is not None:
@@ -112,6 +118,7 @@ def check_outputs(out: Path | None, film: Path | None, rate: float | None = None
     if film is not None:
         check_film(film, rate, slow)
         refuse_unwritable(film)
+        refuse_foreign(film, replace, "--film")
 
 
 def frames_of(

@@ -148,6 +148,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     depth = depth_of(planes, DEPTH_STEP * factor * applied) if any(planes) else None
     cloud = None if depth is not None else _cloud(folder, data, file, notes)
     notes += _of_files(file, files)
+    known = "unknown" if unit == ARBITRARY else unit
     return Clip(
         layout="nerfstudio",
         where=path,
@@ -163,10 +164,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         times=None if times is None else np.sort(times).astype(np.float64),
         read_here=_places(entries, data),
         inside=_inside(file, files, masked, planes, _places(entries, data)),
-        notes=[
-            f"{file.name}: {counted(len(files), 'frame')}, unit of lengths {'unknown' if unit == ARBITRARY else unit}",
-            *notes,
-        ],
+        notes=[f"{file.name}: {counted(len(files), 'frame')}, unit of lengths {known}", *notes],
     )
 
 
