@@ -18,6 +18,7 @@ from endotsr.port.judge.profiles import lines_of
 from endotsr.port.judge.recognise import Suspect
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
+from endotsr.untrusted.marks import GENERATOR
 from endotsr.untrusted.writing import replace_file, replace_text
 
 MOST_LINES = 60  # refused outputs in the table
@@ -32,7 +33,8 @@ def as_json(report: Report) -> bytes:
     """The report as JSON."""
     cases = [msgspec.structs.replace(case, evidence={}) for case in report.cases]
     text = msgspec.json.encode(msgspec.structs.replace(report, cases=cases))
-    return msgspec.json.format(b'{"generator":"endotsr",' + text.removeprefix(b"{"), indent=1) + b"\n"
+    mark = msgspec.json.encode(GENERATOR).removesuffix(b"}")
+    return msgspec.json.format(mark + b"," + text.removeprefix(b"{"), indent=1) + b"\n"
 
 
 def as_table(report: Report, *, everything: bool = False) -> str:
