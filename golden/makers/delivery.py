@@ -17,8 +17,7 @@ PACKED = ("VERSION", "manifest.json", "README.md", "SETTINGS.md")
 DATE = (2020, 1, 1, 0, 0, 0)
 JUDGE = (
     "endotsr/__init__.py", "endotsr/errors.py", "endotsr/untrusted/__init__.py", "endotsr/untrusted/files.py",
-    "endotsr/untrusted/marks.py", "endotsr/untrusted/names.py", "endotsr/untrusted/writing.py",
-    "endotsr/port/__init__.py",
+    "endotsr/untrusted/names.py", "endotsr/untrusted/writing.py", "endotsr/port/__init__.py",
 )  # fmt: skip
 START = b"import sys\n\nfrom endotsr.port.judge.__main__ import main\n\nsys.exit(main(sys.argv[1:]))\n"
 SHEBANG = b"#!/usr/bin/env python3\n"

@@ -51,7 +51,7 @@ def test_results_of_pictures_pages_and_files(finished_run, tmp_path):
     assert found["times"] == [0.1, 0.6] and found["folder"].endswith("pictures") and found["film"] is None
     page = tmp_path / "page.html"
     assert result(tmp_path, "export", run, "--out", str(page)) == {
-        "generator": "endotsr", "page": str(page), "bytes": page.stat().st_size, "held_out": True
+        "page": str(page), "bytes": page.stat().st_size, "held_out": True
     }  # fmt: skip
     found = result(tmp_path, "export", run, "--out", str(tmp_path / "files"), "--count", "2")
     assert found["bytes"] == {p.name: p.stat().st_size for p in (tmp_path / "files").iterdir()}

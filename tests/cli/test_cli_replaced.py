@@ -65,27 +65,6 @@ def test_a_checkpoint_is_no_slim_model(finished_run, tmp_path, capsys):
     assert_refused(capsys, ["export", str(finished_run), "--out", str(kept)], FOREIGN)
 
 
-def test_texts_of_the_user_are_not_replaced(finished_run, tmp_path, capsys):
-    run, file = str(finished_run), tmp_path / "a.txt"
-    for words in (["check", "clip", "--json"], ["inspect", "clip", "--out"], ["evaluate", run, "--csv"],
-                  ["golden", "judge", run, "--html"], ["golden", "run", "--port", "true", "--badge"]):  # fmt: skip
-        spared(capsys, file, [*words, str(file)], ", or --replace")
-    for words in (["bench", "--json"], ["train", "clip", "--json"], ["poses", "clip", "--html"],
-                  ["gradcheck", "--json"], ["render", "--log-file"]):  # fmt: skip
-        spared(capsys, file, [*words, str(file)])
-
-
-def test_texts_of_endotsr_are_replaced(tmp_path, capsys):
-    clip, json, page, log = (str(tmp_path / name) for name in ("clip", "a.json", "a.html", "a.log"))
-    assert main(["simulate", "still", "--out", clip, "--width", "48", "--height", "32", "--frames", "4"]) == 0
-    words = ["check", clip, "--json", json, "--html", page, "--log-file", log]
-    assert main(words) == main(words)
-    assert all(map(own, map(tmp_path.joinpath, ("a.json", "a.html", "a.log"))))
-    assert (tmp_path / "a.log").read_text().startswith(f"# log of endotsr: endotsr check {clip} --json")
-    (tmp_path / "a.json").write_bytes(b"")
-    assert main(words) in (0, 1), "an empty file holds nothing"
-
-
 def test_tables_of_a_sweep_replace_no_file_of_the_user(tmp_path, capsys):
     out = tmp_path / "out"
     out.mkdir()

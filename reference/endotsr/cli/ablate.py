@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import JsonFile, write_marked
+from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.sweep import ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
@@ -70,7 +70,7 @@ def run(words: list[str]) -> int:
     from endotsr.studies.sweeps.place import Place, check_place
     from endotsr.studies.sweeps.spec import spec_of
     from endotsr.studies.sweeps.sweep import refuse_tables
-    from endotsr.training.runs.files import refuse_folder
+    from endotsr.training.runs.files import refuse_folder, write_json
 
     options = parse(AblateOptions, words, "ablate")
     place = Place(options.workers, options.threads, options.scheduler)
@@ -82,7 +82,8 @@ def run(words: list[str]) -> int:
 
     def on_rows(rows: "Rows") -> None:
         records[:] = [write_ablation(options.out, rows, command)]
-        write_marked(options.json, records[0])
+        if options.json is not None:
+            write_json(options.json, records[0])
 
     if options.collect:
         from endotsr.studies.sweeps.sweep import Inputs, lacking, planned

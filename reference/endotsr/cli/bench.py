@@ -6,9 +6,10 @@ from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import JsonFile, write_marked
+from endotsr.cli.parts.result import JsonFile
 from endotsr.errors import InputError
 from endotsr.studies.bench.case import BenchCase, Precision
+from endotsr.training.runs.files import write_json
 
 LEAST = {"gaussians": 4, "repeats": 1, "width": 16, "height": 16, "threads": 1}
 
@@ -50,7 +51,8 @@ def run(words: list[str]) -> int:
     result = stages.measure_stages(cases_of(options), print)
     for case in result["cases"]:
         print(f"\n{stages.name_of(case['case'])}\n{stages.table(case)}")
-    write_marked(options.json, dated(result))
+    if options.json:
+        write_json(options.json, dated(result))
     return 0
 
 

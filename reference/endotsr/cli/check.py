@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import REPLACE, write_result
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
@@ -29,8 +28,6 @@ class CheckOptions:
     """write the findings to this file"""
     html: Annotated[Path | None, Option("FILE.html", written=True)] = None
     """write a page with the findings and pictures to this file"""
-    replace: Annotated[bool, REPLACE] = False
-    """replace an existing file that endotsr did not write"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
 
 
@@ -43,6 +40,7 @@ def run(words: list[str]) -> int:
     from endotsr.cli.parts.waiting import in_words
     from endotsr.clips.sequences.checks.check import check_sequence
     from endotsr.results.report.check_page import check_page
+    from endotsr.training.runs.files import write_json
     from endotsr.untrusted.writing import replace_text
 
     checked = check_sequence(Path(options.sequence), options.settings, _speed(options.settings))
@@ -57,8 +55,9 @@ def run(words: list[str]) -> int:
             f" and ends with about {cost['gaussians']} Gaussians"
         )
     print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")
-    findings = [finding._asdict() for finding in checked.findings]
-    write_result(options.json, source=checked.source, findings=findings, facts=checked.facts)
+    if options.json is not None:
+        findings = [finding._asdict() for finding in checked.findings]
+        write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
     if options.html is not None:
         replace_text(options.html, check_page(checked))
     return 1 if checked.refused else 0

@@ -8,10 +8,9 @@ from endotsr.cli.parts.evaluating import evaluating
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.related_options import EVALUATE
 from endotsr.cli.parts.relations import check_relations
-from endotsr.cli.parts.result import write_marked
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
-from endotsr.training.runs.files import refuse_read_only
+from endotsr.training.runs.files import refuse_read_only, write_json
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replace_text
@@ -34,7 +33,8 @@ def run(words: list[str]) -> int:
         compare_methods(options)
         return 0
     metrics = _pictures(options) if options.pictures else _run(options)
-    write_marked(options.json, metrics)
+    if options.json:
+        write_json(options.json, metrics)
     if options.csv:
         replace_text(options.csv, frames_csv(metrics, metrics.get("label", "this model")))
     return 0

@@ -8,7 +8,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import given_names, parse
 from endotsr.cli.parts.related_options import EXPORT
 from endotsr.cli.parts.relations import check_relations
-from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.untrusted.names import counted
 
 # The fact `format` of related_options: what --out writes, by its ending.
@@ -55,7 +55,7 @@ class ExportOptions:
     """for a page: show held-out frames and error; needs the sequence of the run"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """for a page: current location of the sequence of the run (default: the recorded one)"""
-    replace: Annotated[bool, REPLACE] = False
+    replace: bool = False
     """replace an existing file that endotsr did not write"""
     json: JsonFile = None
     """also write a record of the output as JSON"""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
 
@@ -31,8 +31,6 @@ class _Reported:
     """also write the report as JSON"""
     html: Annotated[Path | None, Option("FILE", written=True)] = None
     """also write the report as one HTML page with difference images"""
-    replace: Annotated[bool, REPLACE] = False
-    """replace an existing file that endotsr did not write"""
     only: Annotated[str, Option("FAMILY[/CASE]")] = ""
     """judge this family or case only; the report then makes no claim, and exit code 0 means that no case failed"""
     all: bool = False

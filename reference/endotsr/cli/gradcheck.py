@@ -1,11 +1,11 @@
 """`endotsr gradcheck`: all reverse passes compared with finite differences."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import JsonFile
 
 
 @dataclass
@@ -18,7 +18,7 @@ class GradcheckOptions:
     """seed of inputs and directions"""
     definition: bool = False
     """check the definition in plain NumPy instead of the compiled functions"""
-    json: JsonFile = None
+    json: Annotated[Path | None, Option("FILE")] = None
     """also write the table as JSON"""
 
 

@@ -7,9 +7,10 @@ from typing import Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import REPLACE, JsonFile, write_marked
+from endotsr.cli.parts.result import JsonFile
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
+from endotsr.training.runs.files import write_json
 from endotsr.untrusted.writing import replace_text
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks")
@@ -29,8 +30,6 @@ class InspectOptions:
     """write a self-contained page with pictures"""
     json: JsonFile = None
     """write verdicts and plan as JSON"""
-    replace: Annotated[bool, REPLACE] = False
-    """replace an existing file that endotsr did not write"""
     frame_rate: Annotated[float | None, Option("FPS")] = None
     """frames per second, to give rates per minute too (default: the recording's frame rate, if known)"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
@@ -59,5 +58,6 @@ def run(words: list[str]) -> int:
     if options.out:
         replace_text(options.out, inspection_html(Path(options.sequence).absolute().name, inspection, plan))
         print(f"report: {options.out}")
-    write_marked(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})
+    if options.json:
+        write_json(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})
     return 0

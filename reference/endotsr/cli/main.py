@@ -33,7 +33,7 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # the terminal's encoding may lack letters of a file name
     try:
         output, words = split_output(argv)
-        with redirected(output, words):
+        with redirected(output):
             return _main(words)
     except InputError as error:
         return _fail(str(error))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import REPLACE, JsonFile, write_result
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.untrusted.names import counted
 
 
@@ -53,8 +53,8 @@ class RenderOptions:
     """components to omit"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """current location of the sequence of the run, for truth and error (default: the recorded one)"""
-    replace: Annotated[bool, REPLACE] = False
-    """replace an existing film or JSON file that endotsr did not write"""
+    replace: bool = False
+    """replace an existing film that endotsr did not write"""
     json: JsonFile = None
     """also write a record of the output as JSON"""
     threads: int = 0

@@ -90,7 +90,8 @@ def _measure(options: TradeoffOptions) -> "DatedMeasurement":
     refuse_folder(out)
     if out.is_dir():
         refuse_read_only(out)
-    refuse_foreign(out / PAGE)
+    if not (out / RESULT).is_file():
+        refuse_foreign(out / PAGE)
     scene = chosen_scene(options)
     out.mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:

@@ -1,7 +1,8 @@
 """The marks by which endotsr recognises a file that it wrote, and may replace without being asked.
 
 In: the path of a file. Out: whether its content has the mark that endotsr writes into files of this kind. The name of a
-file says nothing about its origin. CSV and pictures have no mark.
+file says nothing about its origin. Films, exports and pages have a mark; a text such as `--json FILE` has none, and
+replaces any other text.
 """
 
 import io
@@ -11,10 +12,9 @@ from typing import IO, Any
 
 from endotsr.errors import InputError
 
-GENERATOR = {"generator": "endotsr"}  # the first key of a JSON file
+GENERATOR = {"generator": "endotsr"}  # of a glTF file
 HTML = '<meta name="generator" content="endotsr">'
 FILM = "film of endotsr"  # the comment of a film
-LOG = "# log of endotsr: "  # how a log begins
 SLIM = "endotsr slim model"  # the format of a slim model, in its header
 HEAD = 1 << 14  # bytes; every mark but those of .mp4 and .npz stands in them
 LONGEST = 1 << 26  # bytes, of the header of a slim model and of the index of an .mp4 film
@@ -22,13 +22,9 @@ JSON_MARK = b'"generator": "endotsr"'
 MARKS = (  # beginning of a file, and its mark
     (b"ply\n", b"\ncomment endotsr "),
     (b"glTF", JSON_MARK),
-    (b"{", JSON_MARK),
     (b"<!doctype html>", HTML.encode()),
-    (b"{", b'"claim": "golden '),  # a certificate
-    (b"<svg", b">endotsr golden<"),
     (b"GIF8", FILM.encode()),
     (b"\x1aE\xdf\xa3", FILM.encode()),  # WebM
-    (LOG.encode(), LOG.encode()),
 )
 
 

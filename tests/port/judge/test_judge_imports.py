@@ -8,7 +8,7 @@ from pathlib import Path
 import endotsr.port.judge
 
 ROOM = Path(endotsr.port.judge.__file__).parent
-FILES = tuple(f"endotsr.untrusted.{name}" for name in ("files", "marks", "names", "writing"))
+FILES = ("endotsr.untrusted.files", "endotsr.untrusted.names", "endotsr.untrusted.writing")
 OWN = ("endotsr", "endotsr.errors", "endotsr.port.judge", *FILES)
 LIBRARIES = {"numpy", "msgspec", "pytest"}  # pytest by the tests of ports in Python
 

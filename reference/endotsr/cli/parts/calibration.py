@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from endotsr.cli.parts.options import differences
-from endotsr.cli.parts.result import write_marked
 from endotsr.config import Config
 from endotsr.errors import InputError
+from endotsr.training.runs.files import write_json
 from endotsr.training.runs.folder import RunFolder
 from endotsr.untrusted.names import counted
 
@@ -44,7 +44,8 @@ def calibrate_run(folder: RunFolder, config: Config, source: str | None, json: P
     print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")
     print(found.table)
     print(f"lambda_lap = {found.lambda_lap:.6g} ({counted(len(found.ratios), 'view')})")
-    write_marked(json, {"iteration": model.iteration, **found._asdict()})
+    if json:
+        write_json(json, {"iteration": model.iteration, **found._asdict()})
 
 
 def _refuse_fixed(replaced: list[str], run_path: Path) -> None:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import msgspec
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.result import REPLACE, JsonFile, write_marked
+from endotsr.cli.parts.result import JsonFile
 from endotsr.config import PAPER, SequenceConfig
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
-from endotsr.training.runs.files import read_json
+from endotsr.training.runs.files import read_json, write_json
 from endotsr.training.runs.folder import open_run
 from endotsr.untrusted.json import Keys
 from endotsr.untrusted.sections import Section
@@ -58,8 +58,6 @@ class EvaluateOptions:
     """also write the metrics as JSON"""
     csv: Annotated[Path | None, Option("FILE", written=True)] = None
     """also write the metrics of every held-out frame as CSV"""
-    replace: Annotated[bool, REPLACE] = False
-    """replace an existing file that endotsr did not write, or a CSV file, which does not show it"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
     measures: Annotated[tuple[str, ...], Option("NAME")] = ()
@@ -119,7 +117,8 @@ def compare_methods(asked: EvaluateOptions) -> None:
     methods[1:] = sorted(methods[1:], key=lambda method: method.label not in dict(named))  # baselines at the end
     rows = compare(methods, tuple(METRICS), asked.seed)
     print(comparison_table(rows))
-    write_marked(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
+    if asked.json:
+        write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
         replace_text(asked.csv, comparison_csv(rows))
 

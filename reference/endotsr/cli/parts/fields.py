@@ -32,7 +32,6 @@ class Option:
     positional: bool = False  # an argument without a name
     may_be_empty: bool = False  # of several values: none is allowed
     written: bool = False  # an output file, checked before the computation
-    foreign: bool = False  # a switch that permits to replace a file that endotsr did not write
     flat: bool = False  # a section of settings whose options omit the name of the field
     short: tuple[str, ...] = ()  # keys of a section that also exist without its name: `--scale`
 
@@ -51,7 +50,6 @@ class Field:
     positional: bool
     may_be_empty: bool = False
     written: bool = False
-    foreign: bool = False
 
     @property
     def in_section(self) -> bool:
@@ -115,7 +113,6 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
                 positional=note.positional,
                 may_be_empty=note.may_be_empty,
                 written=note.written,
-                foreign=note.foreign,
             )
 
 

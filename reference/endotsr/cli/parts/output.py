@@ -5,7 +5,6 @@ always printed. A log file contains all standard output and standard error, also
 """
 
 import contextlib
-import shlex
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,7 +12,6 @@ from typing import IO, Any, NamedTuple
 
 from endotsr.errors import InputError
 from endotsr.training.runs.files import os_error_line, refuse_no_text
-from endotsr.untrusted.marks import LOG, refuse_foreign
 from endotsr.untrusted.names import plain_line
 
 QUIET, LOG_FILE = ("-q", "--quiet"), "--log-file"
@@ -50,15 +48,13 @@ def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
 
 
 @contextlib.contextmanager
-def redirected(output: OutputOptions, words: list[str]) -> Iterator[None]:
+def redirected(output: OutputOptions) -> Iterator[None]:
     """Redirect standard output and standard error for the block; an existing log file is overwritten.
 
-    words   of the command, for the first line of the log
-
-    Raises: InputError if the log file cannot be written, or would replace a file that is no log.
+    Raises: InputError if the log file cannot be written, or would replace another kind of file.
     """
     with contextlib.ExitStack() as stack:
-        log = _Log(output.log_file, words) if output.log_file else None
+        log = _Log(output.log_file) if output.log_file else None
         if log is not None:
             stack.callback(log.close)
         if output.quiet or log is not None:
@@ -71,17 +67,15 @@ def redirected(output: OutputOptions, words: list[str]) -> Iterator[None]:
 class _Log:
     """The log file. If a line cannot be written, as on a full disk, the log ends and the command goes on."""
 
-    def __init__(self, file: Path, words: list[str]) -> None:
+    def __init__(self, file: Path) -> None:
         """Open the file. Raises InputError as `redirected`."""
         self._file = file
         try:
             refuse_no_text(file)
-            refuse_foreign(file, option=LOG_FILE)
             self._stream: IO[str] | None = file.open("w", encoding="utf-8", newline="\n", buffering=1)
         except OSError as error:
             raise InputError(f"{file}: cannot be written: {error.strerror}") from None
         self._shown = sys.stderr  # before it is redirected
-        self.write(f"{LOG}{plain_line(shlex.join(['endotsr', *words]))}\n")
 
     def write(self, text: str) -> None:
         """Write the text, or end the log with one warning."""

@@ -60,8 +60,7 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
     found = _built(options, fields, given, default)
     if command not in FACTS:
         check_relations(command, RELATIONS.get(command, ()), found, _names(fields, given))
-    permission = next((getattr(found, field.path[0]) for field in fields if field.foreign), None)
-    refuse_texts({field.name: getattr(found, field.path[0]) for field in fields if field.written}, permission)
+    refuse_texts({field.name: getattr(found, field.path[0]) for field in fields if field.written})
     return found
 
 

@@ -21,7 +21,6 @@ from endotsr.port.judge.runs import called_often
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
 from endotsr.port.judge.verdict import Report, judge
 from endotsr.port.judge.verify import summary, verified
-from endotsr.untrusted.marks import refuse_foreign
 
 NO_SEARCH = "the line of the definition that your port computes is searched by `endotsr golden` of the package endotsr"
 
@@ -53,7 +52,6 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--only", default="", metavar="FAMILY[/CASE]", help="this part alone, without a claim")
         command.add_argument("--json", type=Path, metavar="FILE", help="also write the report as JSON")
         command.add_argument("--html", type=Path, metavar="FILE", help="also write the report as one page")
-        command.add_argument("--replace", action="store_true", help="replace files that endotsr did not write")
         command.add_argument("--all", action="store_true", help="list all cases")
     return parser
 
@@ -78,12 +76,11 @@ def _verified(golden: Golden, options: argparse.Namespace, scratch: Path) -> int
 
 
 def _refuse_unwritable(options: argparse.Namespace) -> None:
-    """Raise InputError before the port runs if a file cannot be written afterwards, or is none of endotsr."""
+    """Raise InputError before the port runs if a file cannot be written afterwards."""
     for name in ("json", "html", "certificate", "badge"):
         file = getattr(options, name, None)
         if file and (file.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK)):
             raise InputError(f"--{name} {file}: cannot be written; allowed: a file in a folder that exists")
-        refuse_foreign(file, getattr(options, "replace", None), f"--{name}")
 
 
 def main(words: list[str]) -> int:

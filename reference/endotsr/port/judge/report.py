@@ -18,7 +18,6 @@ from endotsr.port.judge.profiles import lines_of
 from endotsr.port.judge.recognise import Suspect
 from endotsr.port.judge.store import Golden
 from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
-from endotsr.untrusted.marks import GENERATOR
 from endotsr.untrusted.writing import replace_file, replace_text
 
 MOST_LINES = 60  # refused outputs in the table
@@ -32,9 +31,7 @@ UNKNOWN = "looks like none of the known mistakes"
 def as_json(report: Report) -> bytes:
     """The report as JSON."""
     cases = [msgspec.structs.replace(case, evidence={}) for case in report.cases]
-    text = msgspec.json.encode(msgspec.structs.replace(report, cases=cases))
-    mark = msgspec.json.encode(GENERATOR).removesuffix(b"}")
-    return msgspec.json.format(mark + b"," + text.removeprefix(b"{"), indent=1) + b"\n"
+    return msgspec.json.format(msgspec.json.encode(msgspec.structs.replace(report, cases=cases)), indent=1) + b"\n"
 
 
 def as_table(report: Report, *, everything: bool = False) -> str:
@@ -217,7 +214,6 @@ def as_html(report: Report, golden: Golden, outputs: Path) -> str:
 
 
 _PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
-<meta name="generator" content="endotsr">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{claim}</title><style>
 body{{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;color:#1c2430}}
 table{{border-collapse:collapse;width:100%}}td,th{{text-align:left;vertical-align:top;padding:.3em .6em;

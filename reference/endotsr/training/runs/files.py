@@ -12,7 +12,6 @@ from typing import Any
 from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
 from endotsr.untrusted.json import Keys
-from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.writing import replace_text
 
@@ -90,11 +89,8 @@ def refuse_no_text(file: Path) -> None:
                 raise InputError(f"{file}: would be replaced, but is no text file; allowed: another name")
 
 
-def refuse_texts(files: dict[str, Path | None], replace: bool | None = None) -> None:
-    """Raises InputError if a file of text cannot be written, or two options (the keys) name one file.
-
-    replace   as in `refuse_foreign`
-    """
+def refuse_texts(files: dict[str, Path | None]) -> None:
+    """Raises InputError if a file of text cannot be written, or two options (the keys) name one file."""
     options: dict[Path, str] = {}
     for option, file in files.items():
         if file is not None:
@@ -104,7 +100,6 @@ def refuse_texts(files: dict[str, Path | None], replace: bool | None = None) -> 
                 raise InputError(
                     f"{option} {file}: is also the file of {options[file.resolve()]}; allowed: another name"
                 )
-            refuse_foreign(file, replace, option)
 
 
 def _refuse_input(file: Path) -> None:
