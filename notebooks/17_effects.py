@@ -32,6 +32,7 @@ from running_clip import load
 from endotsr.clips.effects.frames import TILE, reduced_frames
 from endotsr.clips.effects.inspect import inspect_sequence
 from endotsr.clips.effects.noise import temporal_noise
+from endotsr.clips.effects.periodic import spectral_lines
 from endotsr.clips.effects.plan import apply_plan, make_plan
 from endotsr.clips.effects.rigid import inverse_depth
 from endotsr.clips.effects.savings import memory_fraction, numbers_of_a_gaussian
@@ -55,11 +56,12 @@ found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 # %% [markdown]
 # ## Noise first
 #
-# Every test uses the noise as its unit. Let $x_t$ be the value of a pixel in frame $t$, and $\sigma$ the standard
-# deviation of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes slow changes. Independent
-# noise gives it the standard deviation $\sqrt{1+4+1}\,\sigma$. For a normal distribution the median of the absolute
-# values is $0.6745$ standard deviations. The noise is estimated from this median, which a few moving edges hardly
-# change.
+# The tests of blur, smoke, motion, rate, light and topology use the noise. Let $x_t$ be the value of a pixel in frame
+# $t$, and $\sigma$ the standard deviation of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes
+# a linear change and reduces a slow one. Independent noise gives it the standard deviation $\sqrt{1+4+1}\,\sigma$. For a
+# normal distribution the median of the absolute values is $0.6745$ standard deviations. The noise is estimated from
+# this median, which a few moving edges hardly change. `endotsr inspect` has a second estimate, from differences over
+# one picture, and takes the smaller one. On these clips that is the estimate over time.
 
 
 # %% tags=["transcription"]
@@ -87,14 +89,17 @@ np.testing.assert_allclose(temporal_noise(part), by_channel, rtol=1e-5)
 sigma = made["still"].settings.noise.sigma
 print(f"true {255 * sigma:.2f} grey levels, found {255 * found['still'].noise.level:.2f}")
 assert abs(found["still"].noise.level / sigma - 1) < 0.15
+assert {clip.noise.source for clip in found.values()} == {"differences over time"}
+np.testing.assert_allclose(found["still"].noise.full, temporal_noise(whole), rtol=1e-5)
 
 # %% [markdown]
 # ## Motion, in units of the flow from noise
 #
-# Even in a static scene the optical flow between two frames is not 0. The test therefore also measures the flow
-# between the reference frame and copies of it with new noise. A *tile* is a square of pixels. It counts as moving if
-# its flow exceeds twice the flow from noise, and also exceeds 0.05 px<!--=effects.motion-->. Three clips follow: one
-# is still, one has a beating spot, and one has light that drifts. In which of the six panels do you expect a signal?
+# Noise alone gives the optical flow between two frames of a static scene a length above 0. The test therefore also
+# measures the flow between the reference frame and copies of it with new noise. A *tile* is a square of pixels. It
+# counts as moving if its flow, as an RMS over the frames, exceeds twice the flow from noise, and also exceeds
+# 0.05 px<!--=effects.motion-->. One moving tile is not enough for a verdict. Three clips follow: one is still, one has a
+# beating spot, and one has light that drifts. In which of the six panels do you expect a signal?
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 3, figsize=(9.4, 5.2), layout="constrained")
@@ -132,8 +137,9 @@ assert (
 #
 # The beat of the second clip has five cycles. With 16 frames the same beat is found as motion, but not as a rate. The
 # verdict is *irregular*, and the plan switches off component S, which is the component for periodic motion. A rate
-# passes the test if its line in the spectrum is significant at 1 %<!--=effects.rates--> and its wave is the same in
-# each third of the clip. In 14 training frames no rate passes. The remedy is more frames of the same five beats.
+# passes the test only if its line in the spectrum is significant at 1 %<!--=effects.rates-->, explains most of the
+# motion that is not slow, and has about the same wave in each third of the clip. Each third must have five frames for
+# this comparison, so no rate can pass in 14 training frames. The remedy is more frames of the same five beats.
 
 # %% tags=["hide-input"]
 short = msgspec.structs.replace(plain, frames=16)
@@ -152,6 +158,18 @@ for inspection in (too_short, found["beating"]):
 assert not too_short.lines and too_short.verdicts["motion"].kind == "irregular"
 assert [round(line.cycles) for line in found["beating"].lines] == [5]
 assert apply_plan(make_plan(found["beating"], PAPER), PAPER)[0].model.spectral_motion
+
+
+def lines_of(frames, cycles):
+    """The lines that the test finds in four tiles that all move like one sine, without noise."""
+    stamps = np.array([i / frames for i in range(frames) if (i - 1) % 8])
+    tiles = np.zeros((stamps.size, 2, 4))
+    tiles[:, 0] = 5 * np.sin(2 * np.pi * cycles * stamps)[:, None]
+    return spectral_lines(tiles, stamps, frames, np.full(4, 0.05))
+
+
+assert not any(lines_of(16, cycles) for cycles in (3.5, 4.0, 5.0, 6.0)), "14 training frames"
+assert lines_of(17, 5.0), "15 training frames"
 
 # %% [markdown]
 # ## The running clip: a plan that is right
@@ -183,16 +201,16 @@ for effect, causing in made_in.items():
 print("\nrates:", [round(cycles, 2) for cycles in stored["cycles"]], "cycles per sequence")
 print("plan:", stored["plan"] or "nothing to switch off")
 for effect, causing in made_in.items():
-    assert (stored["verdicts"][effect] != "none") == bool(causing), effect
+    assert (stored["verdicts"][effect] not in ("none", "good")) == bool(causing), effect
 assert [round(cycles) for cycles in stored["cycles"]] == [5] and not stored["plan"]
 
 # %% [markdown]
 # ## A moving camera and a static scene
 #
-# If the camera moves, the whole picture flows. In a rigid scene one number per tile explains the flow to all frames:
-# its inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference camera, and
+# If the camera moves, static tissue flows as well. If the poses are known, one number per tile explains the flow of a
+# rigid scene to all frames: its inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference camera, and
 # $(R_k,\mathbf t_k)$ the pose from the reference camera to camera $k$. Camera $k$ sees the tile at the projection of
-# $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and takes the residual as motion of the tissue.
+# $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and looks for motion of the tissue in the residual.
 # The test needs no depth map.
 
 
@@ -238,8 +256,9 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # Consider 20 frames and 16 cycles. Does the rank of the dictionary over the stamps, centred and scaled to RMS 1, show
 # this limit? It need not. The slower sinusoid is seldom one of the eight of the dictionary, and the rank is then full.
 # The plan therefore limits three quantities: the highest frequency, the rank, and the condition number, which is the
-# ratio of the largest to the smallest singular value. The condition number bounds the amplification of frame noise in
-# the coefficients. It is large for the shortest clips and varies little from 33 frames on.
+# ratio of the largest to the smallest singular value. The relative error of fitted coefficients is at most the condition
+# number times the relative error of the values to which they are fitted. Of the lengths below, only 20 frames have a
+# condition above 100. From 33 frames on it is at most 1.5 times that of 63 frames.
 
 
 # %% tags=["transcription"]
@@ -274,6 +293,7 @@ for n in lengths:
 conditions = {n: report.condition for n, report in zip(lengths, reports, strict=True)}
 print(", ".join(f"{n} frames: {conditions[n]:.3g}" for n in (20, 22, 24, 28, 33, 63)))
 assert conditions[20] > 100 > conditions[24] > 1.2 * conditions[63]
+assert [n for n in lengths if conditions[n] > 100] == [20]
 assert max(conditions[n] for n in lengths if n > 32) < 1.5 * conditions[63]
 plan = make_plan(found["beating"], PAPER)
 carried = plan.dictionary
