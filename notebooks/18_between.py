@@ -308,7 +308,12 @@ for s in (0.1, 0.3, 0.6):
         assert error.max() < 1.01 * bound + 1e-5, "rounding to float32"
         if a == 0.5:
             print(f"s = {s}: relative error {error.max():.4f}, bound {bound:.4f}")
-for s, a in ((1.5, 0.75), (1.2, 0.75), (0.9, 0.75), (-0.9, 0.75)):  # to 2.5, 2.2, 1.9, 0.1 times
+for s, a in (
+    (1.5, 0.75),
+    (1.2, 0.75),
+    (0.9, 0.75),
+    (-0.9, 0.75),
+):  # to 2.5, 2.2, 1.9, 0.1 times
     v, far = [s], s / (1 + a * s)
     for _ in range(8):
         v.append(s * (1 - a * v[-1]))  # at x = 1
@@ -424,7 +429,11 @@ print({name: round(value, 2) for name, value in found.items()})
 assert found["the target"] > found["both frames as they are"] + 2
 apart, steady = np.abs(pair[0] - pair[1]).mean(axis=0), np.hypot(*field) < 0.1
 of_q = [q[tissue & part].mean() for part in (steady, apart < 0.02, apart > 0.1)]
-print("mean q: {:.2f} at rest, {:.2f} where the frames agree, {:.2f} where they differ".format(*of_q))
+print(
+    "mean q: {:.2f} at rest, {:.2f} where the frames agree, {:.2f} where they differ".format(
+        *of_q
+    )
+)
 assert abs(of_q[0] - 0.5) < 0.05 and of_q[2] < of_q[1] - 0.05
 
 # %% [markdown]

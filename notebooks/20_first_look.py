@@ -56,7 +56,7 @@ rng = np.random.default_rng(20)
 #
 # **(20.1) Equal steps.** Let $N$ be the number of Gaussians left after pruning, $M$ the budget, and $r$ the number of
 # densifications from the current one to the last. The current one adds $\lceil\max(0,M-N)/r\rceil$ Gaussians, at the
-# largest gradients. It adds fewer if fewer have a gradient above 0, or if fewer are alive.
+# largest gradients. It adds fewer if fewer have a gradient above 0.
 #
 # **(20.2) The budget is reached.** Without rounding, $M-N-(M-N)/r=(M-N)\frac{r-1}r$ Gaussians are missing after this
 # step, and $r-1$ densifications remain. If nothing is pruned in between, the next step is $(M-N)/r$ again, so the
@@ -221,6 +221,7 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # squared steps. For noise that is independent between pixels, whose steps do not grow, half the weight halves the
 # loss. The factor is between these cases and was not tuned.
 
+
 # %%
 def area_lacks(frame, half):
     """Mean difference of a frame (3, H, W) from its half-size frame, enlarged bilinearly."""
@@ -237,7 +238,9 @@ half = np.array(project(scale_camera(camera, 64, 48), points)[:2])
 np.testing.assert_allclose(half, full / 2, rtol=1e-12)
 small = halved(sequence, 0.0)
 assert (small.height, small.width) == (48, 64) and small.cameras[0].width == 64
-lacking = np.mean([area_lacks(sequence.images[k] / 255, small.images[k] / 255) for k in range(8)])
+lacking = np.mean(
+    [area_lacks(sequence.images[k] / 255, small.images[k] / 255) for k in range(8)]
+)
 band = np.mean(
     [np.abs(laplacian_levels(sequence.frame(k).image, 1).bands[0]).mean() for k in range(8)]
 )

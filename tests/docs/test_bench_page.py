@@ -55,3 +55,21 @@ def test_page_refuses_results_of_other_sizes(found):
     cases = [case for case in found["stages"]["cases"] if any(case["case"][k] != v for k, v in MAIN.items())]
     with pytest.raises(InputError, match="no case with"):
         bench.fragments(found | {"stages": found["stages"] | {"cases": cases}}, {})
+
+
+def test_what_the_page_says_of_float64_by_stage(found):
+    """The forward blend takes twice the time, binning less than the blends; the largest ratios are of two others."""
+    times = {
+        (case["case"]["gaussians"], case["case"]["threads"], case["case"]["precision"]): case["stages"]
+        for case in found["stages"]["cases"]
+        if case["case"]["scene"] is None
+    }
+    largest = {}
+    for gaussians, threads, precision in times:
+        if precision == "float64":
+            pair = [times[gaussians, threads, p] for p in ("float32", "float64")]
+            ratio = {stage: pair[1][stage]["median_ms"] / pair[0][stage]["median_ms"] for stage in pair[0]}
+            assert 1.9 < ratio["blend forward"] < 2.1
+            assert ratio["binning"] < min(ratio["blend forward"], ratio["blend reverse"])
+            largest = {stage: max(value, largest.get(stage, 0)) for stage, value in ratio.items()}
+    assert set(sorted(largest, key=lambda stage: largest[stage])[-2:]) == {"Fourier", "Adam"}

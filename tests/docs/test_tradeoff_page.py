@@ -44,6 +44,24 @@ def test_what_the_page_says_of_a_looser_stop():
     assert tight["1e-06"] - loose["1e-06"] > max(row["1e-06"] - row["0.01"] for row in (tight, loose)) > 0
 
 
+def test_on_the_real_clip_a_stop_can_err_more_than_a_cutoff_and_on_public_scenes_it_saves_visits(result):
+    """The notes on the dials hold for the simulated scene; they name both exceptions."""
+
+    def point(scene, cutoff, stop):
+        found = json.loads((tradeoff.RESULTS / f"tradeoff_{scene}.json").read_text(encoding="utf-8"))
+        return next(p for p in found["points"] if p["name"] == f"float32, cutoff {cutoff}, stop {stop}")
+
+    by_stop, by_cutoff = point("cutting_sharp", "1e-4", "1e-3"), point("cutting_sharp", "1/255", "1e-6")
+    assert by_stop["error"]["max"] > 2 * by_cutoff["error"]["max"]
+    for scene in ("biker", "guitar"):
+        assert point(scene, "1/255", "1e-6")["visits"] > 1.2 * point(scene, "1/255", "1e-3")["visits"]
+    worst = {
+        dial["name"]: max(p["error"]["max"] for p in result["points"] if p["name"] in dial["points"].values())
+        for dial in result["dials"]
+    }
+    assert worst["cutoff"] > max(worst[name] for name in ("stop", "clamp", "precision", "exponential"))
+
+
 def test_the_headline_states_no_time_below_the_scatter_of_equal_arithmetic(result):
     """Of exactly the setting that it names, against exactly `paper`, not of a faster one with the same error."""
     by_name = {p["name"]: p for p in result["points"]}

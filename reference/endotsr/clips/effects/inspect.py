@@ -1,6 +1,6 @@
 """All tests of a clip, in order: noise, blur and smoke, motion, then the others.
 
-The tests of blur, smoke, motion, light and topology measure in units of the noise. Frames with blur or smoke, and those
+The tests of blur, smoke, motion, light and topology use the noise. Frames with blur or smoke, and those
 without tissue, are excluded as reference and from motion. The test of light depends on the results of the tests of
 motion and of the camera.
 """

@@ -1,4 +1,4 @@
-"""The noise level, which is the unit of every other test.
+"""The noise level, which the tests of blur, smoke, motion, rate, light and topology use.
 
 There are two estimates, and each is an upper limit: differences over time include motion, and differences over the
 picture include texture. The smaller one is used. Both are medians, which suppresses moving edges and vessels.
