@@ -161,7 +161,7 @@ assert apply_plan(make_plan(found["beating"], PAPER), PAPER)[0].model.spectral_m
 
 
 def lines_of(frames, cycles):
-    """The lines that the test finds in four tiles that all move like one sine, without noise."""
+    """The lines that the test finds in four tiles that move like one sine, without noise."""
     stamps = np.array([i / frames for i in range(frames) if (i - 1) % 8])
     tiles = np.zeros((stamps.size, 2, 4))
     tiles[:, 0] = 5 * np.sin(2 * np.pi * cycles * stamps)[:, None]

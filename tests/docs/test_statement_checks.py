@@ -11,8 +11,10 @@ import pytest
 from pages.claims import base_checkpoint
 from pages.full_size import depth_outliers
 from pages.full_size import page as full_size
+from pages.hard_cases import pictures
 from pages.hard_cases.page import rounded_up
 from pages.store.published import MEANS_ON_TISSUE, PUBLISHED
+from scipy.ndimage import distance_transform_cdt
 
 from endotsr.clips.flow.between import flows_between, frame_between, gap_between
 from endotsr.clips.simulator.settings import SimulatorSettings
@@ -133,6 +135,20 @@ def test_the_bound_of_the_hard_cases_is_not_below_the_worst():
     worst = max(float(row["float32"]["ours_error"]) for row in cases)
     assert worst <= float(rounded_up(worst)) <= 1.1 * worst
     assert [rounded_up(value) for value in (2.38e-7, 2e-7, 0.031)] == ["2.4e-07", "2.0e-07", "3.1e-02"]
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_what_the_page_of_hard_cases_says_of_its_figure():
+    """Negative distances, a gradient that is lost at an alpha of 1, and NaN up to ten pixels from the mask."""
+    textbook, ours = pictures.needle_opacity()
+    assert ((textbook == 0) & (ours > 0.2)).any() and np.abs(textbook - ours).max() > 0.5
+    textbook, ours = pictures.opaque_gradient()
+    assert np.isnan(textbook).any() and not np.isnan(textbook).all() and np.isfinite(ours).all()
+    textbook, _ = pictures.unknown_under_the_instrument()
+    tissue = np.ones(textbook.shape, bool)
+    tissue[14:26, 16:] = False
+    away = distance_transform_cdt(tissue, "chessboard")
+    assert away[~np.isfinite(textbook)].max() == 10 and away[np.isfinite(textbook)].min() == 11
 
 
 def test_the_first_sentences_of_the_page_at_full_size():

@@ -39,6 +39,15 @@ def test_the_first_line_of_an_assumed_speed_holds_today_on_the_machine_it_was_me
         assert abs(float(shown.partition("(")[2].rstrip("%)"))) <= 15
 
 
+def test_what_the_page_says_of_the_rows_with_avx512():
+    """Two of three were measured with other factors; the evaluation of `sharp` was forecast too long by a half."""
+    rows = [row for row in RECORD["rows"] if row["register_bytes"] == 64]
+    same = [waiting_text.today(row).split()[0] == waiting_text.told(row, "start").split()[0] for row in rows]
+    assert len(rows) == 3 and same.count(True) == 1
+    (sharp,) = (row for row in rows if row["preset"] == "sharp")
+    assert 1.4 < sharp["said"]["forecast"]["evaluation"] / (sharp["whole"] - sharp["trained"]) < 1.7
+
+
 def test_what_is_excluded_takes_no_time(monkeypatch):
     clock = SimpleNamespace(now=10.0)
     monkeypatch.setattr(
