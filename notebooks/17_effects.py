@@ -57,11 +57,11 @@ found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 # ## Noise first
 #
 # The tests of blur, smoke, motion, rate, light and topology use the noise. Let $x_t$ be the value of a pixel in frame
-# $t$, and $\sigma$ the standard deviation of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes
-# a linear change and reduces a slow one. Independent noise gives it the standard deviation $\sqrt{1+4+1}\,\sigma$. For a
-# normal distribution the median of the absolute values is $0.6745$ standard deviations. The noise is estimated from
-# this median, which a few moving edges hardly change. `endotsr inspect` has a second estimate, from differences over
-# one picture, and takes the smaller one. On these clips that is the estimate over time.
+# $t$, and $\sigma$ the standard deviation of its noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$,
+# removes a linear change and reduces a slow one. Independent noise gives it the standard deviation
+# $\sqrt{1+4+1}\,\sigma$. For a normal distribution the median of the absolute values is $0.6745$ standard deviations.
+# The noise is estimated from this median, which a few moving edges hardly change. `endotsr inspect` has a second
+# estimate, from differences over one picture, and takes the smaller one. On these clips that is the estimate over time.
 
 
 # %% tags=["transcription"]
@@ -208,10 +208,10 @@ assert [round(cycles) for cycles in stored["cycles"]] == [5] and not stored["pla
 # ## A moving camera and a static scene
 #
 # If the camera moves, static tissue flows as well. If the poses are known, one number per tile explains the flow of a
-# rigid scene to all frames: its inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference camera, and
-# $(R_k,\mathbf t_k)$ the pose from the reference camera to camera $k$. Camera $k$ sees the tile at the projection of
-# $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and looks for motion of the tissue in the residual.
-# The test needs no depth map.
+# rigid scene to all frames: its inverse depth $\rho$. Let $\mathbf x=(x,y,1)$ be the ray of a tile in the reference
+# camera, and $(R_k,\mathbf t_k)$ the pose from the reference camera to camera $k$. Camera $k$ sees the tile at the
+# projection of $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and looks for motion of the tissue
+# in the residual. The test needs no depth map.
 
 
 # %% tags=["transcription"]
@@ -256,9 +256,9 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # Consider 20 frames and 16 cycles. Does the rank of the dictionary over the stamps, centred and scaled to RMS 1, show
 # this limit? It need not. The slower sinusoid is seldom one of the eight of the dictionary, and the rank is then full.
 # The plan therefore limits three quantities: the highest frequency, the rank, and the condition number, which is the
-# ratio of the largest to the smallest singular value. The relative error of fitted coefficients is at most the condition
-# number times the relative error of the values to which they are fitted. Of the lengths below, only 20 frames have a
-# condition above 100. From 33 frames on it is at most 1.5 times that of 63 frames.
+# ratio of the largest to the smallest singular value. The relative error of fitted coefficients is at most the
+# condition number times the relative error of the values to which they are fitted. Of the lengths below, only 20 frames
+# have a condition above 100. From 33 frames on it is at most 1.5 times that of 63 frames.
 
 
 # %% tags=["transcription"]

@@ -175,19 +175,19 @@ assert swing[both] < swing[alone] - 2
 # $v=-g(x+(1-a)v)$.
 #
 # **(18.4) Three steps of a fixed-point iteration** approximate the solution of each equation. For the first, start from
-# $v^{(0)}=f(x)$ and repeat $v^{(k+1)}=f(x-av^{(k)})$. If $|f(x)-f(y)|\le L\,|x-y|$ for any two positions $x$ and $y$, then
-# $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: if $aL<1$, every step reduces the error at least by the factor $aL$. Along a line,
-# tissue that neither folds nor stretches to twice its length has $L<1$, and then $aL<1$ at every $a$. In a picture, a
-# turn counts as well: a turn by the angle $\vartheta$ has $L=2\sin\frac\vartheta2$, which is below 1 for less than
-# $60^\circ$. The start has the error $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
+# $v^{(0)}=f(x)$ and repeat $v^{(k+1)}=f(x-av^{(k)})$. If $|f(x)-f(y)|\le L\,|x-y|$ for any two positions $x$ and $y$,
+# then $|v^{(k+1)}-v|\le aL\,|v^{(k)}-v|$: if $aL<1$, every step reduces the error at least by the factor $aL$. Along a
+# line, tissue that neither folds nor stretches to twice its length has $L<1$, and then $aL<1$ at every $a$. In a
+# picture, a turn counts as well: a turn by the angle $\vartheta$ has $L=2\sin\frac\vartheta2$, which is below 1 for
+# less than $60^\circ$. The start has the error $|f(x)-f(x-av)|\le aL\,|v|$, so three steps leave at most $(aL)^4|v|$.
 #
 # **(18.5) Which of the two.** The solutions $v_0$ of (18.2) and $v_1$ of (18.3) are read at different places: $v_0$ at
 # the distance $a|v|$ from $x$, and $v_1$ at the distance $(1-a)|v|$. The nearer one has the larger weight:
 # $v=(1-a)v_0+av_1$. This rule treats both frames alike. If the frames are exchanged and $a$ is replaced by $1-a$, then
 # $f$ and $g$ change places, $v_0$ becomes $-v_1$, and $v$ changes its sign only.
 #
-# **(18.6) The moved pair.** If the flow is right, $J_0$ and $J_1$ are two pictures of the same point. They then differ by
-# noise, by a change of light and by the interpolation. Their blend has less noise than a frame: at whole pixels its
+# **(18.6) The moved pair.** If the flow is right, $J_0$ and $J_1$ are two pictures of the same point. They then differ
+# by noise, by a change of light and by the interpolation. Their blend has less noise than a frame: at whole pixels its
 # variance is $\bigl((1-a)^2+a^2\bigr)\sigma^2$, half the variance of a frame at $a=\frac12$. Between pixels the
 # interpolation averages the noise and lowers its variance further.
 #
@@ -198,9 +198,9 @@ assert swing[both] < swing[alone] - 2
 # $(1-q)V_{\mathrm m}=qV_{\mathrm s}$, so $q=V_{\mathrm m}/(V_{\mathrm m}+V_{\mathrm s})$.
 #
 # **(18.8) The variances** are not known. Where a pair is wrong, its two pictures usually disagree. The squared
-# differences $e_{\mathrm m}$ and $e_{\mathrm s}$ are therefore used in place of the variances. The window $G_2$ averages a difference, which reduces its noise. The
-# square of $1/255$, the smallest difference of 8-bit pictures, is added, so that two equal pairs have $q=\frac12$ and
-# not $0/0$.
+# differences $e_{\mathrm m}$ and $e_{\mathrm s}$ are therefore used in place of the variances. The window $G_2$
+# averages a difference, which reduces its noise. The square of $1/255$, the smallest difference of 8-bit pictures, is
+# added, so that two equal pairs have $q=\frac12$ and not $0/0$.
 #
 # **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. The interpolation of (18.1) and
 # the window of (18.8) also read neighbours of a pixel. In the code, such pixels of both frames have colours of tissue.
@@ -387,10 +387,10 @@ assert q[8:40, 16:-16].mean() < 0.02 and q[56:-8, 16:-16].mean() > 0.98
 # %% [markdown]
 # ## Figure: one time between two frames
 #
-# The clip has breathing, a beat, a pulled spot, light that changes, highlights and a grasper, here with 16 frames. Frame
-# 8 is predicted from the frames 6 and 10; the frames between them are not read. Below each picture is its error, from 0
-# (black) to 0.15 (white). The last panel shows $q$. Its mean is about one half where the motion is below a tenth of a
-# pixel. It is smaller where the static frames differ more.
+# The clip has breathing, a beat, a pulled spot, light that changes, highlights and a grasper, here with 16 frames.
+# Frame 8 is predicted from the frames 6 and 10; the frames between them are not read. Below each picture is its error,
+# from 0 (black) to 0.15 (white). The last panel shows $q$. Its mean is about one half where the motion is below a tenth
+# of a pixel. It is smaller where the static frames differ more.
 
 # %% tags=["hide-input"]
 scene = replace(named_scene("pulling"), width=160, height=128, frames=16)
@@ -460,8 +460,8 @@ for name, run in runs.items():
 #
 # There is none. A target is made from training frames and flow, which do not depend on any parameter of the model, so
 # it is held fixed like a frame. The losses of {doc}`11_base_losses` are differentiated with respect to the render at
-# the intermediate time. In the presets, time enters the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are
-# valid at any time. The pair to check is the loss that uses the target.
+# the intermediate time. In the presets, time enters the model only through the atoms {eq}`eq-1` and the bases
+# {eq}`eq-b1`, which are valid at any time. The pair to check is the loss that uses the target.
 
 # %%
 with one_thread():

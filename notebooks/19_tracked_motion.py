@@ -135,8 +135,8 @@ for part in ("residual", "log_scale", "quaternion", "opacity_logit"):
 # followed points, weighted by their inverse distance. With fewer than 16 followed points it stays. Its $a_{pi}$ is 0.1.
 #
 # **(19.5) Found again.** A lost point is followed again from the first frame in which its pixel is tissue with a depth
-# within 2.5 %<!--=tracks.again--> of its own. This limit is narrower than in (19.3), because pixel and depth of the carried point are the
-# only evidence for the same piece of tissue.
+# within 2.5 %<!--=tracks.again--> of its own. This limit is narrower than in (19.3), because pixel and depth of the
+# carried point are the only evidence for the same piece of tissue.
 #
 # <!-- definition: endotsr.clips.flow.tracks._step -->
 # ```python
@@ -400,10 +400,10 @@ assert np.argmax(others) == F - 1, "the cosine of the lowest frequency"
 # ## Why not the deformation
 #
 # The deformation {eq}`eq-b1` could also represent the motion. Its centres and widths are learned, and by (4.5) the
-# effect of one step of a centre is proportional to the weight of its basis, so it has no bound. The atoms, in
-# contrast, are fixed functions of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes
-# in each direction by at most $\eta\sum_k|\phi_k(t)|\le\sqrt2\,F\eta=11.3\,\eta$, because $|\sin|+|\cos|\le\sqrt2$ for each of the $F$
-# pairs.
+# effect of one step of a centre is proportional to the weight of its basis, so it has no bound. The atoms, in contrast,
+# are fixed functions of time. If every coefficient of $C$ takes a step of at most $\eta$, a path changes by
+# at most $\eta\sum_k|\phi_k(t)|\le\sqrt2\,F\eta=11.3\,\eta$ in each direction, because $|\sin|+|\cos|\le\sqrt2$ for
+# each of the $F$ pairs.
 
 # %%
 steps = np.array(

@@ -63,8 +63,8 @@ rng = np.random.default_rng(20)
 # steps are equal. The last one has $r=1$ and adds all that is missing.
 #
 # **(20.3) A pruned Gaussian is replaced**, because $N$ is counted after pruning. If $p$ Gaussians are pruned before
-# every densification, the one with $r$ left adds $p/r$ more than the one before, without rounding. The steps are then no longer equal,
-# and they grow towards the end.
+# every densification, the one with $r$ left adds $p/r$ more than the one before, without rounding. The steps are then
+# no longer equal, and they grow towards the end.
 #
 # <!-- definition: endotsr.definition.density_control.densify -->
 # ```python
@@ -92,9 +92,9 @@ rng = np.random.default_rng(20)
 # ```
 
 # %% [markdown]
-# The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. At every
-# call about a twentieth of the Gaussians have faded and are pruned. All gradients are then multiplied by 3, as larger weights of
-# the losses would do. By what factor does the final number of Gaussians change under each rule?
+# The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. At
+# every call about a twentieth of the Gaussians have faded and are pruned. All gradients are then multiplied by 3, as
+# larger weights of the losses would do. By what factor does the final number of Gaussians change under each rule?
 
 
 # %%
@@ -163,8 +163,8 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # smaller of the two errors, and half size has only a quarter of the pixels. Once $e<d$, the missing band is the larger
 # error, and training continues on the full frames.
 #
-# **(20.6) The camera.** The edges of the picture stay aligned, so $u'=u/2$ for every point, if width and height are even. With the centre of the first
-# pixel at $(0.5,0.5)$ this needs no shift.
+# **(20.6) The camera.** The edges of the picture stay aligned, so $u'=u/2$ for every point, if width and height are
+# even. With the centre of the first pixel at $(0.5,0.5)$ this needs no shift.
 #
 # **(20.7) The smoothness.** Its loss sums squared steps of depth on tissue and absolute steps, the total variation,
 # under the instrument ({eq}`eq-b9`), each as a mean over pixels. At half size neighbouring pixels are twice as far

@@ -183,9 +183,10 @@ assert values[2] > max(values[:2])
 # **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. For any $C$, the
 # subtraction of $C\,\phi(u^*)$ leaves the Gaussian in its place at the join: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
 #
-# **(21.6) The picture at the join** is therefore that of the neighbour, to rounding, if no Gaussian is dropped or added.
-# A warm window inherits at most 80 %<!--=window.carried--> of the number of Gaussians that it may have, and drops those
-# that no frame shows. The next cell prints the difference from the neighbour with this bound and with room for all.
+# **(21.6) The picture at the join** is therefore that of the neighbour, to rounding, if no Gaussian is dropped or
+# added. A warm window inherits at most 80 %<!--=window.carried--> of the number of Gaussians that it may have, and
+# drops those that no frame shows. The next cell prints the difference from the neighbour with this bound and with room
+# for all.
 
 # %%
 shift, shared = second.first - first.first, first.end - second.first

@@ -15,10 +15,10 @@
 #
 # Many scopes are held by hand, and their recordings have no poses. If the depth is known and the tissue does not move,
 # the pose of one frame relative to another is a problem of registration: points of one picture that are moved by the
-# right pose fall on pixels of the other picture that look the same. This chapter derives the residual {eq}`eq-b19` and its Jacobian
-# {eq}`eq-b19b`, and recovers the pose of a simulated scope. It also shows a motion of the scope that cannot be
-# distinguished from a motion of the tissue. Both equations are on the page {doc}`/specification/b19_registration` and
-# not in the paper.
+# right pose fall on pixels of the other picture that look the same. This chapter derives the residual {eq}`eq-b19` and
+# its Jacobian {eq}`eq-b19b`, and recovers the pose of a simulated scope. It also shows a motion of the scope that
+# cannot be distinguished from a motion of the tissue. Both equations are on the page
+# {doc}`/specification/b19_registration` and not in the paper.
 #
 # | Symbol | Meaning |
 # |---|---|
@@ -125,8 +125,8 @@ assert 0.5 * medians[1] < without_noise < medians[1]
 #
 # **(22.1) The kernel.** The function $k$ is cubic on $|s|<1$ and on $1\le|s|<2$. It is 1 at 0 and 0 at every other
 # whole number, so the sum equals the picture at the pixel centres. Its slope is 0 at 0 and at 2, and the slopes of both
-# pieces agree at 1, so the slope of the sum is continuous. These conditions leave one number free, the slope $a=k'(1)$. With
-# $a=-\tfrac12$ the sum reproduces parabolas.
+# pieces agree at 1, so the slope of the sum is continuous. These conditions leave one number free, the slope $a=k'(1)$.
+# With $a=-\tfrac12$ the sum reproduces parabolas.
 #
 # <!-- definition: endotsr.definition.registration.keys -->
 # ```python
@@ -295,11 +295,11 @@ assert courses[-1][1] < 0.1
 # %% [markdown]
 # ## Two motions with one picture
 #
-# **(22.7) The same picture.** Let the whole tissue move by the rigid motion $B$, and let the camera be at $T_j$, with the
-# lamp fixed to it. The picture and the depth are then those of still tissue and a camera at $T_jB$. They depend on $T_jB$ alone,
-# so the residual, and any other function of pictures and depth, has the same value for both. Breathing has such a
-# common part. An estimate from pictures and depth assigns this part to the scope, and the path of the scope is wrong
-# by that amount.
+# **(22.7) The same picture.** Let the whole tissue move by the rigid motion $B$, and let the camera be at $T_j$, with
+# the lamp fixed to it. The picture and the depth are then those of still tissue and a camera at $T_jB$. They depend on
+# $T_jB$ alone, so the residual, and any other function of pictures and depth, has the same value for both. Breathing
+# has such a common part. An estimate from pictures and depth assigns this part to the scope, and the path of the scope
+# is wrong by that amount.
 #
 # In the next cell the tissue breathes in front of a scope that does not move. The figure shows the motion of the scope
 # that corresponds to the rigid motion with the smallest squared distance from the true positions of the tissue. A
