@@ -85,6 +85,12 @@ def without_verdict() -> list[Strong]:
     return [one for one in all_strong() if (one.file, one.key) not in table]
 
 
+def without_word() -> list[tuple[str, str]]:
+    """File and words of the verdicts whose sentence is gone."""
+    found = {(one.file, one.key) for one in all_strong()}
+    return [one for one in known() if one not in found]
+
+
 def main() -> int:
     """The command. Returns: 1 if a strong word has no verdict."""
     found = without_verdict()

@@ -22,6 +22,10 @@ def test_every_strong_word_has_a_verdict():
     assert not found, "give each a verdict, with the run that shows it, or reword it: python tests/docs/strong_words.py"
 
 
+def test_every_verdict_has_its_sentence():
+    assert strong_words.without_word() == [], "remove these lines from strong_words.toml"
+
+
 def test_verdicts_are_of_the_listed_kinds():
     assert {kind for of in TABLE.values() for kind in of} <= KINDS
     measured = [of[kind] for of in TABLE.values() for kind in ("record", "run") if kind in of]
