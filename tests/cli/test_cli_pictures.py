@@ -54,7 +54,7 @@ def test_pictures_on_a_named_sequence(tmp_path, capsys):
     assert main([*words, "--json", str(tmp_path / "m.json")]) == 0
     found = json.loads((tmp_path / "m.json").read_text())
     assert found["held_out"]["mean"] == found["baselines"]["flow_interpolation"]["mean"]
-    assert "pictures, paired" in capsys.readouterr().out
+    assert "1 picture, paired" in capsys.readouterr().out
     words[-1] = "0.75"
     assert_refused(capsys, words, f"{pictures}", "a picture of 36x24")
 

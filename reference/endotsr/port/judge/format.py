@@ -3,6 +3,7 @@
 Names and paths of files are checked as soon as a structure is made: none leaves the folder it belongs to.
 """
 
+import inspect
 import json
 from pathlib import Path
 from typing import Any, Literal
@@ -275,8 +276,16 @@ def to_json(value: msgspec.Struct) -> str:
 
 
 def schema_text(kind: type[msgspec.Struct]) -> str:
-    """JSON Schema of one of the structures."""
-    return json.dumps(msgspec.json.schema(kind), indent=1) + "\n"
+    """JSON Schema of one of the structures; the same bytes with every Python and msgspec.
+
+    Python 3.13 and msgspec 0.23 remove the indentation of a docstring, and earlier versions keep it.
+    """
+    schema = msgspec.json.schema(kind)
+    for part in schema["$defs"].values():
+        if "description" in part:
+            first, *more = inspect.cleandoc(part["description"]).split("\n")
+            part["description"] = "\n".join([first, *("    " + line if line else "" for line in more)])
+    return json.dumps(schema, indent=1) + "\n"
 
 
 def read_struct(path: Path, kind: type[Any]) -> Any:
