@@ -11,7 +11,7 @@ from typing import Any, Literal
 import msgspec
 
 from endotsr.untrusted.files import LARGEST_TEXT, read_bytes
-from endotsr.untrusted.names import file_name, relative_path
+from endotsr.untrusted.names import file_name, plain_line, relative_path
 
 Level = Literal[0, 1, 2, 3, 4, 5]
 LEVELS = {
@@ -295,3 +295,5 @@ def read_struct(path: Path, kind: type[Any]) -> Any:
         return msgspec.json.decode(data, type=kind)
     except (RecursionError, UnicodeDecodeError) as error:
         raise msgspec.DecodeError(f"no JSON text: {error}") from None
+    except msgspec.DecodeError as error:  # it repeats the name of an unknown field
+        raise type(error)(plain_line(str(error))) from None
