@@ -347,7 +347,7 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # many parameters.
 #
 # **(13.10) The opacity stays.** Two layers of the same $\alpha$ at one place absorb $1-(1-\alpha)^2$, which is more
-# than one of them absorbs if $0<\alpha<1$. A clone that is seen therefore changes the picture. Its moments are 0 and
+# than one of them absorbs if $0<\alpha<1$. A clone that is seen therefore changes the picture in general. Its moments are 0 and
 # those of its parent in general are not, so the next step of Adam moves the two apart, even if their gradients are
 # equal. 3DGS also resets opacities at
 # intervals; `paper` does not.

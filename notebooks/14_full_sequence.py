@@ -520,7 +520,7 @@ plt.show()
 # At the small size the model is worse even than a copy of the nearest frame. A thumbnail of 48x38 pixels and 240
 # iterations are no fair trial. At full size a defeat is possible too: `paper` is 1.5 dB<!--=paper.below_blend--> below
 # the blend on a recorded clip with little noise ({doc}`/full_size`). Its worst frame on a simulated clip looks like the
-# blend: every vessel appears twice, as if the model faded one training frame into the next.
+# blend: vessels appear twice, as if the model faded one training frame into the next.
 #
 # ![The worst held-out frame of paper: truth, model, copy, blend and flow](/results/full_size/paper_eighth_worst.webp)
 #
@@ -583,7 +583,7 @@ found = {name: psnr_tissue(p, clip.image, clip.mask) for name, p in predictions.
 assert found["model"] > found["blend"] + 4 > found["copy"] + 6
 
 # %% [markdown]
-# The blend shows every moved vessel twice, so its error has the shape of the vessels. In the error of the model one
+# The blend shows moved vessels twice, and its error has the shape of vessels. In the error of the model one
 # sees noise, some fine vessels, and a moving highlight ({doc}`17_effects`).
 #
 # On this clip the model is better than the blend and level with flow, which needs no model. The model is also one scene

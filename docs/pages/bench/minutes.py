@@ -72,11 +72,16 @@ def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
     return dict(sorted(means.items(), key=lambda row: row[1]["seconds"]))
 
 
+def baselines(result: dict[str, Any]) -> dict[str, Any]:
+    """Predictions without a model by label, those that obey the masks last."""
+    obeying = tissue_only(result["clip"]["name"], EVERY_EIGHTH)
+    return result["baselines"] | {LABELS[name]: row for name, row in obeying.items()}
+
+
 def levels(result: dict[str, Any]) -> dict[str, Any]:
     """Levels without a training: the baselines, and the numbers published for this clip."""
     published = next((row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]), None)
-    obeying = {LABELS[name]: row for name, row in tissue_only(result["clip"]["name"], EVERY_EIGHTH).items()}
-    return result["baselines"] | obeying | ({"as published": published} if published else {})
+    return baselines(result) | ({"as published": published} if published else {})
 
 
 def label(name: str) -> str:

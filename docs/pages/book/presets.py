@@ -12,11 +12,12 @@ import numpy as np
 
 from endotsr.config import PRESETS
 from endotsr.results.report.tables import duration, markdown
+from pages.bench import minutes
 from pages.bench.waiting_text import CLOCKS, processor
 from pages.book import running_clip
 from pages.full_size import page as full_size
 from pages.full_size import record
-from pages.full_size.interpolation import TISSUE_ONLY, tissue_only
+from pages.full_size.interpolation import TISSUE_ONLY
 from pages.full_size.text import LABELS, PREDICTIONS, mean_psnr
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, Program
@@ -53,9 +54,7 @@ def table(columns: Columns = MEASURED) -> str:
         ]
         for seconds, name, of in rows
     ]
-    obeying = tissue_only(found["clip"]["name"], record.EVERY_EIGHTH)
-    baselines = found["baselines"] | {LABELS[name]: row for name, row in obeying.items()}
-    for name, values_of in baselines.items():
+    for name, values_of in minutes.baselines(found).items():
         cells.append([name, "-", *values([values_of], columns), "-"])
     runs = [run for of in presets.values() for run in of]
     machines, threads = sorted({run["processor"] for run in runs}), sorted({run["threads"] for run in runs})

@@ -17,7 +17,7 @@ HTML = '<meta name="generator" content="endotsr">'
 FILM = "film of endotsr"  # the comment of a film
 SLIM = "endotsr slim model"  # the format of a slim model, in its header
 HEAD = 1 << 14  # bytes; every mark but those of .mp4 and .npz stands in them
-LONGEST = 1 << 26  # bytes, of the header of a slim model and of the index of an .mp4 film
+LONGEST = 1 << 26  # bytes, of the index of an .mp4 film
 JSON_MARK = b'"generator": "endotsr"'
 MARKS = (  # beginning of a file, and its mark
     (b"ply\n", b"\ncomment endotsr "),
