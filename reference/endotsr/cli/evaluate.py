@@ -66,7 +66,6 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
 
 def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of a folder of pictures."""
-    from endotsr.results.evaluation.doubts import doubt
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
     from endotsr.results.report.run_text import held_out_table
@@ -76,9 +75,9 @@ def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     sequence = shown_sequence("evaluate", options.run, options.sequence, options.settings)
     found = find_pictures(options.pictures, sequence)
     print(f"{options.pictures}: {counted(len(found.files), 'picture')}, paired {found.pairing}")
-    if remark := doubt(sequence, lambda i: found.read(i, sequence.images.shape[1:])):
-        print(f"{options.pictures}: {remark}")
     metrics = measure_pictures(found, sequence, options.label, weights)
+    if said := metrics["pictures"]["doubt"]:
+        print(f"{options.pictures}: {said}")
     print(held_out_table(metrics))
     return metrics
 

@@ -10,6 +10,7 @@ from endotsr.clips.opencv import write_png
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.errors import InputError
+from endotsr.results.evaluation import pictures
 from endotsr.results.evaluation.baselines import BASELINES, flow_interpolation
 from endotsr.results.evaluation.metrics import round_8bit
 from endotsr.results.evaluation.pictures import find_pictures, measure_pictures, read_picture
@@ -190,3 +191,13 @@ def test_a_part_of_a_name_that_two_frames_share_pairs_no_file(sequence, tmp_path
     timed = dataclasses.replace(sequence, names=names)
     found = find_pictures(write_folder(tmp_path, [f"{names[i]}.png" for i in HELD_OUT]), timed)
     assert {i: file.stem for i, file in found.files.items()} == {i: names[i] for i in HELD_OUT}
+
+
+def test_a_doubt_on_pictures_is_in_the_record_and_each_picture_is_read_once(sequence, tmp_path, monkeypatch):
+    for i in HELD_OUT:
+        write_png(tmp_path / f"{sequence.names[i]}.png", bytes_of(flow_interpolation(sequence, i)[::-1]))
+    read, seen = pictures.read_picture, []
+    monkeypatch.setattr(pictures, "read_picture", lambda file, shape: seen.append(file.name) or read(file, shape))
+    found = measure_pictures(find_pictures(tmp_path, sequence), sequence)
+    assert "with red and blue exchanged" in found["pictures"]["doubt"]
+    assert sorted(seen) == sorted(f"{sequence.names[i]}.png" for i in HELD_OUT)

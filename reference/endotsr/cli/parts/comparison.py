@@ -154,7 +154,6 @@ def _metrics(
             _refuse_earlier(path, metrics)
         return cast("EvaluationRecord", metrics), sequence
     from endotsr.clips.formats.video_file import is_video
-    from endotsr.results.evaluation.doubts import doubt
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
 
@@ -164,10 +163,11 @@ def _metrics(
     if sequence is None:
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
         sequence = shown_sequence("evaluate", run, asked.sequence, asked.settings)
-    found, shape = find_pictures(path, sequence), sequence.images.shape[1:]
-    if remark := doubt(sequence, lambda i: found.read(i, shape)):
-        print(f"{path}: {remark}")
-    return measure_pictures(found, sequence, label, load_lpips_weights(asked.lpips)), sequence
+    weights = load_lpips_weights(asked.lpips)
+    metrics = measure_pictures(find_pictures(path, sequence), sequence, label, weights)
+    if said := metrics["pictures"]["doubt"]:
+        print(f"{path}: {said}")
+    return metrics, sequence
 
 
 def _refuse_earlier(path: Path, metrics: Keys) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
-from endotsr.results.evaluation.records import EvaluationRecord, FrameMetrics, RunEvaluation
+from endotsr.results.evaluation.records import EvaluationRecord, FrameMetrics, PicturesEvaluation, RunEvaluation
 from endotsr.untrusted.json import number
 from endotsr.untrusted.names import counted
 
@@ -77,7 +77,8 @@ def _hashes(metrics: EvaluationRecord) -> Any:
     """SHA-256 by name of an array; a run of windows has them beside its windows."""
     found: Any = metrics
     if "windows" not in metrics:
-        found = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
+        pictures = cast(PicturesEvaluation, metrics).get("pictures")
+        found = cast(RunEvaluation, metrics)["run"]["input"] if pictures is None else pictures
     return found["arrays_sha256"]
 
 

@@ -7,6 +7,7 @@ method.
 """
 
 from collections import Counter
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,15 +20,17 @@ from endotsr.clips.opencv import pictures as stored
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array, FloatArray
+from endotsr.results.evaluation.doubts import doubt
 from endotsr.results.evaluation.evaluate import evaluate_model
 from endotsr.results.evaluation.lpips import LpipsWeights
-from endotsr.results.evaluation.records import EvaluationRecord
+from endotsr.results.evaluation.records import PicturesEvaluation
 from endotsr.training.runs.sources import digest
 from endotsr.untrusted.arrays import read_npy
 
 KINDS = (".npy", ".png", *stored.TIFF_ENDINGS, ".bmp")  # lossless; the first kind found in a folder is read
 CHANNELS = 3
 LARGEST_FILE = 1 << 32  # bytes
+PICTURES_KEPT = 64  # in memory after they are read; further ones are read again for the metrics
 LARGEST = 16.0  # display units; a larger value means 8-bit or 16-bit levels, not an overshoot
 LOWEST = -0.5  # display units; a lower value means pictures from -1 to 1, not an undershoot
 
@@ -196,24 +199,29 @@ def _read_array(file: Path) -> Array:
 
 def measure_pictures(
     pictures: Pictures, sequence: Sequence, label: str = "", weights: LpipsWeights | None = None
-) -> EvaluationRecord:
+) -> PicturesEvaluation:
     """The dictionary of metrics.json for a folder of pictures.
 
     label     name of the method; default: the name of the folder
-    returns   the keys of `evaluate_model`, `label`, and `pictures` (folder, pairing, digests, file of every frame). The
-              training part covers the training frames with a picture, possibly none
+    returns   the keys of `evaluate_model`, `label`, and `pictures` (folder, pairing, `doubt`, digests, file of every
+              frame). The training part covers the training frames with a picture, possibly none
 
     Raises: InputError as `read_picture`.
     """
     shape = sequence.images.shape[1:]
     training = [int(i) for i in sequence.train_index if int(i) in pictures.files]
+    read = lru_cache(PICTURES_KEPT)(lambda index: pictures.read(index, shape))
 
-    metrics = evaluate_model(sequence, lambda index: pictures.read(index, shape), weights, training)
+    said = doubt(sequence, read)
+    metrics = evaluate_model(sequence, read, weights, training)
     metrics["label"] = label or pictures.folder.absolute().name
-    metrics["pictures"] = {
-        "folder": str(pictures.folder.absolute()),
-        "pairing": pictures.pairing,
-        "arrays_sha256": {name: digest(getattr(sequence, name)) for name in ("images", "masks")},
-        "files": {sequence.names[i]: file.name for i, file in pictures.files.items()},
+    return {
+        **metrics,
+        "pictures": {
+            "folder": str(pictures.folder.absolute()),
+            "pairing": pictures.pairing,
+            "doubt": said,
+            "arrays_sha256": {name: digest(getattr(sequence, name)) for name in ("images", "masks")},
+            "files": {sequence.names[i]: file.name for i, file in pictures.files.items()},
+        },
     }
-    return metrics

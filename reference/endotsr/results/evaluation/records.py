@@ -112,6 +112,7 @@ class PicturesPart(TypedDict):
 
     folder: str
     pairing: str
+    doubt: str  # a sentence on pictures that look like a mistake; empty without one
     arrays_sha256: dict[str, str]
     files: dict[str, str]  # file of every frame
 
@@ -149,7 +150,12 @@ class EvaluationRecord(TypedDict):
     pose_correction: NotRequired[PosePart | None]
     measures: NotRequired[dict[str, Measured]]
     label: NotRequired[str]
-    pictures: NotRequired[PicturesPart]
+
+
+class PicturesEvaluation(EvaluationRecord):
+    """The metrics of a folder of pictures or a video."""
+
+    pictures: PicturesPart
 
 
 class RunEvaluation(EvaluationRecord):
