@@ -172,8 +172,10 @@ np.testing.assert_allclose(*paths, rtol=1e-9)
 # residuals starts at $K_s$:
 #
 # $$
-# \eta(i)=\eta_0\,\varphi^{\tau},\qquad
-# \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure, poses}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
+# \begin{aligned}
+# \eta(i)&=\eta_0\,\varphi^{\tau},\\
+# \tau&=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure, poses}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
+# \end{aligned}
 # $$
 #
 # <!-- definition: endotsr.definition.schedules.decay -->

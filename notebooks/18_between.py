@@ -153,8 +153,8 @@ assert swing[both] < swing[alone] - 2
 # v_0(x)&=f\bigl(x-a\,v_0(x)\bigr),\qquad v_1(x)=-g\bigl(x+(1-a)\,v_1(x)\bigr),\\
 # v&=(1-a)\,v_0+a\,v_1,\\
 # J_0(x)&=I_0\bigl(x-a\,v(x)\bigr),\qquad J_1(x)=I_1\bigl(x+(1-a)\,v(x)\bigr),\\
-# e_{\mathrm m}&=G_2*\operatorname{mean}_c(J_0-J_1)^2+255^{-2},\qquad
-# e_{\mathrm s}=G_2*\operatorname{mean}_c(I_0-I_1)^2+255^{-2},\qquad q=\frac{e_{\mathrm m}}{e_{\mathrm m}+e_{\mathrm s}},\\
+# e_{\mathrm m}&=G_2*\operatorname{mean}_c(J_0-J_1)^2+255^{-2},\\
+# e_{\mathrm s}&=G_2*\operatorname{mean}_c(I_0-I_1)^2+255^{-2},\qquad q=\frac{e_{\mathrm m}}{e_{\mathrm m}+e_{\mathrm s}},\\
 # I_a&=(1-q)\bigl[(1-a)\,J_0+a\,J_1\bigr]+q\,\bigl[(1-a)\,I_0+a\,I_1\bigr],\\
 # M_a(x)&=M_0\bigl(x-a\,v(x)\bigr)\vee M_1\bigl(x+(1-a)\,v(x)\bigr).
 # \end{aligned}

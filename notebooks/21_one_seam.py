@@ -173,8 +173,10 @@ assert values[2] > max(values[:2])
 # quaternion $q$, log-scale $s$ and degree-0 coefficient $h_0$ of the new window are
 #
 # $$
-# \mu=\mu_n(t^*)-C\,\phi(u^*),\qquad q=q_n(t^*),\qquad s=s_n(t^*),\qquad
-# h_0=h_{0,n}+\tfrac{\beta}{Y_{00}}\tanh\bigl(A_n\bar\phi_n(t^*)\bigr)
+# \begin{aligned}
+# \mu&=\mu_n(t^*)-C\,\phi(u^*),&q&=q_n(t^*),\\
+# h_0&=h_{0,n}+\tfrac{\beta}{Y_{00}}\tanh\bigl(A_n\bar\phi_n(t^*)\bigr),&s&=s_n(t^*)
+# \end{aligned}
 # $$
 #
 # **(21.4) Time is not inherited.** The bases of the FDM and the atoms of $A$ belong to the time of the neighbour.

@@ -1,10 +1,11 @@
 """Lay pages out in a headless browser at three widths: no page is wider than its window, and no table than its box.
 
 Run after the build: python tests/docs/check_layout.py docs/_build/html [PAGE ...]
-At 1400 and 1000 px every column of every table and every picture of a chapter is visible. On a telephone (390 px) a
-table of many columns and a picture may scroll inside their boxes. At every width no line of code and no output of a
-chapter is cut, a page shows at most one search box, and no word is broken over two lines. In the pages that commands
-write no text is cut at the edge of its box. Without a browser the check says so and ends with exit code 0.
+At 1400 and 1000 px every column of every table, every formula and every picture of a chapter is visible. On a
+telephone (390 px) a table of many columns, a formula and a picture may scroll inside their boxes. At every width no
+line of code and no output of a chapter is cut, a page shows at most one search box, and no word is broken over two
+lines. In the pages that commands write no text is cut at the edge of its box. Without a browser the check says
+so and ends with exit code 0.
 """
 
 import json
@@ -45,8 +46,17 @@ function measure(page, width) {
     const by = picture.getBoundingClientRect().right - box(picture).getBoundingClientRect().right;
     if (width >= ALL_COLUMNS_FROM && shown(picture) && by > 1) say("picture", picture.alt || "a figure", by);
   }
+  for (const formula of root.querySelectorAll("article.bd-article mjx-container[display]")) {
+    const drawn = formula.firstElementChild, edge = box(formula).getBoundingClientRect().right;
+    const by = drawn ? drawn.getBoundingClientRect().right - edge : 0;
+    if (width >= ALL_COLUMNS_FROM && shown(formula) && by > 1) say("formula", heading(formula), by);
+  }
   const boxes = [...frame.contentDocument.querySelectorAll("input[type=search], .search-button-field")].filter(shown);
   if (boxes.length > 1) say("search", boxes.length + " search boxes", 0);
+}
+function heading(e) {  // of the section of an element
+  const section = e.closest("section"), title = section && section.querySelector("h1, h2, h3, h4");
+  return title ? title.textContent.trim().slice(0, 40) : "";
 }
 function cutText(root, say, shown) {
   for (const e of root.querySelectorAll("*")) {
