@@ -162,15 +162,3 @@ def test_the_splits_without_interpolation_are_named():
     found = json.loads((RESULTS / "interpolation.json").read_text(encoding="utf-8"))
     del found["clips"]["endonerf_pulling"]["blocks of 8 frames"]
     assert "endonerf_pulling, blocks of 8 frames" in interpolation.table(found).split("Not measured yet: ")[1]
-
-
-def test_a_gains_at_least_as_much_with_the_geometry_frozen():
-    """What the page says of the sweep, in every seed that is measured."""
-    rows = json.loads((RESULTS / "sweeps" / "frozen_geometry.json").read_text(encoding="utf-8"))["rows"]
-    psnr = {(row["configuration"], row["seed"]): row["psnr_full"] for row in rows if row.get("psnr_full") is not None}
-    seeds = {seed for name, seed in psnr if name == "A fixed"}
-    assert len(seeds) >= 2
-    for seed in seeds:
-        assert (
-            psnr["A frozen", seed] - psnr["base frozen", seed] >= psnr["A fixed", seed] - psnr["base fixed", seed] > 0
-        )

@@ -61,6 +61,15 @@ def test_frozen_geometry_leaves_the_rate_of_the_colour_residual_as_it_is():
     assert (frozen.position, frozen.opacity, frozen.scale, frozen.rotation) == (0, 0, 0, 0)
 
 
+def test_a_configuration_is_compared_with_the_base_of_its_own_kind():
+    spec = sweeps.read(FILES["frozen_geometry"])[0]
+    assert [sweeps.reference(spec, name) for name in ("base", "A frozen", "A fixed", "base fixed")] == [
+        "base", "base frozen", "base fixed", "base fixed",
+    ]  # fmt: skip
+    assert sweeps.reference(sweeps.read(FILES["matern_weight"])[0], "lambda_msp 100") == "lambda_msp 0"
+    assert sweeps.reference(sweeps.read(FILES["similarity_weight"])[0], "w 0") == "w 0.1"
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     (tmp_path / "w.toml").write_text(
@@ -106,3 +115,15 @@ def test_the_prior_moves_psnr_by_less_than_its_interval_at_any_measured_weight()
     assert [len(values) for values in apart.values()] == [3, 3]
     (psnr, of_psnr), (lpips, of_lpips) = map(interval, apart.values())
     assert abs(psnr) < of_psnr and lpips > of_lpips
+
+
+def test_a_gains_by_colour_alone():
+    """The sentence on frozen geometry: both gains are decided, and their difference is not."""
+    rows = sweeps.rows_of(FILES["frozen_geometry"])
+    frozen, fixed = (sweeps.differences(rows, f"A {kind}", f"base {kind}", "psnr_full") for kind in ("frozen", "fixed"))
+    assert len(frozen) == len(fixed) == 3
+    for values in (frozen, fixed):
+        mean, half = interval(values)
+        assert mean > half
+    mean, half = interval([a - b for a, b in zip(frozen, fixed)])
+    assert abs(mean) < half

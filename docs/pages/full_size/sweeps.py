@@ -5,7 +5,7 @@
     python docs/make.py full_size.sweeps measure NAME DIR/results.json store the finished runs, then write the tables
 
 The first lines of a file are its question. The tables are in docs/results/README.md. Differences are paired by clip,
-split and seed, and are taken to the first configuration, or to the first one that continues a shared checkpoint.
+split and seed, and are taken to the configuration that `reference` names.
 """
 
 from collections.abc import Iterable
@@ -59,10 +59,16 @@ def planned(file: Path) -> int:
     return len(clips) * len(spec.seeds) * max(1, len(spec.splits)) * len(spec.configurations)
 
 
-def reference(spec: Spec) -> str:
-    """The configuration that differences are taken to."""
+def reference(spec: Spec, name: str) -> str:
+    """The configuration that the differences of `name` are taken to.
+
+    That is `base` with the words of `name` after its first, such as `base frozen` of `A frozen`. Without one it is the
+    first configuration that continues a shared checkpoint, or the first of all.
+    """
+    names = [configuration.name for configuration in spec.configurations]
     continued = [configuration.name for configuration in spec.configurations if configuration.start]
-    return (continued or [spec.configurations[0].name])[0]
+    base = " ".join(["base", *name.split()[1:]])
+    return base if base in names else (continued or names)[0]
 
 
 def rows_of(file: Path) -> list[Row]:
@@ -91,10 +97,9 @@ def differences(rows: list[Row], configuration: str, to: str, metric: str) -> li
 def table(file: Path) -> str:
     """The measured runs of a file, one table for each clip and split."""
     spec, rows, parts = read(file)[0], rows_of(file), []
-    to = reference(spec)
     for clip, split in dict.fromkeys((row["sequence"], row["split"]) for row in rows):
         of = [row for row in rows if (row["sequence"], row["split"]) == (clip, split)]
-        lines = [_line(of, configuration.name, to) for configuration in spec.configurations]
+        lines = [_line(of, name, reference(spec, name)) for name in (one.name for one in spec.configurations)]
         heads = [f"`{file.stem}`: {clip}, {split}", "seeds", *(label for _, label, _ in COLUMNS)]
         parts.append(markdown(heads, lines))
     return "\n\n".join(parts)
