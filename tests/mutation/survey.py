@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from endotsr.method.kernels.jit import kernel_source_hash
+from endotsr.method.kernels.kernel_cache import kernel_source_hash
 from endotsr.port.gradcheck import all_pairs
 from endotsr.port.judge.store import golden_folder, read_golden
 from mutation.checks import BLOCKS, Check, forward_only, of_case, of_item, of_pair, surveyed

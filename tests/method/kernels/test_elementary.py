@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from endotsr.method.kernels.elementary import exponential, logarithm
-from endotsr.method.kernels.jit import jit, kernel_sources
+from endotsr.method.kernels.jit import jit
+from endotsr.method.kernels.kernel_cache import kernel_sources
 
 BITS = {"expf": ((0x00000000, 0x42CFF000), (0x80000000, 0xC2CFF000)), "logf": ((0x00800000, 0x7F800000),)}
 STEP = 4801  # between tested numbers, in units of the last place

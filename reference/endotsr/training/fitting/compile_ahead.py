@@ -8,7 +8,6 @@ at its first call is compiled then.
 `python -m endotsr.training.fitting.compile_ahead` runs the second process, with settings as JSON on standard input.
 """
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -44,13 +43,9 @@ def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: No
 
 def _second(config: Config) -> subprocess.Popen | None:
     """The second process; None if it cannot be started. A kernel that fails there fails again here when called."""
-    import numba
-
-    environment = os.environ | {"NUMBA_CACHE_DIR": numba.config.CACHE_DIR}  # type: ignore[attr-defined]
     try:
         helper = subprocess.Popen(
             [sys.executable, "-m", __spec__.name],
-            env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -66,14 +61,12 @@ def _second(config: Config) -> subprocess.Popen | None:
 
 def done_before(config: Config) -> Path:
     """Marker file: all kernels of this source and these components are compiled for this processor."""
-    import numba
-
-    from endotsr.method.kernels.jit import kernel_source_hash
+    from endotsr.method.kernels.kernel_cache import kernel_folder
 
     model = config.model
     parts = [name for name in ("deformation", "appearance", "spectral_motion", "laplacian") if getattr(model, name)]
-    words = (kernel_source_hash(), config.training.precision, *parts, config.raster.preset, compiled_for())
-    return Path(numba.config.CACHE_DIR) / f"compiled-{'-'.join(words)}"  # type: ignore[attr-defined]
+    words = (config.training.precision, *parts, config.raster.preset, compiled_for())
+    return kernel_folder() / f"compiled-{'-'.join(words)}"
 
 
 def rehearse(config: Config) -> None:

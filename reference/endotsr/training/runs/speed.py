@@ -21,11 +21,9 @@ ITERATIONS, START, EVALUATION = "seconds_per_unit", "start_seconds_per_unit", "e
 
 def speed_file(threads: int) -> Path:
     """The file for a number of threads."""
-    import numba
+    from endotsr.method.kernels.kernel_cache import kernel_folder
 
-    from endotsr.method.kernels.jit import kernel_source_hash
-
-    return Path(numba.config.CACHE_DIR) / f"speed-{kernel_source_hash()}-{threads}.json"  # type: ignore[attr-defined]
+    return kernel_folder() / f"speed-{threads}.json"
 
 
 def remembered_unit(threads: int) -> float | None:

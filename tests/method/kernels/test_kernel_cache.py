@@ -1,4 +1,4 @@
-"""An edited kernel is never stale: compiled code is kept in a folder named after a hash of all kernel sources."""
+"""An edited kernel is never stale, and what is compiled serves every installation of the same sources."""
 
 import os
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import endotsr
-from endotsr.method.kernels.jit import kernel_sources
+from endotsr.method.kernels.kernel_cache import kernel_folder, kernel_source_hash, kernel_sources
 
 PACKAGE = Path(endotsr.__file__).parent
 COMPILES = re.compile(r"^from endotsr\.method\.kernels\.jit import .*\bjit|^from numba\.extending|njit", re.MULTILINE)
@@ -53,6 +53,24 @@ def test_an_edit_of_a_file_that_a_kernel_inlines_is_never_stale(tmp_path):
     scale = 2.0 ** np.trunc(-u * u / np.log(2))
     assert answer(tmp_path) - before == 2 * scale
     assert kept and kept < set((tmp_path / "cache").rglob("*.nbi"))
+
+
+def test_another_installation_of_the_same_sources_compiles_nothing(tmp_path):
+    """Another environment or clone has other paths and other times of its files."""
+    found = []
+    for name in ("one", "two"):
+        copy_package(tmp_path / name)
+        for file in (tmp_path / name).rglob("*.py"):
+            os.utime(file, (1e9, 1e9 + len(found)))
+        value = process(tmp_path / name, tmp_path / "cache").stdout
+        found.append((value, {file: file.stat().st_mtime_ns for file in (tmp_path / "cache").rglob("*.nb?")}))
+    assert found[0] == found[1] and found[0][1]
+
+
+def test_a_chosen_folder_holds_the_kernels_of_every_version(tmp_path, monkeypatch):
+    """In NUMBA_CACHE_DIR too, so an edit is not stale there either."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert kernel_folder() == tmp_path / kernel_source_hash()
 
 
 def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_sources(tmp_path):
