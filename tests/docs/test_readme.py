@@ -22,5 +22,11 @@ def test_a_readme_without_them_is_refused():
 
 
 def test_a_command_that_fails_is_told(tmp_path):
-    assert readme.run("exit 3", tmp_path).code == 3
-    assert readme.run("test ! -e .venv && pwd", tmp_path).code == 0
+    assert readme.run("exit 3", tmp_path, tmp_path / "cache").code == 3
+    assert readme.run("test ! -e .venv && pwd", tmp_path, tmp_path / "cache").code == 0
+
+
+def test_a_command_finds_no_cache_but_the_one_that_it_is_given(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
+    command = f'test "$XDG_CACHE_HOME" = {tmp_path}/cache -a -z "$NUMBA_CACHE_DIR" -a -n "$PIP_CACHE_DIR"'
+    assert readme.run(command, tmp_path, tmp_path / "cache").code == 0
