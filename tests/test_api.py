@@ -312,6 +312,40 @@ def test_film_view_and_export_are_those_of_the_commands(run, tmp_path):
         run.film(tmp_path / "c.gif", count=2, camera=str(tmp_path / "path.json"))
 
 
+WRITERS = {
+    "a.gif": lambda run, file, **more: run.film(file, count=2, **more),
+    "a.html": lambda run, file, **more: run.view(file, **more),
+    "a.ply": lambda run, file, **more: run.export(file, times=(0.5,), **more),
+    "a.glb": lambda run, file, **more: run.export(file, **more),
+    "a.npz": lambda run, file, **more: run.export(file, **more),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_file_of_the_user_is_replaced_with_permission_alone(name, run, tmp_path):
+    file, write = tmp_path / name, WRITERS[name]
+    file.write_bytes(b"notes of a user\n")
+    said = f"{file}: exists already, and does not show that endotsr wrote it; use another name, or replace=True"
+    with pytest.raises(endotsr.InputError, match=f"^{re.escape(said)}$"):
+        write(run, file)
+    assert file.read_bytes() == b"notes of a user\n" and [path.name for path in tmp_path.iterdir()] == [name]
+    write(run, file, replace=True)
+    written = file.read_bytes()
+    assert write(run, file) and file.read_bytes() == written, "its own file is replaced without a word"
+
+
+def test_a_page_and_a_folder_of_a_run_are_not_replaced(run, tmp_path):
+    saved = run.save(tmp_path / "run")
+    page = saved / "report.html"
+    page.write_text("a report")
+    with pytest.raises(endotsr.InputError, match=r"belongs to the folder of run\.json"):
+        run.view(page, replace=True)
+    for write in (run.save, run.export):
+        with pytest.raises(endotsr.InputError, match="already"):
+            write(saved)
+    assert page.read_text() == "a report"
+
+
 def test_runs_that_cannot_be_opened(tmp_path):
     with pytest.raises(endotsr.InputError, match="run folder not found"):
         endotsr.open_run(tmp_path / "absent")

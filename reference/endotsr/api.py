@@ -35,6 +35,7 @@ from endotsr.method.splatting.render import RenderOut
 from endotsr.training.fitting.records import LogEntry
 from endotsr.training.runs import folder as run_folders
 from endotsr.training.runs import sources
+from endotsr.training.runs.files import refuse_replacing
 from endotsr.training.runs.log import RunLog, log_until
 from endotsr.training.runs.machine import now, peak_memory_bytes
 from endotsr.training.runs.model import Model, load_model, load_training, save_training
@@ -310,6 +311,7 @@ class Run:
         camera: str = "observed",
         rate: float | None = None,
         slow: float | None = None,
+        replace: bool = False,
     ) -> Path:
         """Write a film, .mp4 (H.264), .webm (VP9) or .gif, as `endotsr render --film`; returns its path.
 
@@ -317,45 +319,50 @@ class Run:
         camera   "observed", "orbit", "sway", the number of a frame, or a camera file
         rate     pictures per second; default: real time, or 15 if the frame rate is unknown
         slow     slow-down relative to the recording, instead of `rate`
+        replace  replace an existing film that endotsr did not write
 
-        Raises: InputError for an invalid name, rate, count or camera.
+        Raises: InputError for an invalid name, rate, count or camera, and for such a film.
         """
         from endotsr.results.export.times import Times
         from endotsr.results.views import film, pictures
         from endotsr.results.views.plan import ViewRequest
 
         path, look, scene = Path(path), pictures.Look(), self._scene()
-        pictures.check_outputs(None, path, rate, slow)
+        pictures.check_outputs(None, path, rate, slow, replace, option="")
         views = pictures.requested_views(scene, ViewRequest(Times(count=count), camera), "all")
         pictures.check_panels(look.panels, views)
         chosen = rate or film.film_rate(path, [view.time for view in views], scene.record.duration, slow)
         film.write_film(path, pictures.film_pictures(pictures.rendered(scene, views, look), look), chosen)
         return path
 
-    def view(self, path: str | Path) -> Path:
+    def view(self, path: str | Path, *, replace: bool = False) -> Path:
         """Write the interactive viewer page, as `endotsr export --out PAGE.html`; returns its path.
 
-        Raises: InputError if `path` is no .html name.
+        replace  replace an existing file that endotsr did not write
+
+        Raises: InputError if `path` is no .html name, and for such a file.
         """
         from endotsr.results.views.page import KEYS, check_page, write_page
 
         path = Path(path)
         check_page(path, KEYS)
+        refuse_replacing(path, replace)
         write_page(path, self._scene(), path.stem, KEYS)
         return path
 
-    def export(self, path: str | Path, *, times: tuple[float, ...] = ()) -> str:
+    def export(self, path: str | Path, *, times: tuple[float, ...] = (), replace: bool = False) -> str:
         """Write files for other programs, as `endotsr export`; returns one line on the result.
 
         path    .ply (one time), .glb (animated points), .npz (slim model), or a folder of .ply files to create
         times   normalised, in [0, 1]
+        replace replace an existing file that endotsr did not write; a folder is never replaced
 
-        Raises: InputError for an invalid name or time.
+        Raises: InputError for an invalid name or time, and for such a file.
         """
         from endotsr.results.export.files import GAUSSIANS, export
         from endotsr.results.export.times import Times
 
-        return export(self._scene(), Path(path), Times(tuple(times)), GAUSSIANS)
+        return export(self._scene(), Path(path), Times(tuple(times)), GAUSSIANS, replace)
 
     def evaluate(self, *, lpips: str | Path | None = None) -> "EvaluationRecord":
         """Metrics of the held-out frames, of training frames, and of baselines without a model.

@@ -69,8 +69,7 @@ def run(words: list[str]) -> int:
     from endotsr.results.export.files import Content, export
     from endotsr.results.export.times import Times
     from endotsr.studies.windows.scene import open_any, refuse_one_set
-    from endotsr.training.runs.files import refuse_unwritable
-    from endotsr.untrusted.marks import refuse_foreign
+    from endotsr.training.runs.files import refuse_replacing
 
     options = parse(ExportOptions, words, "export")
     kind = FORMATS.get(options.out.suffix.lower(), "folder")
@@ -78,15 +77,14 @@ def run(words: list[str]) -> int:
     use_threads(options.threads)
     refuse_one_set(options.scene, options.out)
     if kind != "folder":
-        refuse_unwritable(options.out)
-        refuse_foreign(options.out, options.replace, "--out")
+        refuse_replacing(options.out, options.replace, "--out")
     times = Times(options.times, options.frames, options.count)
     content = Content(options.content, options.opacity, options.without, options.voxel)
     if kind == "page":
         _write_page(options)
         return 0
     scene = open_any(options.scene)
-    said = export(scene, options.out, times, content)
+    said = export(scene, options.out, times, content, options.replace)
     print("\n".join([said, *(f"  {note}" for note in scene.notes)]))
     files = sorted(options.out.iterdir()) if options.out.is_dir() else [options.out]
     sizes = {file.name: file.stat().st_size for file in files}

@@ -43,8 +43,8 @@ def own(file: Path) -> bool:
 def refuse_foreign(file: Path | None, replace: bool | None = None, option: str = "") -> None:
     """Raises InputError for an existing file that endotsr did not write.
 
-    replace   whether the command may replace it; None if the command has no such option
-    option    that names the file, for the message
+    replace   whether the caller may replace it; None if the caller has no such option
+    option    of the command that names the file, for the message; empty in Python
     """
     if file is None or replace or not file.is_file():
         return
@@ -54,7 +54,8 @@ def refuse_foreign(file: Path | None, replace: bool | None = None, option: str =
         raise InputError(f"{file}: cannot be read: {error.strerror}") from None
     if not found:
         named = f"{option} {file}".lstrip()
-        remedy = "use another name" + ("" if replace is None else ", or --replace")
+        permission = ", or --replace" if option else ", or replace=True"
+        remedy = "use another name" + ("" if replace is None else permission)
         raise InputError(f"{named}: exists already, and does not show that endotsr wrote it; {remedy}")
 
 

@@ -105,6 +105,12 @@ def test_python_writes_it_and_follows_points(cold_run, tmp_path):
     run = endotsr.open_run(cold_run)
     assert run.view(tmp_path / "page.html") == tmp_path / "page.html"
     assert len(about(tmp_path / "page.html")["windows"]) == 2 and not about(tmp_path / "page.html")["held_out"]
+    (tmp_path / "notes.html").write_text("mine")
+    with pytest.raises(InputError, match="exists already, and does not show that endotsr wrote it; use another name"):
+        run.view(tmp_path / "notes.html")
+    assert not window_files(tmp_path / "notes.html").exists()
+    run.view(tmp_path / "page.html")
+    run.view(tmp_path / "notes.html", replace=True)
     points = run.scene.at(0.0).position[:, :4]
     assert np.isfinite(run.follow(points, 0, [0, 50])).all()
     with pytest.raises(InputError, match=r"name that ends in \.html"):

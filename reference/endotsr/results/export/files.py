@@ -12,7 +12,7 @@ from endotsr.results.export.placement import placed_points, placed_scene
 from endotsr.results.export.ply import gaussian_vertices, mesh_vertices, point_vertices, write_ply
 from endotsr.results.export.scene import MovingScene
 from endotsr.results.export.times import Times, chosen_times
-from endotsr.training.runs.files import refuse_unwritable
+from endotsr.training.runs.files import refuse_replacing
 from endotsr.training.runs.folder import refuse_existing
 from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replacing_folder
@@ -51,13 +51,17 @@ def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> 
         raise InputError(f"{out}: --out is a folder of {of}, but this is the name of a {ending} file; {advice}")
 
 
-def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Content = GAUSSIANS) -> str:
+def export(
+    scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Content = GAUSSIANS, replace: bool = False
+) -> str:
     """Write a scene to `out`; returns one line on the written file. The extension of `out` selects the format:
 
     .npz    slim model; times or content cannot be chosen
     .glb    animated points; default: at all frames
     .ply    one time; default: the first frame of the sequence
     none    a folder with one ply file per time; default: all frames
+
+    replace   whether a file that endotsr did not write may be replaced
     Raises: InputError for another extension, for invalid times or content, and for a path that cannot be written.
     """
     if not 0.0 <= content.least_opacity <= 1.0:
@@ -65,6 +69,8 @@ def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Con
     if content.voxel is not None and content.kind != "mesh":
         raise InputError("export: --voxel applies to a mesh only; allowed: with --content mesh")
     ending = out.suffix.lower()
+    if ending in (".npz", ".glb", ".ply"):
+        refuse_replacing(out, replace)
     if ending == ".npz":
         return _slim(scene, out, times, content)
     if ending == ".glb":
@@ -82,7 +88,6 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
         )
     if scene.one_time:
         raise InputError(f"{out}: a slim model cannot be made from a .ply file of one time; allowed: a run folder")
-    refuse_unwritable(out)
     model = scene.model
     save_slim_model(out, model, scene.record)
     size = out.stat().st_size
@@ -96,7 +101,6 @@ def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> 
     if content.kind == "mesh":
         raise InputError(f"{out}: a .glb stores points; the triangles of a mesh change over time; allowed: a folder")
     wanted = [time for time, _, _, _ in chosen_times("export", times, scene.record, default="all")]
-    refuse_unwritable(out)
     count = write_animated_points(out, scene, wanted, content.least_opacity, content.taken_out)
     return f"{out}: {counted(count, 'point')} at {counted(len(wanted), 'time')}, {out.stat().st_size / 1e6:.2f} MB"
 
@@ -105,7 +109,6 @@ def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> 
     wanted = chosen_times("export", times if times.chosen else Times(frames="all"), scene.record)
     if times.chosen and len(wanted) > 1:
         raise InputError(f"{out}: a .ply file stores one time, not {len(wanted)}; allowed: a folder, one time")
-    refuse_unwritable(out)
     count = _write(scene, out, wanted[0][0], content)
     name = "triangles" if content.kind == "mesh" else content.kind
     return f"{out}: {count} {name} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"

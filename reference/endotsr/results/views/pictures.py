@@ -28,10 +28,9 @@ from endotsr.results.views.cameras import TURNING, pivot_depth_of
 from endotsr.results.views.film import check_film
 from endotsr.results.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
 from endotsr.results.views.plan import PlannedView, ViewRequest, check_request, views_of
-from endotsr.training.runs.files import refuse_unwritable, write_json
+from endotsr.training.runs.files import refuse_replacing, write_json
 from endotsr.training.runs.folder import refuse_existing
 from endotsr.training.runs.sources import load_run_sequence
-from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.writing import replacing_folder
 
 DepthKind = Literal["accumulated", "normalised"]
@@ -104,11 +103,17 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
 
 
 def check_outputs(
-    out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None, replace: bool = True
+    out: Path | None,
+    film: Path | None,
+    rate: float | None = None,
+    slow: float | None = None,
+    replace: bool = False,
+    option: str = "--film",
 ) -> None:
     """Raises InputError without an output, or if the folder or film cannot be written.
 
     replace   whether a film that endotsr did not write may be replaced
+    option    that names the film, for the message; empty in Python
     """
     if out is None and film is None:
         raise InputError("render: --out DIR or --film FILE is missing; allowed: one or both")
@@ -117,8 +122,7 @@ def check_outputs(
         refuse_existing(out)
     if film is not None:
         check_film(film, rate, slow)
-        refuse_unwritable(film)
-        refuse_foreign(film, replace, "--film")
+        refuse_replacing(film, replace, option)
 
 
 def frames_of(

@@ -11,6 +11,7 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.studies.windows.scene import WindowedScene, WindowFrames, open_windows
+from endotsr.training.runs.files import refuse_replacing
 from endotsr.training.runs.folder import RunFolder
 
 if TYPE_CHECKING:
@@ -66,18 +67,21 @@ class WindowedRun:
 
         return followed(self.scene, points, frame, frames)
 
-    def view(self, path: str | Path, *, held_out: bool = False) -> Path:
+    def view(self, path: str | Path, *, held_out: bool = False, replace: bool = False) -> Path:
         """Write the viewer page and, in the same folder, the folder of its windows; returns the page.
 
         held_out  also show the held-out frames; this reads the sequence
+        replace   replace an existing page that endotsr did not write
 
-        Raises: InputError if `path` is no .html name, or if the folder of windows contains other files.
+        Raises: InputError if `path` is no .html name, for such a page, and if the folder of windows contains other
+                files.
         """
         from endotsr.results.views.page import check_page
         from endotsr.studies.windows.page import WINDOW_KEYS, write_windows_page
 
         path = Path(path)
         check_page(path, WINDOW_KEYS)
+        refuse_replacing(path, replace)
         frames = WindowFrames(self.scene, self._source) if held_out else None
         write_windows_page(path, self.scene, path.stem, WINDOW_KEYS, frames)
         return path

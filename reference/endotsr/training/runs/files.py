@@ -12,6 +12,7 @@ from typing import Any
 from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.marks import refuse_foreign
 from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.writing import replace_text
 
@@ -78,6 +79,15 @@ def refuse_unwritable(*files: Path | None) -> None:
         if not all(os.access(path, os.W_OK) for path in (above, file) if path.exists()):
             raise InputError(f"{file}: cannot be written: no permission")
         _refuse_input(file)
+
+
+def refuse_replacing(file: Path, replace: bool, option: str = "") -> None:
+    """Raises InputError if a film, an export or a page cannot be written, or would replace a file of the user.
+
+    Commands and Python functions ask here. replace, option: as in `refuse_foreign`
+    """
+    refuse_unwritable(file)
+    refuse_foreign(file, replace, option)
 
 
 def refuse_no_text(file: Path) -> None:
