@@ -8,7 +8,8 @@ from tiny import assert_refused, scene
 
 from endotsr.cli.main import main
 from endotsr.clips.formats.film_file import write_video
-from endotsr.untrusted.marks import own
+from endotsr.errors import InputError
+from endotsr.untrusted.marks import own, refuse_foreign
 
 FOREIGN = "does not show that endotsr wrote it; use another name"
 EXPORTS = ("a.ply", "a.glb", "a.npz", "a.html")
@@ -74,6 +75,20 @@ def test_tables_of_a_sweep_replace_no_file_of_the_user(tmp_path, capsys):
         "tradeoff.html": ["tradeoff", "--scale", "0.2"],
     }.items():  # fmt: skip
         (out / name).write_bytes(NOTES)
-        assert_refused(capsys, [*words, "--out", str(out)], f"{name}: exists already, and ")
+        said = f"{name}: exists already, and does not show that endotsr wrote it; choose another --out"
+        assert_refused(capsys, [*words, "--out", str(out)], said)
         assert [file.name for file in out.iterdir()] == [name] and (out / name).read_bytes() == NOTES
         (out / name).unlink()
+    (out / "results.json").mkdir()
+    assert_refused(capsys, ["sweep", str(tmp_path / "s.toml"), "--out", str(out)], "results.json: cannot be read")
+    assert [file.name for file in out.iterdir()] == ["results.json"]
+
+
+def test_tables_of_a_sweep_are_written_again_beside_its_runs(tmp_path):
+    """They have no mark: the folder of the runs shows their origin, as the record of a trade-off does for its page."""
+    table, runs = tmp_path / "results.csv", tmp_path / "runs"
+    table.write_bytes(NOTES)
+    with pytest.raises(InputError, match="choose another --out"):
+        refuse_foreign(table, beside=runs)
+    runs.mkdir()
+    refuse_foreign(table, beside=runs)

@@ -67,16 +67,18 @@ class AblateOptions:
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.studies.sweeps.ablation_page import FILES, ablation_markdown, write_ablation
+    from endotsr.studies.sweeps.jobs import RUNS
     from endotsr.studies.sweeps.place import Place, check_place
     from endotsr.studies.sweeps.spec import spec_of
-    from endotsr.studies.sweeps.sweep import refuse_tables
     from endotsr.training.runs.files import refuse_folder, write_json
+    from endotsr.untrusted.marks import refuse_foreign
 
     options = parse(AblateOptions, words, "ablate")
     place = Place(options.workers, options.threads, options.scheduler)
     check_place("ablate", place)
     spec = spec_of(spec_data(options), "ablate", Path.cwd())
-    refuse_tables(options.out, FILES)
+    for name in FILES:
+        refuse_foreign(options.out / name, beside=options.out / RUNS)
     records: list[AblationRecord] = []  # the latest record
     command = ["endotsr", "ablate", *map(without_folders, words)]
 

@@ -90,8 +90,7 @@ def _measure(options: TradeoffOptions) -> "DatedMeasurement":
     refuse_folder(out)
     if out.is_dir():
         refuse_read_only(out)
-    if not (out / RESULT).is_file():
-        refuse_foreign(out / PAGE)
+    refuse_foreign(out / PAGE, beside=out / RESULT)
     scene = chosen_scene(options)
     out.mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:

@@ -1,8 +1,8 @@
 """The marks by which endotsr recognises a file that it wrote, and may replace without being asked.
 
 In: the path of a file. Out: whether its content has the mark that endotsr writes into files of this kind. The name of a
-file says nothing about its origin. Films, exports and pages have a mark; a text such as `--json FILE` has none, and
-replaces any other text.
+file says nothing about its origin. Films, exports and pages have a mark. The tables of a sweep have none: their folder
+shows their origin. A text such as `--json FILE` has none either, and replaces any other text.
 """
 
 import io
@@ -40,13 +40,17 @@ def own(file: Path) -> bool:
     return not head or any(head.startswith(start) and mark in head for start, mark in MARKS)
 
 
-def refuse_foreign(file: Path | None, replace: bool | None = None, option: str = "") -> None:
-    """Raises InputError for an existing file that endotsr did not write.
+def refuse_foreign(
+    file: Path | None, replace: bool | None = None, option: str = "", beside: Path | None = None
+) -> None:
+    """Raises InputError for an existing file that endotsr did not write. Every command and function asks here.
 
     replace   whether the caller may replace it; None if the caller has no such option
     option    of the command that names the file, for the message; empty in Python
+    beside    for a file in a folder of results, which the user cannot name: the record or folder that endotsr creates
+              before it. Where this exists, endotsr wrote the file too
     """
-    if file is None or replace or not file.is_file():
+    if file is None or replace or not (file.is_file() or file.is_dir()) or (beside is not None and beside.exists()):
         return
     try:
         found = own(file)
@@ -55,7 +59,8 @@ def refuse_foreign(file: Path | None, replace: bool | None = None, option: str =
     if not found:
         named = f"{option} {file}".lstrip()
         permission = ", or --replace" if option else ", or replace=True"
-        remedy = "use another name" + ("" if replace is None else permission)
+        other = "use another name" if beside is None else "choose another --out"
+        remedy = other + ("" if replace is None else permission)
         raise InputError(f"{named}: exists already, and does not show that endotsr wrote it; {remedy}")
 
 

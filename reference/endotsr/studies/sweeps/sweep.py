@@ -10,7 +10,7 @@ or on a cluster. Out: the rows of the table in the order of the spec.
 import contextlib
 import shlex
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -25,6 +25,7 @@ from endotsr.studies.sweeps.spec import Spec
 from endotsr.training.runs.files import refuse_folder
 from endotsr.training.runs.folder import RunFolder
 from endotsr.training.runs.log import last_iteration
+from endotsr.untrusted.marks import refuse_foreign
 
 LOCK = "sweep.lock"
 Rows = list[RunRow]
@@ -106,15 +107,6 @@ def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> SweepPlan:
     return SweepPlan(jobs, rows, left, failed)
 
 
-def refuse_tables(out: Path, names: Iterable[str]) -> None:
-    """Raises InputError if a folder without runs of a sweep contains one of its tables, which would be replaced."""
-    found = [] if (out / RUNS).is_dir() else [name for name in names if (out / name).exists()]
-    if found:
-        raise InputError(
-            f"{out / found[0]}: exists already, and is not of a sweep in this folder; choose another --out"
-        )
-
-
 def run_sweep(
     spec: Spec,
     out: Path,
@@ -135,7 +127,8 @@ def run_sweep(
     """
     out = Path(out)
     refuse_folder(out)
-    refuse_tables(out, FILES)
+    for name in FILES:
+        refuse_foreign(out / name, beside=out / RUNS)
     (out / RUNS).mkdir(parents=True, exist_ok=True)
     with file_lock(out / LOCK, f"{out}: another process runs this sweep; wait until it ends, or stop it"):
         plan = planned(spec, out, inputs, retry)
