@@ -89,14 +89,23 @@ def run(words: list[str]) -> int:
 
 
 def _refuse_place(options: MasksOptions) -> None:
-    """Raises InputError, before the motion of the clip is computed, for a place where no masks can be written."""
+    """Raises InputError, before the motion of the clip is computed, for a place where no masks can be written, or
+    where they would replace or join the pictures or the masks of the key frames."""
     from endotsr.clips.sequences.sequence_file import MASKS
-    from endotsr.training.runs.files import refuse_folder, refuse_linked, refuse_read_only
+    from endotsr.training.runs.files import refuse_folder, refuse_inside, refuse_linked, refuse_nested, refuse_read_only
     from endotsr.untrusted.writing import refuse_existing
 
+    keys, place = options.keys, (options.out or options.sequence) / MASKS
+    if keys is not None and keys.exists() and keys.resolve().is_relative_to(place.resolve()):
+        raise InputError(
+            f"--keys {keys}: {place} would be replaced; copy the masks of the key frames to another folder"
+        )
     if options.out is None:
         refuse_linked(options.sequence / MASKS)
         return refuse_read_only(options.sequence)
+    refuse_nested(options.sequence, options.out, (MASKS,))
+    if keys is not None:
+        refuse_inside(options.out, keys, "the masks of the key frames")
     if not options.replace:
         refuse_existing(options.out)
     refuse_folder(options.out)

@@ -164,29 +164,17 @@ def run(words: list[str]) -> int:
 def _check_options(options: PrepareOptions, words: list[str]) -> None:
     """Raises InputError for an existing output, for wrong numbers, and for options that do not go together."""
     from endotsr.clips.sequences.layouts import layout_of
+    from endotsr.clips.sequences.sequence_file import WRITTEN
+    from endotsr.training.runs.files import refuse_nested
     from endotsr.untrusted.writing import refuse_existing
 
     if not options.replace:
         refuse_existing(options.out)
     _check_numbers(options)
-    _refuse_nested(options.source, options.out)
+    if options.source.resolve() != options.out.resolve():  # with --replace they may be the same one
+        refuse_nested(options.source, options.out, WRITTEN, f", or the source {options.out}")
     layout = layout_of(options.source, options.layout).name
     check_relations("prepare", PREPARE, options, given_names(PrepareOptions, words), {"layout": layout})
-
-
-def _refuse_nested(source: Path, out: Path) -> None:
-    """Raises InputError if one folder is inside the other; with --replace they may be the same one."""
-    from endotsr.clips.sequences.sequence_file import WRITTEN
-    from endotsr.training.runs.files import refuse_inside
-
-    inner, outer = source.resolve(), out.resolve()
-    if inner == outer:
-        return
-    refuse_inside(out, source, "the source")
-    if inner.is_relative_to(outer) and inner.relative_to(outer).parts[0] in WRITTEN:  # `new_folder` refuses all others
-        raise InputError(
-            f"{source}: is inside {out}, which would be replaced; choose another --out, or the source {out}"
-        )
 
 
 def _refuse_two_baselines(options: PrepareOptions, of_pair: bool) -> None:

@@ -200,6 +200,40 @@ def test_a_source_that_is_not_prepared_gets_its_masks_in_a_folder(tmp_path, caps
     assert "has no sequence.toml; use a folder that `endotsr prepare" in capsys.readouterr().err
 
 
+def files_in(folder: Path) -> dict[Path, bytes]:
+    return {file: file.read_bytes() for file in sorted(folder.rglob("*")) if file.is_file()}
+
+
+def test_proposed_masks_join_and_replace_no_input(tmp_path, capsys, monkeypatch):
+    """A proposal was written between the pictures, and keys inside the replaced masks were deleted."""
+    for name in ("raw/images", "keys", "earlier/masks/keys"):
+        (tmp_path / name).mkdir(parents=True)
+    for name in "abc":
+        write_png(tmp_path / f"raw/images/{name}.png", np.full((48, 64, 3), 90, np.uint8))
+    mask = np.pad(np.full((24, 20), 255, np.uint8), ((0, 24), (0, 44)))
+    for folder in ("keys", "earlier/masks", "earlier/masks/keys"):
+        write_png(tmp_path / folder / "a.png", mask)
+    (tmp_path / "earlier/proposal.json").write_text("{}")
+    written(tmp_path / "clip", masks=True)
+    write_png(tmp_path / "clip/masks/keys.png", mask)
+    monkeypatch.setattr("endotsr.clips.masks.make_masks.motion_of", lambda pictures: pytest.fail("too late"))
+    monkeypatch.chdir(tmp_path)
+    before = files_in(tmp_path)
+    replaced = "masks would be replaced; copy the masks of the key frames to another folder"
+    for source, keys, out, said in (
+        ("raw", "keys", "raw/o", "raw/o: is inside the source raw; choose an --out outside of it"),
+        ("raw/images", "keys", "raw/images", "raw/images: is inside the source raw/images; choose an --out outside"),
+        ("raw", "keys", "keys/o", "keys/o: is inside the masks of the key frames keys; choose an --out outside of it"),
+        ("earlier/masks", "keys", "earlier", "earlier/masks: is inside earlier, which would be replaced; choose an"),
+        ("raw", "earlier/masks", "earlier", f"--keys earlier/masks: earlier/{replaced}"),
+        ("raw", "earlier/masks/keys", "earlier", f"--keys earlier/masks/keys: earlier/{replaced}"),
+        ("clip", "clip/masks", None, f"--keys clip/masks: clip/{replaced}"),
+    ):
+        words = ["masks", source, "--keys", keys, "--replace", *(["--out", out] if out else [])]
+        assert main(words) == 2 and said in " ".join(capsys.readouterr().err.split()), words
+        assert files_in(tmp_path) == before
+
+
 def rows_of_the_page(column: int) -> dict[int, tuple[float, float]]:
     """Key distance -> (mean, worst) as printed in conventions, *Masks*."""
     page = (Path(__file__).parents[3] / "docs/specification/conventions.md").read_text(encoding="utf-8")

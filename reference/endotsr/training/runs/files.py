@@ -61,6 +61,18 @@ def refuse_inside(path: Path, data: Path, what: str) -> None:
         raise InputError(f"{path}: is inside {what} {data}; choose an --out outside of it")
 
 
+def refuse_nested(source: Path, out: Path, written: tuple[str, ...], other: str = "") -> None:
+    """Raises InputError if `out` is `source` or inside it, or if `source` would be replaced together with `out`.
+
+    written   names of what is replaced in `out`; `new_folder` refuses a folder with any other name
+    other     more advice for a source that would be replaced
+    """
+    refuse_inside(out, source, "the source")
+    inner, outer = Path(source).resolve(), Path(out).resolve()
+    if inner.is_relative_to(outer) and inner.relative_to(outer).parts[:1] in [(name,) for name in written]:
+        raise InputError(f"{source}: is inside {out}, which would be replaced; choose another --out{other}")
+
+
 def refuse_link(path: Path) -> None:
     """Raises InputError if `path` is a link, or exists and is no regular file: writing could change another file."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
