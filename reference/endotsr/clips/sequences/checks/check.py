@@ -43,6 +43,7 @@ from endotsr.clips.sequences.checks.frames import (
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
+from endotsr.clips.sequences.checks.specks import Specks
 from endotsr.clips.sequences.checks.split_tissue import SplitTissue, split_findings
 from endotsr.clips.sequences.checks.stereo import PairViews
 from endotsr.clips.sequences.checks.still_parts import StillParts
@@ -90,7 +91,7 @@ class _Pass:
         count = len(clip.images)
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
-        self.masks = MaskSteps()
+        self.masks, self.specks = MaskSteps(), Specks()
         self.view = FieldOfView()
         self.still = StillParts(count)
         self.depth: list[DepthFacts] = []
@@ -144,6 +145,7 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
         run.findings += run.still.findings(str(clip.images[0].parent))
     if clip.masks and clip.masks.files:
         run.findings += run.masks.findings(str(clip.masks.files[0].parent))
+        run.findings += run.specks.findings(str(clip.masks.files[0].parent))
     if run.depth and clip.depth:
         where, near = str(clip.depth.files[0].parent), config.raster.near
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
@@ -223,6 +225,7 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         run.frames.append(frame_facts(file.name, picture))
         tissue = _mask(clip, run, masks[i], i, size, levels)
         run.masks.add(i, tissue)
+        run.specks.add(i, tissue)
         run.view.add(picture, tissue)
         run.still.add(i, picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)

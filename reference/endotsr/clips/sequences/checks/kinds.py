@@ -120,6 +120,10 @@ KINDS: dict[str, Kind] = {
     "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
                         " held-out frame there is measured on pixels that training hardly sees",
                         f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
+    "speckled-masks": Kind("warning", "noise hides tissue all over the picture and leaves parts of the instrument in"
+                           " the training",
+                           "remove it by a median or an opening of the masks, as cv2.medianBlur(mask, 5), or smooth"
+                           " the picture before its threshold"),
     # depth
     "no-depth": Kind("refusal", "nothing can be placed in space",
                      f"a stereo pair: endotsr depth; {ONE_CAMERA}; empty files: check their scale"),
