@@ -2,10 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 from pages.store import program
 from pages.tradeoff import page as tradeoff
 from pages.tradeoff.parts import fragments, promise, scatter_of_equal, time_sentence
+from pages.tradeoff.text import advice
+
+from endotsr.studies.tradeoff.text import levels
 
 
 @pytest.fixture
@@ -28,6 +32,35 @@ def test_a_scene_on_which_the_advice_fails_is_named(result):
     made = fragments(result, {"other": other}, {})["scenes"]
     rows = [line for line in made.splitlines() if line.startswith("| simulated")]
     assert rows[0].endswith("holds |") and "does not hold" in rows[1]
+
+
+def row_of(result, rms: float, largest: float) -> str:
+    """The row of a scene with these errors of `paper` and of the 8-bit setting, in steps of 8 bits."""
+    other = json.loads(json.dumps(result))
+    other["lines"]["sensor_noise"] = None  # as of a trained scene
+    by_name = {p["name"]: p for p in other["points"]}
+    by_name[other["presets"]["paper"]]["error"]["rms"] = rms / 255
+    by_name["float32, cutoff 1e-4, stop 1e-6"]["error"]["max"] = largest / 255
+    return fragments(result, {"other": other}, {})["scenes"].splitlines()[3]
+
+
+def test_each_advice_is_held_against_what_it_promises(result):
+    """The RMS error against the sensor noise that the first names, the largest error against one level, not half."""
+    noise = 255 * result["lines"]["sensor_noise"]
+    advised = advice(result)
+    assert f"below the sensor noise of {levels(noise / 255)}" in advised[0]
+    assert "off by at most one level of 8 bits" in advised[1]
+    assert row_of(result, 0.99 * noise, 0.99).endswith("| holds |")
+    assert "not below the sensor noise |" in row_of(result, 1.01 * noise, 0.99)
+    failed = row_of(result, 0.4, 1.01)
+    assert "| does not hold: the 8-bit setting is off by more than one level: take float32" in failed
+
+
+def test_pictures_that_differ_by_less_than_a_step_are_off_by_at_most_one_level():
+    rng = np.random.default_rng(0)
+    exact = np.concatenate([rng.uniform(0, 254, 10_000), np.arange(254) + 0.5])
+    for error, most in ((0.5, 1), (0.999, 1), (1.5, 2)):
+        assert abs(np.rint(exact + error) - np.rint(exact)).max() == most
 
 
 def test_command_refuses_words_that_it_does_not_know(monkeypatch):

@@ -42,7 +42,10 @@ def advice(result: dict[str, Any]) -> list[str]:
 
 
 def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
-    """The cheapest float32 setting of the sweep whose largest error is below half a step of 8 bit."""
+    """The cheapest float32 setting of the sweep whose largest error is at most half a step of 8 bit.
+
+    Less than a whole step is off by at most one level: the half leaves a factor of two to other scenes and views.
+    """
     kept = [p for p in _joint(result, "float32") if p["error"]["max"] <= result["lines"]["eight_bit"]]
     return min(kept, key=lambda p: (p["visits"], p["error"]["max"]), default=None)
 

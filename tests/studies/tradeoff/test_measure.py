@@ -16,7 +16,7 @@ from endotsr.method.splatting.render import render_forward
 from endotsr.method.splatting.settings import PRESETS
 from endotsr.studies.bench.pairs import count_pairs
 from endotsr.studies.tradeoff.measure import errors, forward, frame, prepare, reverse, terms, upsampling
-from endotsr.studies.tradeoff.settings import ACCURATE, CLOSE
+from endotsr.studies.tradeoff.settings import ACCURATE, CLOSE, joint
 from endotsr.studies.tradeoff.study import cost_of, described
 from endotsr.training.fitting.model import scene_at
 
@@ -45,6 +45,14 @@ def test_every_error_of_the_chart_is_that_of_the_images(study):
             got = gradients[block] if block in gradients else 0 * wanted
             ratio = np.sqrt(((got - wanted) ** 2).sum() / (wanted**2).sum())
             assert value == pytest.approx(ratio, rel=1e-9, abs=1e-300), (point["name"], block)
+
+
+def test_errors_of_equal_renderings_are_equal_to_the_bit():
+    """The page compares errors without a scatter."""
+    scene = moving_scene(count=30, width=24)
+    setting = next(iter(joint(degree=3, near=scene.near).values()))
+    (one, _), (other, _) = (frame(prepare(scene, setting)) for _ in range(2))
+    assert one.colour.tobytes() == other.colour.tobytes()
 
 
 def test_the_study_is_json_and_its_names_resolve(study):
