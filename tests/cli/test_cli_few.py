@@ -9,7 +9,7 @@ from tiny import scene
 from endotsr.cli.main import main
 
 ONE_OF_MANY = re.compile(r"\b1 (?!less|ms|s\b)[a-z]+s\b")
-TOO_SHORT = "no training: it needs at least 3 frames, and the clip has {}; prepare more frames of its source"
+TOO_SHORT = "no training: {} too few: at least 3 are needed; prepare more frames of its source"
 
 
 def said(capsys, *words) -> str:
@@ -42,12 +42,13 @@ def test_no_message_says_1_frames(finished_run, tmp_path, capsys):
     assert "1 file of gaussians" in lines["files"] and "at 1 time," in lines["points"]
 
 
-@pytest.mark.parametrize(("frames", "named"), [("0:1", "1 frame"), ("0:2", "2 frames")])
+@pytest.mark.parametrize(("frames", "named"), [("0:1", "1 frame is"), ("0:2", "2 frames are")])
 def test_a_clip_that_is_too_short_for_a_training_is_told_so_where_one_comes_next(frames, named, tmp_path, capsys):
     clip = tmp_path / "clip"
     lines = said(capsys, "prepare", scene(), "--out", clip, "--frames", frames).splitlines()
     assert lines[-1] == TOO_SHORT.format(named) and "endotsr train" not in "\n".join(lines)
-    assert "refused" in said(capsys, "check", clip).splitlines()[-1], "as check says"
+    checked = said(capsys, "check", clip)
+    assert "refused" in checked.splitlines()[-1] and f": {named} too few: at least 3 are needed; " in checked
     lines = said(capsys, "depth", clip, "--flat", "--replace").splitlines()
     assert lines[-1] == TOO_SHORT.format(named)
     assert said(capsys, "prepare", scene(), "--out", tmp_path / "three", "--frames", "0:3").splitlines()[-1] == (
@@ -57,6 +58,6 @@ def test_a_clip_that_is_too_short_for_a_training_is_told_so_where_one_comes_next
 
 def test_pictures_that_are_too_small_for_a_training_are_named(tmp_path, capsys):
     lines = said(capsys, "prepare", scene(), "--out", tmp_path / "clip", "--crop", "0", "0", "40", "14").splitlines()
-    assert lines[-1] == (
-        "no training: it needs at least 16 pixels on each side, and the pictures have 40x14; prepare larger ones"
-    )
+    words = "images of 40x14 pixels; allowed: at least 16 on each side"
+    assert lines[-1] == f"no training: {words}; prepare larger ones"
+    assert f"{words}; " in said(capsys, "check", tmp_path / "clip"), "as check says"

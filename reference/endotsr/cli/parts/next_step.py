@@ -4,9 +4,8 @@ import shlex
 from pathlib import Path
 
 from endotsr.clips.sequences.sequence_file import SequenceFile
-from endotsr.clips.sequences.smaller import LEAST_SIDE
-from endotsr.clips.sequences.splits import LEAST_FRAMES
-from endotsr.untrusted.names import counted
+from endotsr.clips.sequences.smaller import too_small
+from endotsr.clips.sequences.splits import too_few
 
 
 def training_step(folder: Path, file: SequenceFile) -> str:
@@ -15,16 +14,8 @@ def training_step(folder: Path, file: SequenceFile) -> str:
 
 
 def obstacle(file: SequenceFile) -> str:
-    """Why the size of a clip permits no training, as `check` refuses it; "" if it permits one."""
-    camera = file.camera
-    if file.frames < LEAST_FRAMES:
-        return (
-            f"no training: it needs at least {LEAST_FRAMES} frames, and the clip has {counted(file.frames, 'frame')};"
-            " prepare more frames of its source"
-        )
-    if min(camera.width, camera.height) < LEAST_SIDE:
-        return (
-            f"no training: it needs at least {LEAST_SIDE} pixels on each side, and the pictures have"
-            f" {camera.width}x{camera.height}; prepare larger ones"
-        )
-    return ""
+    """Why the size of a clip permits no training, in the words of `check` and `train`; "" if it permits one."""
+    if few := too_few(file.frames):
+        return f"no training: {few}; prepare more frames of its source"
+    small = too_small(file.camera.width, file.camera.height)
+    return f"no training: {small}; prepare larger ones" if small else ""

@@ -106,14 +106,19 @@ def end_of_clip(count: int, length: int) -> tuple[IndexArray, IndexArray]:
     return index[:first], index[first:]
 
 
+def too_few(count: int) -> str:
+    """Why a training needs more frames than `count`; "" if these suffice."""
+    number = "1 frame is" if count == 1 else f"{count} frames are"
+    return f"{number} too few: at least {LEAST_FRAMES} are needed" if count < LEAST_FRAMES else ""
+
+
 def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray, IndexArray]:
     """The split named in the configuration.
 
     Raises:  InputError if there are fewer than 3 frames, fewer than 2 training frames, or no block fits.
     """
-    if count < LEAST_FRAMES:
-        number = "1 frame is" if count == 1 else f"{count} frames are"
-        raise InputError(f"{number} too few: at least {LEAST_FRAMES} are needed")
+    if few := too_few(count):
+        raise InputError(few)
     if split == "blocks":
         train, test = blocks(count, block_length)
     elif split == "end":
