@@ -207,7 +207,7 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     prune_opacity: Fraction = 0.005
     """remove Gaussians with a lower opacity"""
     maximum: PositiveCount = 400_000
-    """largest number of Gaussians; with a budget, the number after the last densification"""
+    """no Gaussian is added beyond this number; a budget grows to it if enough Gaussians have a gradient"""
 
 
 class InitialisationConfig(Section, frozen=True, kw_only=True):

@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 from made_up_scenes import FIELDS, as_dtype, assert_bitwise, assert_close, assert_finite, run, select
 from scipy.spatial.transform import Rotation
 
+from endotsr.method.splatting.binning import screen_boxes
+from endotsr.method.splatting.projection import Projected
 from endotsr.method.splatting.render import Scene
 from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
 from properties.strategies import CAMERA, HIDDEN, RASTER, SEEDS, Y00, scenes
@@ -159,3 +161,16 @@ def test_the_dtype_of_the_scene_is_that_of_every_result(scene, how):
     wide = as_dtype(scene, np.float64)
     for group in run(wide, CAMERA, settings, path, background=BACKGROUND):
         assert all(a.dtype == np.float64 for a in group.values())
+
+
+@given(st.floats(0.3, 1e4), st.floats(0.3, 1e4), st.floats(-1, 1), st.floats(-5, 60), st.floats(-5, 60))
+@example(0.999999, 0.3, 0.0, 30.4999, 20.5)  # 0.13 of the opacity is cut
+def test_the_tiles_of_three_sigma_cut_less_than_an_e_squared_th(a, c, correlation, u, v):
+    """Specification B5: towards larger indices the tiles can end a pixel inside the radius, which is at least 3."""
+    b = 0.999 * correlation * np.sqrt((a - 0.3) * (c - 0.3))  # the low-pass is included in a and c
+    one = [np.array([x]) for x in ((u, v), (a, b, c), a * c - b * b, 1.0, True)]
+    box, _ = screen_boxes(Projected(one[0].T, one[1].T, *one[2:]), np.zeros(1), LEGACY, 64, 64)
+    dy, dx = np.mgrid[:64, :64] + 0.5 - np.array([v, u])[:, None, None]
+    value = np.exp(-(c * dx**2 - 2 * b * dx * dy + a * dy**2) / (a * c - b * b) / 2)
+    value[box[0, 2] : box[0, 3] + 1, box[0, 0] : box[0, 1] + 1] = 0
+    assert value.max() < np.exp(-2)

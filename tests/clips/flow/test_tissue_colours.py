@@ -88,3 +88,10 @@ def test_the_nearest_pixel_is_nearest_within_two_percent(seed):
     away = lambda y, x: np.hypot(y - rows, x - columns)
     least = np.min([away(y, x) for y, x in known], axis=0)
     assert not missing[tuple(found)].any() and (away(*found) <= 1.02 * least + 1e-9).all()
+
+
+def test_the_frame_itself_is_one_of_the_nearest(monkeypatch):
+    monkeypatch.setattr(module, "NEAREST", 2)
+    excluded = masks(4)
+    excluded[1, 0] = excluded[0, 0] = False
+    assert (tissue_colours(clip(excluded), 1)[:, 0] == 11).all(), "of the row below: frame 2 is the third"

@@ -93,6 +93,8 @@ def test_pairs_have_both_directions_and_the_gaps():
     pairs = {tuple(pair) for pair in pairs_of(20).tolist()}
     assert {abs(a - b) for a, b in pairs} == {1, 4, 16}
     assert {(b, a) for a, b in pairs} == pairs
+    starts = {gap: sorted(a for a, b in pairs_of(40).tolist() if b - a == gap) for gap in (1, 4, 16)}
+    assert starts == {1: [*range(39)], 4: [*range(0, 36, 2)], 16: [0, 8, 16]}, "a gap begins at every frame, 2nd, 8th"
     assert pairs_of(1).shape == (0, 2)
 
 

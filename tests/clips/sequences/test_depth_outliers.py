@@ -79,3 +79,13 @@ def test_a_training_removes_them_only_if_configured(folder):
 def test_check_names_the_frame_and_the_setting(folder):
     (found,) = [finding for finding in check_sequence(folder, PAPER).findings if finding.code == "depth-outliers"]
     assert f"frame {FAR} (" in found.what and "sequence.depth_outliers" in found.remedy
+
+
+def test_the_limits_of_held_out_frames_count(folder):
+    """Frame 3 is a training frame; without the depth of frame 1, which is held out, it has three limits around it."""
+    sequence = read_sequence(folder, SequenceConfig(depth_outliers="removed"))
+    assert sequence.test_index.tolist() == [1] and not sequence.depth[FAR, :, :8].any()
+    for frame in (0, 1):
+        file = sorted((folder / "depth").iterdir())[frame]
+        cv2.imwrite(str(file), np.zeros_like(cv2.imread(str(file), cv2.IMREAD_UNCHANGED)))
+    assert read_sequence(folder, SequenceConfig(depth_outliers="removed")).depth[FAR, :, :8].any()

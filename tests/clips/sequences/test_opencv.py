@@ -3,10 +3,20 @@
 import subprocess
 import sys
 
+import cv2
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import area_resize, canny_edges, dense_flow, grown, read_png, warp_bilinear, write_png
+from endotsr.clips.opencv import (
+    area_resize,
+    canny_edges,
+    dense_flow,
+    grown,
+    read_png,
+    warp_bilinear,
+    warp_cubic,
+    write_png,
+)
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.errors import InputError
 
@@ -141,3 +151,22 @@ def test_a_grown_mask_holds_the_pixels_within_the_radius(pixels):
     squared = ((rows[..., None] - y) ** 2 + (columns[..., None] - x) ** 2).min(axis=2)
     np.testing.assert_array_equal(grown(mask, pixels), squared <= pixels**2)
     assert not grown(np.zeros((5, 5), bool), pixels).any()
+
+
+def test_the_bicubic_warp_is_the_kernel_of_keys_with_three_quarters():
+    """Specification B14. OpenCV 4 rounds the position to 1/32 pixel, OpenCV 5 does not."""
+
+    def kernel(s, a=-0.75):
+        s = abs(s)
+        return (a + 2) * s**3 - (a + 3) * s**2 + 1 if s < 1 else a * (s**3 - 5 * s**2 + 8 * s - 4) if s < 2 else 0.0
+
+    impulse = np.zeros((9, 9), np.float32)
+    impulse[4, 4] = 1
+    for step in (1, 9, 16, 31):
+        for nudge in (0, 0.01):
+            flow = np.zeros((2, 9, 9), np.float32)
+            flow[0] = (step + nudge) / 32
+            rounded = int(cv2.__version__.split(".")[0]) < 5
+            place = (step if rounded else step + nudge) / 32
+            expected = [kernel(x + place - 4) for x in range(9)]
+            np.testing.assert_allclose(warp_cubic(impulse, flow)[4], expected, atol=1e-6)

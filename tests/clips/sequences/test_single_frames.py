@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from endotsr.clips.sequences.mask_polarity import check_single_masks
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -98,3 +99,18 @@ def test_hard_E6_a_depth_picture_on_another_scale_is_noted(tmp_path):
     cv2.imwrite(str(tmp_path / "depth" / "frame-000002.depth.png"), written.depth[2] * np.uint16(10))
     notes = read_sequence(tmp_path, EVERYTHING).notes
     assert any("depth-far-off: frame 2: median of frame-000002.depth.png is" in note for note in notes)
+
+
+def test_one_mask_against_its_picture_is_wrong_if_the_pictures_support_more_masks_than_they_contradict():
+    """The other pictures may say nothing: two that support their masks are more than one that contradicts its own."""
+    masks = np.zeros((10, 40, 40), bool)
+    masks[:, :, :24] = True
+    masks[:2] = ~masks[:2]  # two in a row, so that neither differs from both of its neighbours
+    images, depth = np.full((10, 3, 40, 40), 100, np.uint8), np.ones((10, 40, 40))
+    names = [f"masks/{k}.png" for k in range(10)]
+    images[0, 0, :, :24] = 180
+    for supporting in (1, 2):
+        images[3 + supporting, 0, :, :24] = 180
+        notes = check_single_masks(masks, depth, images, names, allow=True)
+        found = [note for note in notes if "masks/0.png" in note and "red minus blue" in note]
+        assert bool(found) is (supporting == 2)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from endotsr.definition import calibration as definition
+from endotsr.definition.masked_ssim import ssim_target
+from endotsr.definition.objective import Targets, photometric_loss
 from endotsr.errors import CalibrationError
 from endotsr.method.equations.calibration import calibrate, calibration_views, rms
 from endotsr.method.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
@@ -87,3 +89,25 @@ def test_refused_ratio():
     for ratio in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="ratio"):
             calibrate(views([(1.0, 1.0)]), ratio)
+
+
+def ratio(mask, right, below):
+    """RMS of the Laplacian gradient over that of the photometric one, with excluded pixels appended to the images."""
+    rng = np.random.default_rng(4)
+    observed = rng.random((3, *mask.shape))
+    rendered = observed + 0.1 * rng.normal(size=observed.shape)
+    pad = ((0, below), (0, right))
+    mask, (rendered, observed) = np.pad(mask, pad), (np.pad(a, ((0, 0), *pad)) for a in (rendered, observed))
+    _, saved = laplacian_loss_forward(rendered, observed, support_masks(mask))
+    target = ssim_target(observed, mask)
+    _, _, photometric = photometric_loss(rendered, Targets(target.image, mask, target, None, None), 0.1)
+    return rms(laplacian_loss_reverse(1.0, saved)) / rms(photometric)
+
+
+@pytest.mark.parametrize("size", [(48, 52), (47, 51)])
+def test_hard_K2_pixels_appended_to_excluded_ones_do_not_change_the_weight(size):
+    """At a border of tissue they do: the pyramid reflects there, and beside excluded pixels it has no valid values."""
+    mask = np.ones(size, bool)
+    assert abs(ratio(mask, 9, 7) / ratio(mask, 0, 0) - 1) > 0.01
+    mask[-1], mask[:, -1] = False, False
+    assert ratio(mask, 9, 7) == pytest.approx(ratio(mask, 0, 0), rel=1e-12)

@@ -167,3 +167,19 @@ def test_refused_input():
         motion_forward(coefficients, atoms[:-1])
     with pytest.raises(ValueError, match="d_out"):
         motion_reverse(upstream[:, :-1], motion_forward(coefficients, atoms)[1])
+
+
+@pytest.mark.parametrize("beta", [0.01, 0.3, 3.0, 100.0])
+def test_the_slope_of_a_saturated_residual_is_bounded_in_proportion_to_beta(beta):
+    for dtype, bound in ((np.float32, 2e-37), (np.float64, 1e-306)):
+        coefficients = np.full((3, 2, 1), 1e4, dtype)
+        _, saved = appearance_forward(coefficients, np.ones(2, dtype), beta)
+        slope = appearance_reverse(np.ones((3, 1), dtype), saved).d_appearance_coefficients.max()
+        assert 0 <= slope <= bound * beta
+
+
+def test_between_two_times_a_colour_changes_by_up_to_twice_beta():
+    coefficients = np.full((3, 2, 1), 40.0)
+    one, other = (Y00 * appearance_forward(coefficients, np.full(2, at), BETA)[0] for at in (1.0, -1.0))
+    assert np.abs(one).max() == pytest.approx(BETA, rel=1e-15)
+    assert np.abs(one - other).max() == pytest.approx(2 * BETA, rel=1e-15)

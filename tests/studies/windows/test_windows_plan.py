@@ -144,3 +144,18 @@ def test_a_record_that_was_edited_is_refused_by_name(tmp_path, changes, words):
     (tmp_path / FILE).write_text(json.dumps(data), encoding="utf-8")
     with pytest.raises(InputError, match=words):
         read_record(tmp_path)
+
+
+def test_the_place_of_a_beginning_is_rounded_up_to_a_frame_and_then_down_to_the_period():
+    """Half of the densities of 31 frames end at 15.5: the window begins at 16, a multiple of 8, and not at 8."""
+    assert spans(frames(39), Wanted(24, 8))[0] == [(0, 24), (16, 39)]
+
+
+def test_a_last_window_of_fewer_than_16_frames_is_part_of_the_one_before_it():
+    """Also with a short overlap, of which 8 frames more would be fewer than 16."""
+    assert spans(frames(37), Wanted(18, 2))[0] == [(0, 37)]
+    assert spans(frames(33), Wanted(18, 2))[0] == [(0, 18), (16, 33)]
+
+
+def test_a_section_with_too_few_frames_for_the_split_has_no_window():
+    assert spans(frames(16), AUTO, SequenceConfig(split="blocks")) == ([], [(0, 16)])

@@ -290,3 +290,15 @@ def test_a_slim_model_holds_the_corrected_cameras_and_no_correction(disturbed, r
         np.testing.assert_array_equal(found.rotation, camera.rotation)
         np.testing.assert_array_equal(found.translation, camera.translation)
         assert not np.array_equal(found.translation, given.translation)
+
+
+def test_without_a_gaussian_a_step_changes_the_parameters_of_frames_alone(dimmed):
+    """All are pruned: the render is black, and the biases still move towards the frames."""
+    config = msgspec.structs.replace(settings("exposure", True), density=DensityConfig(start=0, interval=1, until=3,
+                                                                                       prune_opacity=1.0))  # fmt: skip
+    state, constants = new_training(dimmed, config), training_constants(dimmed, config)
+    training_step(state, constants)
+    assert state.gaussians.count == 0 and state.frames is not None
+    before = state.frames.exposure_bias.copy()
+    training_step(state, constants)
+    assert state.gaussians.count == 0 and (state.frames.exposure_bias != before).any()

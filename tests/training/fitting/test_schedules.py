@@ -211,3 +211,17 @@ def test_tracked_motion_and_parts_that_are_off_are_not_missed():
     assert schedules.phases_never_reached(bare) == []
     coarse = with_settings(QUICK, density={"until": 0})
     assert schedules.phases_never_reached(coarse) == ["the coarse start, which ends at density.until = 0"]
+
+
+def test_tracked_motion_without_an_activation_keeps_its_first_rate():
+    config = with_settings(PAPER, initialisation={"motion": "flow"}, training={"residual_activation": 6000})
+    first = PAPER.optimiser.deformation * PAPER.optimiser.spectral_motion_factor
+    for iteration in (1, 3000, 6000):
+        rates = learning_rates(iteration, config)
+        assert rates["motion_coefficients"] == first and "appearance_coefficients" not in rates
+
+
+def test_milestones_round_halves_to_even():
+    """9 of 6000 iterations: 1.5 rounds to 2, and 4.5 to 4."""
+    short = with_iterations(PAPER, 9)
+    assert (short.loss.laplacian_from, short.training.residual_activation) == (2, 4)

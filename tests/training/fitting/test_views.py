@@ -44,3 +44,10 @@ def test_one_training_frame_has_no_time_to_bridge():
     training = msgspec.structs.replace(PAPER.training, bridge_fraction=1.0)
     view, _ = drawn_view(np.random.default_rng(3), sequence, training)  # type: ignore[arg-type]
     assert view == (2, 2 / 8, None)
+
+
+def test_midway_between_two_frames_the_earlier_is_the_nearer():
+    index, t = _draws(4000, bridge_fraction=1.0)
+    halves = np.array([1, 2.5, 3.5, 5.5])
+    for earlier, place in zip(TRAIN, halves):
+        assert set(index[np.isclose(t * 8, place)]) == {earlier}

@@ -314,3 +314,13 @@ def test_moments_of_other_arrays_are_left_alone(scene):
     regather(adam, arrays(gaussians), plan.source, plan.survivors)
     assert adam.first["exposure_bias"] is other is adam.second["exposure_bias"] and adam.step == steps
     assert adam.first["position"].shape == (3, 7)
+
+
+def test_a_budget_at_most_doubles_the_number(rng):
+    """Each candidate adds one Gaussian, so a budget with more room than candidates does not reach `maximum`."""
+    gaussians, adam = make(rng, 12)
+    gaussians.opacity_logit[:] = 0.0
+    statistics = empty_statistics(12)
+    statistics.visits[:], statistics.gradient_sum[:] = 1, 1e-9
+    budget = msgspec.structs.replace(CONFIG, growth="budget", maximum=1000)
+    assert run(gaussians, adam, statistics, budget, remaining=1).gaussians.count == 24

@@ -1,7 +1,7 @@
 """Dense flows between the neighbouring frames of a clip, kept in a cache between commands.
 
 The masks of a clip are drawn in rounds, which carry them along the same flows. Flows are stored in steps of 1/32 px, to
-which OpenCV rounds the positions of a warp, and take half the space of float32. In: pictures in time order. Out:
+which OpenCV 4 rounds the positions of a warp, and take half the space of float32. In: pictures in time order. Out:
 `ClipFlows`. The cache is a folder of the user's cache directory; `endotsr --cache` shows and removes it. The flows of a
 missing or damaged file are computed; a failure to write one is no error.
 """

@@ -134,7 +134,7 @@ def warp_cubic(image: Array, flow: Array) -> NDArray[np.float32]:
     flow     (2, H, W) pixels, x first
     returns  float32 of the same shape; values may overshoot the range of the image
 
-    OpenCV rounds positions to 1/32 pixel, which is finer than the accuracy of any flow.
+    OpenCV 4 rounds positions to 1/32 pixel, and OpenCV 5 does not. The kernel is that of Keys with a = -3/4.
     """
     cv2 = _cv2()
     height, width = image.shape[-2:]
@@ -152,7 +152,7 @@ def warp_bilinear(image: Array, flow: Array) -> Array:
     flow     (2, H, W) pixels, x first
     returns  (..., H, W), dtype of the image
 
-    Plain NumPy, because OpenCV's remap rounds positions to 1/32 pixel.
+    Plain NumPy, because the remap of OpenCV 4 rounds positions to 1/32 pixel.
     """
     height, width = image.shape[-2:]
     return sample_bilinear(image, np.arange(width)[None, :] + flow[0], np.arange(height)[:, None] + flow[1])
@@ -166,7 +166,7 @@ def gaussian_blur(plane: Array, deviation: float) -> NDArray[np.float32]:
 def warp_mask(mask: Array, flow: Array, place: tuple[slice, slice]) -> NDArray[np.float32]:
     """A soft mask (H, W) at y + flow[1], x + flow[0], bilinear; beyond the border, the nearest value.
 
-    OpenCV rounds positions to 1/32 pixel, which is finer than the accuracy of any flow.
+    OpenCV 4 rounds positions to 1/32 pixel, and OpenCV 5 does not.
 
     flow     (2, h, w) px of the pixels of `place`
     place    rows and columns, h and w of them

@@ -44,7 +44,7 @@ class Bundle(NamedTuple):
 
 
 def pairs_of(count: int, gaps: tuple[int, ...] = GAPS) -> NDArray[np.intp]:
-    """(P, 2) source and target: pairs with these gaps, in both directions. Wide gaps begin at every second frame."""
+    """(P, 2) source and target: pairs with these gaps g, in both directions, from every max(1, g // 2)-th frame on."""
     found = []
     for gap in gaps:
         for i in range(0, count - gap, max(1, gap // 2)):
