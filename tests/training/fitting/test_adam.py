@@ -233,3 +233,12 @@ def test_fused_step_refuses_arrays_that_disagree(rng):
     ):
         with pytest.raises(ValueError, match=f"^{kind}fdm_width: expected C-contiguous"):
             deformation_adam_step(out, curves, saved, broken, rates, *BETAS)
+
+
+def test_a_frame_midway_between_two_time_bases_moves_their_weights_and_hardly_its_own_offset():
+    """Specification B1: with the first widths of `paper`, the basis value there is below 1e-10."""
+    basis = np.exp(-(((1 / 32) ** 2 / 2e-4) ** 2))
+    weight = np.zeros(1)
+    state = adam_state({"w": weight})
+    adam_update(state, {"w": weight}, {"w": np.full(1, 1e-4 * basis)}, {"w": 1.6e-3}, *BETAS)
+    assert basis < 1e-10 and abs(weight[0]) > 0.8 * 1.6e-3 and abs(weight[0] * basis) < 1e-12

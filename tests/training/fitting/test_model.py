@@ -169,3 +169,11 @@ def test_a_scene_that_is_not_finite_is_refused(gaussians):
     gaussians.opacity_logit[4] = np.nan
     with pytest.raises(ValueError, match=r"opacity_logit\[4\]"):
         render_at(gaussians, SPECTRAL, CONFIG, CAMERA, T)
+
+
+def test_what_is_not_finite_in_the_deformation_is_named_where_it_arrives(gaussians):
+    """`render_at` looks at the deformed scene, before the render."""
+    weight = gaussians.fdm_weight.copy()
+    weight[1, 0, 3] = np.nan
+    with pytest.raises(ValueError, match=r"^position\[1, 3\] is nan"):
+        render_at(gaussians._replace(fdm_weight=weight), spectral_from(MODEL, TIMES), CONFIG, CAMERA, 0.0)
