@@ -8,8 +8,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
+from numba.core.caching import IndexDataCacheFile
 
 import endotsr
+from endotsr.method.kernels.jit import jit
 from endotsr.method.kernels.kernel_cache import kernel_folder, kernel_source_hash, kernel_sources
 
 PACKAGE = Path(endotsr.__file__).parent
@@ -67,10 +70,9 @@ def test_another_installation_of_the_same_sources_compiles_nothing(tmp_path):
     assert found[0] == found[1] and found[0][1]
 
 
-def test_a_chosen_folder_holds_the_kernels_of_every_version(tmp_path, monkeypatch):
+def test_a_chosen_folder_holds_the_kernels_of_every_version(folder):
     """In NUMBA_CACHE_DIR too, so an edit is not stale there either."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert kernel_folder() == tmp_path / kernel_source_hash()
+    assert kernel_folder() == folder / kernel_source_hash()
 
 
 def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_sources(tmp_path):
@@ -83,6 +85,59 @@ def test_a_cache_that_cannot_be_written_is_said_and_none_grows_beside_the_source
     assert line.startswith(f"endotsr: warning: {tmp_path / 'no_folder'}") and "recompiled at every start" in line
     assert "set NUMBA_CACHE_DIR" in line
     assert not list((tmp_path / "endotsr").rglob("*.nb?"))
+
+
+def plus_one(x):
+    """A kernel whose result tells the dtype that it was compiled for."""
+    return x + 1
+
+
+FINE = 0.1  # no float32 has this value
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_two_processes_that_save_at_once_never_give_one_name_to_two_dtypes(folder):
+    """Both have read the index before one of them writes it, and the one whose index stays writes its code first."""
+    single, double = jit(plus_one), jit(plus_one)
+    files, before = single._cache._cache_file, double._cache._cache_file
+    save_data = files._save_data
+
+    def save_after_the_other(name, data):
+        before._load_index = dict
+        double(1.0)
+        save_data(name, data)
+
+    files._save_data = save_after_the_other
+    single(np.float32(1))
+    found = jit(plus_one)
+    assert found(FINE) == 1 + FINE and found.stats.cache_hits
+
+
+@pytest.mark.parametrize("part", [0.0, 0.5])
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_a_damaged_file_is_compiled_again(folder, ending, part):
+    """As a crash of the system leaves it."""
+    jit(plus_one)(1.0)
+    (file,) = folder.rglob(f"*.{ending}")
+    content = file.read_bytes()
+    file.write_bytes(content[: int(part * len(content))])
+    again = jit(plus_one)
+    assert again(FINE) == 1 + FINE and not again.stats.cache_hits
+    found = jit(plus_one)
+    assert found(FINE) == 1 + FINE and found.stats.cache_hits
+
+
+def test_a_full_disk_stops_no_kernel(folder, monkeypatch):
+    def full(self, key, data):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", full)
+    assert jit(plus_one)(1.0) == 2.0 and not list(folder.rglob("*.nb?"))
 
 
 def test_every_file_that_compiles_is_under_the_hash():

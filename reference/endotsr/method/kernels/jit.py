@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import numba
 
-from endotsr.method.kernels.kernel_cache import use_kernel_folder
+from endotsr.method.kernels.kernel_cache import KernelCache, use_kernel_folder
 
 # Numba's parallel loops, which no kernel uses, need semaphores; without /dev/shm it warns when it prepares them.
 warnings.filterwarnings("ignore", message="Could not obtain multiprocessing lock", module=r"numba\.")
@@ -37,11 +37,12 @@ def jit(function: F, *, contract: bool = False) -> F:
     contract   allow fused multiply-add; for the fast path only
     """
     compiled: Any = numba.njit(
-        cache=True,
         nogil=True,
         error_model="numpy",  # 1/0 is inf as in NumPy: one meaning with the JIT on or off
         fastmath={"contract"} if contract else False,
     )(function)
+    if hasattr(compiled, "_cache"):  # not with the JIT off
+        compiled._cache = KernelCache(function)
     return compiled  # typed as the function it was compiled from
 
 

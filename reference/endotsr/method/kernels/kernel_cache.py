@@ -5,10 +5,12 @@ for each installation. Here the name of the folder contains a hash of all kernel
 place of its file in the package. An edited kernel is compiled again; another environment or clone with the same sources
 reads what is compiled.
 
-The folder is in the user's cache, or in NUMBA_CACHE_DIR.
+The folder is in the user's cache, or in NUMBA_CACHE_DIR. Processes may write to it at once, and a file that a crash of
+the system damaged counts as absent: its kernel is compiled again.
 """
 
 import atexit
+import contextlib
 import functools
 import hashlib
 import os
@@ -16,11 +18,13 @@ import re
 import shutil
 import sys
 import tempfile
+import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numba
-from numba.core.caching import CacheImpl, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 
 _PACKAGE = Path(__file__).parents[2]
 _COMPILES = re.compile(
@@ -75,21 +79,77 @@ def kernel_folder() -> Path:
     return (Path(chosen) if chosen else Path(user_cache_dir("endotsr")) / "kernels") / kernel_source_hash()
 
 
-class _PackageLocator(UserProvidedCacheLocator):
-    """The place of a kernel of this package; other functions keep the places that Numba gives them."""
+@functools.cache
+def _digest(file: Path) -> str:
+    """SHA-256 of the content; "" for what is no file, as a cell of a notebook."""
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+
+
+class _Locator(UserProvidedCacheLocator):
+    """The place of a kernel: that of its file in the package."""
 
     def __init__(self, py_func: Callable, py_file: str) -> None:
-        self._py_file = py_file
-        self._lineno = py_func.__code__.co_firstlineno
-        self._cache_path = str(kernel_folder() / Path(py_file).parent.relative_to(_PACKAGE))
+        file = Path(py_file)
+        self._code, self._lineno = py_func.__code__, py_func.__code__.co_firstlineno
+        inside = file.parent.relative_to(_PACKAGE) if file.is_relative_to(_PACKAGE) else Path("others")
+        self._cache_path = str(kernel_folder() / inside)
 
     @classmethod
-    def from_function(cls, py_func: Callable, py_file: str) -> "_PackageLocator | None":
-        return cls(py_func, py_file) if Path(py_file).is_relative_to(_PACKAGE) else None
+    def from_function(cls, py_func: Callable, py_file: str) -> "_Locator":
+        return cls(py_func, py_file)
 
     def get_source_stamp(self) -> str:
-        """The content of the file, because its time differs between installations."""
-        return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+        """The content of the file, because its time differs between installations; without a file, the function."""
+        code = self._code
+        return (
+            _digest(Path(code.co_filename)) or hashlib.sha256(repr((code.co_code, code.co_consts)).encode()).hexdigest()
+        )
+
+
+class _Places(CompileResultCacheImpl):
+    """The place of a kernel is that of `_Locator` and no other, such as a folder beside the sources."""
+
+    _locator_classes: ClassVar[list[type]] = [_Locator]
+
+
+class _Files(IndexDataCacheFile):
+    """The files of one kernel: an index, and one file for each combination of dtypes.
+
+    Numba numbers the files by the index that it has read. Two processes that save different dtypes at once would give
+    one name to both, and a later process would load the code of the wrong one. An empty or cut file can raise almost
+    any exception when it is read.
+    """
+
+    def _data_name(self, number: int) -> str:
+        """A name that no other process uses."""
+        return f"{Path(self._index_name).stem}.{uuid.uuid4().hex[:12]}.nbc"
+
+    def _load_index(self) -> dict[Any, str]:
+        with contextlib.suppress(Exception):
+            return super()._load_index()
+        return {}
+
+    def load(self, key: Any) -> Any:
+        """The compiled code of a key; None if it is not there, or damaged."""
+        with contextlib.suppress(Exception):
+            return super().load(key)
+        return None
+
+
+class KernelCache(FunctionCache):
+    """The kept code of one kernel, in `kernel_folder`."""
+
+    _impl_class = _Places
+
+    def __init__(self, py_func: Callable) -> None:
+        super().__init__(py_func)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, stamp)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep compiled code; on a full disk it serves this process alone."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
 
 
 def use_kernel_folder() -> None:
@@ -97,11 +157,10 @@ def use_kernel_folder() -> None:
     folder = kernel_folder()
     if not _takes_files(folder):
         _use_passing_folder(folder)
-    CacheImpl._locator_classes.insert(0, _PackageLocator)
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether files can be created there. If not, Numba would silently cache next to the sources, without the hash."""
+    """Whether files can be created there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
