@@ -3,6 +3,7 @@
 import pytest
 from tiny_sweep import BASE, CONFIGURATIONS, write_spec
 
+from endotsr.cli.main import main
 from endotsr.config import PAPER, SequenceConfig
 from endotsr.errors import InputError
 from endotsr.studies.sweeps.jobs import jobs_of
@@ -13,6 +14,13 @@ START = """
 start = { configuration = "base", iteration = 15 }
 model = { spectral_motion = false }
 """
+
+
+def test_a_sequence_that_is_refused_leaves_no_folder(tmp_path, capsys):
+    spec = write_spec(tmp_path, BASE.replace("seeds = [0, 1]", 'seeds = [0]\nsplits = ["blocks 8"]') + CONFIGURATIONS)
+    assert main(["sweep", str(spec), "--out", str(tmp_path / "out")]) == 2
+    assert "no held-out block of 8 frames fits into" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_runs_are_all_combinations_with_their_settings(tmp_path):

@@ -129,6 +129,8 @@ def run_sweep(
     refuse_folder(out)
     for name in FILES:
         refuse_foreign(out / name, beside=out / RUNS)
+    if not out.exists():
+        planned(spec, out, inputs, retry)  # a sequence that is refused leaves no folder
     (out / RUNS).mkdir(parents=True, exist_ok=True)
     with file_lock(out / LOCK, f"{out}: another process runs this sweep; wait until it ends, or stop it"):
         plan = planned(spec, out, inputs, retry)
