@@ -46,6 +46,15 @@ def test_a_run_is_not_shortened_and_keeps_its_other_settings(words, named, run_c
     assert (run_copy / "config.toml").read_text() == before
 
 
+def test_no_extension_is_stated_that_is_refused(run_copy, capsys):
+    """The settings were edited: the checkpoint is of others."""
+    file = run_copy / "config.toml"
+    file.write_text(file.read_text().replace("ssim_weight = 0.1", "ssim_weight = 0.3"))
+    assert main(["train", "--out", str(run_copy), "--resume", "--iterations", "34"]) == 2
+    said = capsys.readouterr()
+    assert "trained with loss.ssim_weight = 0.1" in said.err and "extended" not in said.out
+
+
 def test_a_run_whose_latest_checkpoint_is_damaged_is_extended_from_the_one_before(run_copy):
     """The damaged file does not replace the checkpoint before it."""
     (run_copy / "checkpoint.npz").write_bytes(b"cut short")

@@ -237,8 +237,8 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
     if asked.training.iterations > kept.training.iterations:
-        print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
+        print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
     config = folder.config()
     shown = _progress(folder, source, sequence, config, options, _reached(folder, config))
     resume_run(folder, sequence, threads, shown)
