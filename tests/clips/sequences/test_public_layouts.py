@@ -1,6 +1,9 @@
 """Public layouts, read from folders made as their documentation says: cameras, depth, poses and masks are true."""
 
+import gzip
 import json
+import tarfile
+import tracemalloc
 
 import numpy as np
 import public_layouts as made
@@ -9,7 +12,7 @@ import pytest
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.layouts import c3vd as c3vd_layout
-from endotsr.clips.sequences.layouts import describe, layout_of
+from endotsr.clips.sequences.layouts import describe, layout_of, scared
 from endotsr.clips.sequences.layouts.scared import frame_texts
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
@@ -74,6 +77,23 @@ def test_numbers_without_leading_zeros_are_in_order(archive, tmp_path):
     made.frame_data(tmp_path, {name: texts[name] for name in sorted(texts)}, archive)
     found = [content if isinstance(content, str) else content.decode() for _, content in frame_texts(tmp_path)]
     assert found == [str(i) for i in range(12)]
+
+
+@pytest.mark.parametrize("kind", [tarfile.REGTYPE, tarfile.XHDTYPE], ids=["a member", "a header"])
+def test_an_archive_that_unpacks_to_far_more_than_its_size_is_refused(kind, tmp_path, monkeypatch):
+    """Zeros compress to a thousandth: refused before they are unpacked, also where they are the header of a member."""
+    monkeypatch.setattr(scared, "LARGEST_ARCHIVE", 1 << 20, raising=False)
+    (tmp_path / "data").mkdir()
+    entry = tarfile.TarInfo("x.json")
+    entry.size, entry.type = 1 << 26, kind
+    with gzip.open(tmp_path / "data/frame_data.tar.gz", "wb", compresslevel=1) as file:
+        file.write(entry.tobuf())
+        file.write(bytes(1 << 26))
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"frame_data.tar.gz: unpacks to more than 1048576 bytes"):
+        frame_texts(tmp_path)
+    assert tracemalloc.get_traced_memory()[1] < 1 << 24
+    tracemalloc.stop()
 
 
 def test_files_that_macos_writes_beside_others_are_passed_over(tmp_path):

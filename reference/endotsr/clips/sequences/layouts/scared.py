@@ -7,8 +7,11 @@ data/frame_data.tar.gz            or data/frame_data/: one JSON per frame, camer
 Structured-light depth belongs to unrectified pictures and is not read; `endotsr depth` matches the pairs.
 """
 
+import gzip
+import io
 import re
 import tarfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +25,7 @@ from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
-from endotsr.untrusted.files import read_text
+from endotsr.untrusted.files import open_regular, read_text
 from endotsr.untrusted.json import parsed
 from endotsr.untrusted.yaml import matrix
 
@@ -48,6 +51,7 @@ FILES = Inventory(
 )
 IN_DATA = ("rgb.mp4", "frame_data", "frame_data.tar.gz", "scene_points", "scene_points.tar.gz")
 LARGEST_FILE, MOST_FILES = 1 << 20, 1 << 17  # bytes of the JSON of a frame; frames
+LARGEST_ARCHIVE = 1 << 28  # bytes of frame_data.tar.gz, packed or unpacked
 
 
 def _calibration(path: Path) -> Path | None:
@@ -120,7 +124,7 @@ def frame_texts(path: Path) -> list[tuple[str, str | bytes]]:
         return []
     found = {}
     try:
-        with tarfile.open(path / ARCHIVE, "r:gz") as archive:
+        with tarfile.open(fileobj=io.BytesIO(_unpacked(path / ARCHIVE)), mode="r:") as archive:
             for member in archive:
                 name = Path(member.name).name
                 if member.isfile() and name.endswith(".json") and name[0] != "." and member.size <= LARGEST_FILE:
@@ -128,9 +132,18 @@ def frame_texts(path: Path) -> list[tuple[str, str | bytes]]:
                     found[name] = stream.read(LARGEST_FILE) if stream else b""
                 if len(found) > MOST_FILES:
                     raise InputError(f"{path / ARCHIVE}: more than {MOST_FILES} files")
-    except (tarfile.TarError, OSError, EOFError) as error:
+    except (tarfile.TarError, OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path / ARCHIVE}: cannot be read: {error}") from None
     return sorted(found.items(), key=lambda entry: _in_order(entry[0]))
+
+
+def _unpacked(file: Path) -> bytes:
+    """The content of a .gz file. Raises InputError for one that unpacks to more than LARGEST_ARCHIVE bytes."""
+    with open_regular(file, LARGEST_ARCHIVE) as packed, gzip.GzipFile(fileobj=packed) as stream:
+        content = stream.read(LARGEST_ARCHIVE + 1)
+    if len(content) > LARGEST_ARCHIVE:
+        raise InputError(f"{file}: unpacks to more than {LARGEST_ARCHIVE} bytes; allowed: at most so many")
+    return content
 
 
 def _in_order(name: str) -> list[str | int]:
