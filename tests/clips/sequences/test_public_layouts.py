@@ -90,7 +90,7 @@ def test_an_archive_that_unpacks_to_far_more_than_its_size_is_refused(kind, tmp_
         file.write(entry.tobuf())
         file.write(bytes(1 << 26))
     tracemalloc.start()
-    with pytest.raises(InputError, match=r"frame_data.tar.gz: unpacks to more than 1048576 bytes"):
+    with pytest.raises(InputError, match=r"frame_data.tar.gz: unpacks to more than 1 MiB"):
         frame_texts(tmp_path)
     assert tracemalloc.get_traced_memory()[1] < 1 << 24
     tracemalloc.stop()

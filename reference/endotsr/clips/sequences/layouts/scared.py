@@ -142,7 +142,7 @@ def _unpacked(file: Path) -> bytes:
     with open_regular(file, LARGEST_ARCHIVE) as packed, gzip.GzipFile(fileobj=packed) as stream:
         content = stream.read(LARGEST_ARCHIVE + 1)
     if len(content) > LARGEST_ARCHIVE:
-        raise InputError(f"{file}: unpacks to more than {LARGEST_ARCHIVE} bytes; allowed: at most so many")
+        raise InputError(f"{file}: unpacks to more than {LARGEST_ARCHIVE >> 20} MiB; allowed: at most that")
     return content
 
 
