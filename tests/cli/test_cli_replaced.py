@@ -34,6 +34,14 @@ def test_an_export_replaces_an_export_and_no_file_of_the_user(name, finished_run
     assert main(words) == 0 and file.read_bytes() == written, "its own file is replaced without a word"
 
 
+def test_a_page_to_draw_on_replaces_another_and_no_file_of_the_user(tmp_path, capsys):
+    clip = scene(tmp_path / "clip")
+    words = ["masks", str(clip), "--draw", str(tmp_path / "draw.html"), "--key-frames", "2"]
+    spared(capsys, tmp_path / "draw.html", words, "--draw ")
+    (tmp_path / "draw.html").unlink()
+    assert main(words) == 0 and main(words) == 0
+
+
 @pytest.mark.parametrize("name", ["a.gif", "a.mp4", "a.webm"])
 def test_a_film_replaces_a_film_of_endotsr_and_no_other_one(name, finished_run, tmp_path, capsys):
     file = tmp_path / name

@@ -117,8 +117,10 @@ def _draw(options: MasksOptions, page: Path) -> int:
     from endotsr.clips.sequences.layouts import describe
     from endotsr.clips.sequences.source_options import SourceOptions
     from endotsr.results.views.draw_page import check_draw_page, write_draw_page
+    from endotsr.untrusted.marks import refuse_foreign
 
     check_draw_page(page)
+    refuse_foreign(page, option="--draw")
     clip = describe(options.sequence, SourceOptions(layout=options.layout))
     drawing = drawing_for(clip, options.keys, options.key_frames)
     command = carrying_command(options.sequence)
