@@ -227,6 +227,11 @@ def _next_step(out: Path, found: "SequenceFile", pair: bool) -> str:
         )
     if stereo and pair:
         return f"next: endotsr depth {folder}"
+    if found.poses is not None:  # they fix the scale of the depth
+        return (
+            f"next: endotsr depth {folder} --given FILES --kind depth (in the unit of the poses), or endotsr poses"
+            f" {folder} --sfm --replace (other poses, with the depth of points); training needs depth"
+        )
     return (
         f"next: endotsr poses {folder} --sfm (a moving camera), or endotsr depth {folder} --given FILES --kind relative"
         " (inverse depth of a network), or --flat; training needs depth"

@@ -369,6 +369,19 @@ def test_the_command(tmp_path, capsys):
     assert "--camera: 2 numbers; allowed: 4" in capsys.readouterr().err
 
 
+def test_a_clip_with_poses_is_told_of_no_depth_that_they_exclude(tmp_path, capsys):
+    """`depth --kind relative` and `--flat` refuse a camera that moves, and `poses` those that are there."""
+    files(tmp_path / "clip", "pictures", [scene_picture(i) for i in range(4)])
+    (tmp_path / "poses.txt").write_text("".join(f"{i} {i / 100} 0 0 0 0 0 1\n" for i in range(4)))
+    words = ["--trajectory", str(tmp_path / "poses.txt"), "--source-rate", "1", "--camera", *map(str, CAMERA)]
+    assert main(["prepare", str(tmp_path / "clip/pictures"), "--out", str(tmp_path / "o"), *words]) == 0
+    said = capsys.readouterr().out
+    assert "--kind relative" not in said and "--flat" not in said
+    assert f"next: endotsr depth {tmp_path / 'o'} --given FILES --kind depth" in said
+    files(tmp_path, "depth", [np.full((HEIGHT, WIDTH), 60, np.uint16) for _ in range(4)])
+    assert main(["depth", str(tmp_path / "o"), "--given", str(tmp_path / "depth"), "--kind", "depth"]) == 0
+
+
 def test_a_pair_without_a_baseline_is_told_which_number_is_missing(tmp_path, capsys):
     for side in ("left", "right"):
         files(tmp_path / "clip", side, [scene_picture(i) for i in range(3)])
