@@ -10,7 +10,8 @@ Level = Literal["refusal", "warning", "note"]
 REFUSED = "training refuses it"
 LEAVE_OUT = "leave the frame out: endotsr prepare CLIP --out CLIP --replace --drop FRAME"
 ONE_CAMERA = (
-    "one camera: endotsr depth --given FILES --kind relative (inverse depth of a network, not metric), a COLMAP model,"
+    "one camera: endotsr depth --given FILES --kind relative (inverse depth of a network, not metric), for a clip with"
+    " poses --kind depth in their unit, a COLMAP model,"
     " endotsr poses --sfm for a moving camera, or endotsr depth --flat"
 )
 SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
