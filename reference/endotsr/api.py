@@ -72,7 +72,7 @@ def make_config(
     file         TOML file, as `endotsr train --config`
     iterations   exact length of the run; milestones keep their fraction of the run. training={"iterations": n} changes
                  the length but not the milestones. training={"visits_per_frame": v} lengthens a run with more than
-                 n / v training frames
+                 n / v training frames; if n / v is above 64, with more than about (n / v)^2 / 64
     sections     changes by section: model={"appearance": False}, training={"seed": 3, "threads": 2}
 
     Raises: InputError naming the file or the key, the value and the allowed values.
@@ -91,7 +91,7 @@ def load_sequence(
     simulator: Mapping[str, Any] | None = None,
     **settings: Any,
 ) -> Sequence:
-    """The complete sequence in memory, checked.
+    """The complete sequence, checked; kept in a file if it needs more than half of `sequence.memory`.
 
     source      sequence folder, or the word "simulated"
     config      initial settings (section `sequence` and the near plane are used); default: those of `preset`
@@ -134,7 +134,8 @@ def train(
     config         from `make_config`; iterations and sections are applied to it. Without it, the settings are
                    make_config(preset, iterations=iterations, **sections)
     on_iteration   called after every iteration with its log entry: iteration, frame, loss, terms of the loss,
-                   gaussians, seconds, and every tenth iteration psnr. May raise StopTraining. Its result is ignored
+                   gaussians, seconds, and psnr at the first and every tenth iteration. May raise StopTraining. Its
+                   result is ignored
     on_run         called next, with the run at this iteration, to use its `model` or `render`. The next iteration
                    changes the arrays in place: copy those to keep, and do not modify them
     on_message     called with each line on what is done: compilation, calibration (7), coarse start, plan of `effects`,
@@ -220,8 +221,9 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
 def estimate_poses(sequence: Sequence) -> Sequence:
     """The sequence with a camera for each frame, estimated from its pictures, masks and depth, as `endotsr poses`.
 
-    The camera of the first frame stays as it is. A note names the frames whose pose is interpolated. Motion that the
-    whole tissue has in common, as in breathing, is part of the estimated motion.
+    The camera of the first frame stays as it is. A note names the frames whose pose is interpolated between
+    others, or is that of the first or last pose. Motion that the whole tissue has in common, as in breathing, is part
+    of the estimated motion.
 
     Raises: InputError for a single frame, without depth, if too few points match, or if more than 8 frames in a row
             have no pose.
@@ -294,7 +296,7 @@ class Run:
     ) -> RenderOut:
         """Colour (3, H, W) in display units, depth (H, W) in scene units and opacity (H, W) in [0, 1].
 
-        time      normalised, in [0, 1]; frame i of n is at i / n
+        time      normalised, in [0, 1]; frame i of n evenly spaced ones is at i / n
         camera    a Camera, or the number of a frame to use its camera; default: the nearest frame in time
         without   spectral components to leave out: "appearance", "spectral_motion"
 

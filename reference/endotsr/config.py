@@ -25,7 +25,7 @@ from endotsr.untrusted.sections import (
 )
 from endotsr.untrusted.toml import read_toml, toml_text
 
-LARGEST_SEED = (1 << 53) - 1  # larger integers are not exact in JSON, which records the seed of a run
+LARGEST_SEED = (1 << 53) - 1  # of a seed, which JSON records: it keeps only some larger integers
 NO_DENSIFICATION = 1  # largest `density.until` with which no iteration densifies: they count from 1
 
 
@@ -60,7 +60,7 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     depth_outliers: Literal["kept", "removed"] = "kept"
     """wrong far depth, in frames whose depth reaches much farther than in those around them: kept, or made no depth"""
     memory: NonNegative = 0.0
-    """limit in GB for frames and derived data, the rest is kept in a file; 0 = half of this machine's memory"""
+    """limit in GB for frames and derived data; a clip above half of it is kept in a file; 0 = half of the machine's"""
 
 
 class ModelConfig(Section, frozen=True, kw_only=True):
@@ -181,7 +181,7 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     """Adam first-moment decay"""
     beta2: DecayRate = 0.999
     """Adam second-moment decay"""
-    epsilon: Annotated[float, msgspec.Meta(ge=1e-37)] = 1e-15  # float32 rounds a smaller one to 0
+    epsilon: Annotated[float, msgspec.Meta(ge=1e-37)] = 1e-15  # of few digits in float32 below 1.2e-38
     """Adam epsilon"""
     legacy_skip: bool = False
     """skip the Adam step on densify iterations, as Deform3DGS and SurgicalGS do"""
@@ -197,13 +197,13 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     until: Count = 4000
     """densify at iterations < until; 0 = none"""
     growth: Literal["threshold", "budget"] = "threshold"
-    """candidates: all above `gradient_threshold`, or those with the largest gradients, up to `maximum` at the end"""
+    """candidates: all from `gradient_threshold` on, or those with the largest gradients, up to `maximum` at the end"""
     gradient_threshold: Positive = 2e-4
     """smallest mean screen gradient of a cloned or split Gaussian, NDC units; not used with a budget"""
     extent: Positive | Literal["cameras"] = 10.0
     """scene extent, scene units; `cameras` = 1.1 x the largest camera distance from their mean"""
     dense_fraction: Positive = 0.01
-    """clone below, split above this fraction of the extent"""
+    """clone up to, split above this fraction of the extent"""
     prune_opacity: Fraction = 0.005
     """remove Gaussians with a lower opacity"""
     maximum: PositiveCount = 400_000
@@ -340,8 +340,8 @@ MILESTONES = {
 def with_iterations(config: Config, iterations: int) -> Config:
     """The same schedule over exactly `iterations`: every milestone of `MILESTONES` keeps its fraction of the run.
 
-    Without densification (`density.until` 0 or 1), there is none at any length. The length is then fixed:
-    `visits_per_frame` is 0.
+    Milestones are rounded, and at least 1: one of 0, such as `residual_activation`, becomes 1. Without densification
+    (`density.until` 0 or 1), there is none at any length. The length is then fixed: `visits_per_frame` is 0.
     """
     ratio = iterations / config.training.iterations
     changes = {

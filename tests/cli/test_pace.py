@@ -32,6 +32,9 @@ def test_the_ends_are_the_presets():
     assert quick.training.iterations == 1600 and quick.training.coarse_start and quick.density.maximum == 22_000
     assert lengthened(SHARP, 55).training.iterations == SHARP_LENGTH == best.training.iterations
     assert best.initialisation == SHARP.initialisation and not best.training.coarse_start
+    assert (best.density.growth, SHARP.density.growth) == ("budget", "threshold")
+    longer = paced(SHARP, 2.0).training.iterations / best.training.iterations
+    assert longer == pytest.approx(SHARP_LENGTH / QUICK.training.iterations, rel=1e-3)
 
 
 @pytest.mark.parametrize("minutes", [1.0, 3.0, 10.0, 40.0])

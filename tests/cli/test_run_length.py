@@ -14,7 +14,16 @@ from endotsr.cli.main import main
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions, of_length
-from endotsr.config import PRESETS, SHARP, Config, config_to_toml, lengthened, load_config, with_iterations
+from endotsr.config import (
+    PRESETS,
+    SHARP,
+    Config,
+    config_to_toml,
+    lengthened,
+    load_config,
+    with_iterations,
+    with_settings,
+)
 from endotsr.studies.sweeps.jobs import jobs_of
 from endotsr.studies.sweeps.spec import read_spec, spec_of
 from endotsr.training.runs.folder import open_run
@@ -116,6 +125,17 @@ def test_where_both_are_given_the_longer_of_the_two_holds(frames, length, tmp_pa
             assert found.density.until == round(stretched.density.until * length / 4000)
     given = {"iterations": 4000, "visits_per_frame": 100}
     assert lengthened(endotsr.make_config("sharp", training=given), frames).training.iterations == length
+
+
+def test_visits_above_64_lengthen_from_a_square_of_frames_on():
+    """As in `make_config`: 6000 / 72 is above 64, and (6000 / 72)^2 / 64 is 108.5."""
+    config = endotsr.make_config("paper", training={"visits_per_frame": 72})
+    assert [lengthened(config, n).training.iterations for n in (84, 108, 109)] == [6000, 6000, 6048]
+
+
+def test_a_milestone_of_0_becomes_1():
+    config = with_settings(PRESETS["paper"], training={"residual_activation": 0})
+    assert with_iterations(config, 3000).training.residual_activation == 1
 
 
 def test_a_later_source_ends_the_visits_of_an_earlier_one(tmp_path):

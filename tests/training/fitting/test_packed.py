@@ -32,6 +32,16 @@ def test_masks_and_supports_come_back_exactly(height, width, seed, rule):
         np.testing.assert_array_equal(a, b)
 
 
+def test_a_pixel_between_two_frames_takes_the_bytes_that_the_docstring_states():
+    mask = np.ones((512, 640), bool)
+    supports = packed_supports(mask, "co_sited")
+    image, depth, bits = 3 * 2, 2, 1 / 8  # uint16, uint16, and a bit each for the mask and for valid depth
+    packed = image + depth + 2 * bits + sum(one.bits.nbytes for one in supports) / mask.size
+    bands = unpacked_supports(supports, mask, "co_sited").bands
+    whole = 4 * 3 + 4 + 2 + sum(band.nbytes for band in bands) / mask.size
+    assert (round(packed, 1), round(whole, 1)) == (8.4, 19.3)
+
+
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_a_depth_comes_back_to_half_a_step(dtype):
     rng = np.random.default_rng(5)

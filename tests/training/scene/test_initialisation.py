@@ -5,6 +5,7 @@ import pytest
 
 from data_folder import data_folder
 from endotsr.clips.sequences.sequence import Sequence
+from endotsr.clips.sequences.splits import every_second
 from endotsr.config import InitialisationConfig, ModelConfig
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera
@@ -119,6 +120,15 @@ def test_every_second_frame_of_long_clips():
         sequence.depth[1:] = 200.0
         position, _, _ = points(sequence, first_frame_points=1, other_frame_points=count)
         assert position.shape[1] == 1 + visited
+
+
+@pytest.mark.parametrize("count, frames", [(150, 75), (151, 1)])
+def test_a_long_clip_with_every_second_frame_held_out_starts_with_the_first_frame_alone(count, frames):
+    train, test = every_second(count)
+    sequence = make(count=count, test=test)
+    assert sequence.train_index.tolist() == train.tolist()
+    sequence.depth[1:] = 200.0
+    assert np.unique(points(sequence, first_frame_points=1, other_frame_points=count).start).size == frames
 
 
 def test_held_out_frames_are_not_read():

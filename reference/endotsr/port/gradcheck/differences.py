@@ -41,9 +41,11 @@ def plateau_difference(line: Line, eps: float = float(np.finfo(np.float64).eps))
     line   h -> weighted outputs, or None if h must not be used; h in units of the block's size
     eps    rounding unit of the outputs
 
-    The steps decrease by a ratio of 4 until neighbours agree to 1e-9. If none do, all steps are used, including coarser
-    ones. The error bar is twice the largest of three bounds: the disagreement of the best neighbours, the noise at
-    finer steps extrapolated to the chosen one, and the rounding of the outputs.
+    The steps decrease by a ratio of 4 until neighbours agree to 1e-9, or to the finest. If the error bar is then above
+    1e-6 of the value, or there is none, coarser steps are used too, unless the coarsest of the ladder was refused.
+
+    The error bar is twice the largest of three bounds: the disagreement of the best neighbours, the noise at finer
+    steps extrapolated to the chosen one, and the rounding of the outputs.
     """
     slopes = _slopes(line, LADDER, eps)
     best = _best(slopes)

@@ -43,7 +43,7 @@ class PrecisionReport(NamedTuple):
 def check_precision(pair: Pair, rng: np.random.Generator) -> PrecisionReport:
     """Compare the reverse pass in float32 and float64, block by block.
 
-    Inputs with different decisions (pair.trace) in the two precisions are redrawn, at most 8 times.
+    Inputs with different decisions (pair.trace) in the two precisions are drawn again, up to 8 draws in all.
     """
     if pair.single:
         return PrecisionReport(pair.name, (), (), skipped=pair.single)

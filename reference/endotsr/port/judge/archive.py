@@ -42,7 +42,8 @@ def unpacked(archive: Path) -> Path:
     """The content of an archive in a temporary folder, which is removed when the process ends.
 
     A file NAME.sha256 beside the archive is compared with it.
-    Raises: InputError for a damaged or foreign archive, a wrong hash, an unsafe name, and more than LARGEST bytes.
+    Raises: InputError for a damaged or foreign archive, a wrong hash, an unsafe name, and more than MOST files or
+            LARGEST bytes.
     """
     data = read_bytes(archive, LARGEST)
     beside = archive.with_name(f"{archive.name}.sha256")

@@ -144,7 +144,7 @@ def obstacle(report: Report) -> str:
 
 
 def manifest_hash(golden: Golden) -> str:
-    """SHA-256 of the manifest, which has the SHA-256 of every other file."""
+    """SHA-256 of the manifest, which has the SHA-256 of every file of the cases and schemas."""
     return hashlib.sha256((golden.folder / "manifest.json").read_bytes()).hexdigest()
 
 

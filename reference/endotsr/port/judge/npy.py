@@ -64,7 +64,7 @@ def header_of(data: bytes) -> Header:
 
 
 def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> NDArray:
-    """A little-endian, C-order array of at most `largest` bytes. Raises Refused, also for a link out of `root`."""
+    """A little-endian, C-order array of at most `largest` bytes. Raises Refused, also for a link or outside `root`."""
     return _with_open(path, root, lambda handle: _read_open(handle, largest))
 
 

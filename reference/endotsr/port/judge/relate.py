@@ -1,9 +1,9 @@
 """Relations between a wrong array and the expected one, found without a list of mistakes.
 
 In: an output of a port, the expected array, the tolerance, and the other arrays of the case. Out: all relations that
-are satisfied to the tolerance, the most specific first: a factor, a permutation, a sign, one index of an axis, a
-matrix, a clamp, a factor or a difference that is an array of the case, a constant, a region. Each is a fact about the
-two arrays, not necessarily the cause.
+are satisfied to the tolerance, the most specific first: a factor, a permutation, a sign, a clamp, one index of an axis,
+a constant, a matrix, a factor or a difference that is an array of the case, a region. Each is a fact about the two
+arrays, not necessarily the cause.
 """
 
 import math

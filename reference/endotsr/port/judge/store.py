@@ -25,7 +25,7 @@ WAYS = (
 
 
 class Golden(NamedTuple):
-    """Cases with files verified against the checksums of the manifest."""
+    """Cases with files verified against the checksums of the manifest, unless `read_golden` was told not to."""
 
     folder: Path
     manifest: Manifest

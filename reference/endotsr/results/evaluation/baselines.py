@@ -5,8 +5,8 @@ alone (`tissue_baselines`).
 
 temporal_mean      per-pixel mean over the training frames in which the pixel is tissue; 0 if it never is
 nearest_frame      copy of the training frame nearest in time; of two, the earlier
-two_neighbours     the training frames before and after, blended linearly in time; on the 7:1 split this is their
-                   mean, inside a held-out block it is a blend of the two border frames
+two_neighbours     the training frames before and after, blended linearly in time; on the 7:1 split of evenly spaced
+                   frames this is their mean, inside a held-out block it is a blend of the two border frames
 flow_interpolation dense optical flow (DIS, medium) in both directions between the same two frames, each warped to
                    the target time and blended with the same weights
 

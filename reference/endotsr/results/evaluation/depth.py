@@ -1,4 +1,4 @@
-"""Rendered depth of the held-out frames compared with their prior depth, which is not used in training.
+"""Rendered depth of the held-out frames compared with their prior depth, which is no target of the training.
 
 The prior is not ground truth: it comes from stereo matching, and its errors count as errors here. The rows without a
 model predict a prior from the priors of training frames, which have similar errors; this favours them.

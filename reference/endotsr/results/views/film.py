@@ -46,7 +46,8 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
 
     times      of the pictures, normalised
     duration   seconds from time 0 to time 1; 0 = unknown
-    slow       default: 1, clipped to the range USUAL; 15 pictures per second if times or duration define no speed
+    slow       default: 1, clipped to the range USUAL (of a gif, up to 50); 15 pictures per second if times or duration
+               define no speed
 
     Raises: InputError if `slow` is given but the speed is undefined, or out of the film's range.
     """

@@ -85,12 +85,12 @@ def measure(case: BenchCase) -> CaseTimes:
 
 
 def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
-    """State and constants of a case at the timed iteration, with precomputed targets."""
+    """State and constants of a case at the timed iteration, with the pyramid supports of every frame."""
     from endotsr.training.fitting.state import bench_state, training_constants
 
     constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in constants.sequence.train_index:
-        constants.targets_of(int(index))  # a run computes them once per frame
+        constants.targets_of(int(index))  # caches the supports, which a run computes once per frame
     if case.scene:
         scene = trained_gaussians(Path(case.scene), config)
     else:

@@ -1,7 +1,7 @@
 """The runs of a sweep on an existing Dask cluster (`pip install 'endotsr[cluster]'`).
 
 In: the address of a scheduler, jobs, and a function that returns their sequences. Out: outcomes as runs end, and None
-about once per second. Each sequence is sent to the workers once. Dask reassigns the run of a lost worker; the new
+between two polls. Each sequence is sent to the workers once. Dask reassigns the run of a lost worker; the new
 worker continues it from its checkpoint. Run folders must be on a disk shared by all machines, and all workers must have
 the same versions, because results depend on them. Both are checked.
 """

@@ -96,8 +96,7 @@ def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "
     Gaussians outside every training frame are dropped. If more than 0.8 `density.maximum` remain, the least opaque are
     dropped too. At tissue pixels with rendered opacity below 0.5, points are drawn as at a cold start. Their number in
     the first training frame is proportional to the uncovered fraction, and all are bounded by `density.maximum`. Adam's
-    moments are 0. Exposures and poses
-    are the neighbour's, constant beyond its last frame.
+    moments are 0. Exposures and poses are the neighbour's, constant beyond its last frame.
     """
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     place = neighbour.join(sequence)

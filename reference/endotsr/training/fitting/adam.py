@@ -8,7 +8,7 @@ In: parameters and gradients by name, and one rate per name (or one per part of 
 is independent of schedules and Gaussians.
 
 Two consequences: a zero gradient still moves a parameter by its momentum. With epsilon 1e-15, a gradient of pure
-rounding noise moves a parameter by up to the full rate; gradients are therefore summed in a fixed order.
+rounding noise moves a parameter as far as a large one would; gradients are therefore summed in a fixed order.
 """
 
 from collections.abc import Iterable, Mapping
@@ -119,7 +119,8 @@ def adam_step(
     learning_rate, beta1, beta2, epsilon scalars; the bias corrections are computed in float64
 
     Edges:  empty arrays are allowed; with gradient and moments 0, the parameter is bitwise unchanged. A first moment
-            below SMALLEST_MOMENT becomes 0: subnormal numbers are slow and have no effect.
+            below SMALLEST_MOMENT becomes 0: subnormal numbers are slow, and with epsilon 1e-15 they move a parameter
+            by less than 1e-21 of the rate.
     Raises: ValueError for unequal shapes or dtypes, non-contiguous arrays, or step < 1.
     Oracle: `endotsr.definition.adam`; tests/oracle/adam.py.
     """

@@ -5,9 +5,10 @@ The file is an uncompressed npz without pickle: a JSON header (as bytes) and one
 frame parameters. The header lists dtype, shape and SHA-256 of every array. Missing, foreign and damaged entries are
 therefore reported by name.
 
-A new file is written under a temporary name and replaces the old one by one rename. The old file is kept under a
-second name (`previous_of`). A complete checkpoint exists at any time after the first, and two after the second. If the
-latest is unreadable, `load_latest` reads its predecessor. All earlier versions of the format are read (`READERS`).
+A new file is written under a temporary name and replaces the old one by one rename. The old file is kept under a second
+name (`previous_of`). A complete checkpoint exists at any time after the first. Two different ones exist after the
+second, but for the moment between the two renames. If the latest is unreadable, `load_latest` reads its predecessor.
+All earlier versions of the format are read (`READERS`).
 """
 
 import contextlib
@@ -156,7 +157,7 @@ def _entries(
 def load_latest(path: Path) -> tuple[Checkpoint, str]:
     """The checkpoint at `path`, or its predecessor if it is damaged; and a message about that, or "".
 
-    Raises: InputError of the checkpoint at `path` if there is no predecessor, and for an unknown version.
+    Raises: InputError of the checkpoint at `path` if there is no readable predecessor, and for an unknown version.
     """
     previous = previous_of(path)
     if not path.exists() and previous.is_file():  # stopped where the file system has no hard links

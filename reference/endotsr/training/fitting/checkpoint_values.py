@@ -1,7 +1,7 @@
 """Validation of the numbers of a checkpoint, which may be damaged, edited or forged.
 
-In: the arrays read from the file. Out: nothing, or ValueError with the name of the array and the allowed values. Every
-state that a training can reach is within the limits.
+In: the arrays read from the file. Out: nothing, or ValueError with the name of the array and the allowed values. The
+limits are far beyond the states of a training at the learning rates of the presets.
 """
 
 from collections.abc import Iterator

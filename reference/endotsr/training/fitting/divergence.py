@@ -17,7 +17,7 @@ from endotsr.training.scene.gaussians import Gaussians
 
 WINDOW = 100  # iterations of a mean of the loss, and between two checks of the centres
 RISE = 3.0  # times the lowest mean so far
-FAR_OFF = 10.0  # times the radius of the scene at the start
+FAR_OFF = 10.0  # times the radius of the scene as the training is started or resumed
 FAR_OFF_FRACTION = 0.01  # of the Gaussians
 WATCHED_TERM = "l1"  # its weight is constant, unlike the weight of the Laplacian loss
 ADVICE = (
@@ -81,7 +81,7 @@ class DivergenceWatch:
         return new
 
     def _far_off(self, gaussians: Gaussians) -> float:
-        """Fraction of the centres that are at least FAR_OFF radii from the centre of the scene along an axis."""
+        """Fraction of the centres that are more than FAR_OFF radii from the centre of the scene along an axis."""
         if not gaussians.count:
             return 0.0
         away = np.abs(gaussians.position - self._centre[:, None]).max(axis=0)

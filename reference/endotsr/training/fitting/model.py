@@ -58,7 +58,8 @@ class SceneSaved(NamedTuple):
 class OffsetsAhead(NamedTuple):
     """Offsets of the FDM at a later time, computed with the update of its arrays.
 
-    Whoever changes the arrays of the FDM afterwards drops it: `optimise` replaces it, and density control sets it None.
+    They are valid until the arrays of the FDM change: `training_step` drops them before its update, and `optimise`
+    computes new ones unless density control follows.
     """
 
     t: float  # normalised time
@@ -104,7 +105,7 @@ def scene_at(
     ahead   of `optimise`, for these Gaussians; replaces the forward pass of the FDM at its own time
     timer   records the stages "FDM" and "Fourier"
 
-    Edges: with zero coefficients, a component leaves the scene bitwise unchanged (x + 0 = x).
+    Edges: with zero coefficients, a component leaves the scene bitwise unchanged, except that -0 becomes 0.
     Raises: ValueError if `ahead` belongs to another number of Gaussians.
     """
     ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = parallel_calls(

@@ -39,7 +39,7 @@ TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothn
 
 
 class Targets(NamedTuple):
-    """Inputs of the losses for one frame, computed once and cached; None for a disabled term."""
+    """Inputs of the losses for one frame; None for a disabled term. `TrainingConstants` says which parts are cached."""
 
     image: FloatArray  # (3, H, W) observed, 0 outside the tissue
     mask: NDArray[np.bool_]  # (H, W) True = tissue

@@ -15,7 +15,7 @@ from endotsr.method.equations.pyramid import Upsampling
 from endotsr.method.kernels.arrays import Array, BoolArray
 from endotsr.method.losses.depth import DepthTarget
 
-STEPS = 65535  # of the interval [0, 1]; 8-bit steps would be as large as the error of a good fit
+STEPS = 65535  # of the interval [0, 1]; an 8-bit step, 1 / 255, is the RMS error of a fit of 48 dB
 
 
 class PackedMask(NamedTuple):

@@ -23,7 +23,7 @@ class BridgedTime(NamedTuple):
 class View(NamedTuple):
     """The time of one iteration's render and the frame that it is compared with."""
 
-    index: int  # frame number, always one of the training frames; the nearest one to a moment
+    index: int  # frame number, always one of the training frames; the nearest one to a bridged time
     t: float  # normalised time at which the scene is rendered
     bridged: BridgedTime | None = None  # compared with the target at this time; None = with the frame
 
@@ -57,8 +57,9 @@ def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingCo
 def _draw_bridged(rng: np.random.Generator, sequence: Sequence) -> View:
     """One of the bridged times between the training frames (B14), uniform. Draws one `rng.integers`.
 
-    A gap of g frames has the 2 g - 1 times k / (2 g): one at every missing frame and one midway between any two
-    frames. Longer gaps are therefore drawn more often, and every time has one target.
+    A gap of g frames has the 2 g - 1 times k / (2 g): if the frames are evenly spaced, one at every missing frame and
+    one midway between any two successive frames. Longer gaps are therefore drawn more often, and every time has one
+    target.
     """
     train = sequence.train_index
     gaps = np.diff(train)

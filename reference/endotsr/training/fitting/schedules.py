@@ -31,7 +31,7 @@ def residuals_activate(iteration: int, config: Config) -> bool:
 
 
 def motion_active(iteration: int, config: Config) -> bool:
-    """Whether the spectral motion is trained at this iteration; tracked motion (B15) is from the first iteration."""
+    """Whether the spectral motion has a rate at this iteration; tracked motion (B15) has one from the first on."""
     tracked = config.model.spectral_motion and config.initialisation.motion != "none"
     return tracked or residuals_active(iteration, config)
 
@@ -55,8 +55,8 @@ def annealing(iteration: int, config: Config) -> float:
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
 
-    Rates of the spectral residuals are listed only while these are active; rates of exposures and poses only if the
-    model has them.
+    Rates of the spectral residuals are listed only while these are active, and then of both, also if the model has one
+    of the two; rates of exposures and poses are listed only if the model has them.
 
     position, fdm_*   decay exponentially to `final_factor` of their initial rate over the whole run
     harmonics         constant up to `annealing`; separate rates for degree 0 and the higher degrees
@@ -119,7 +119,10 @@ def statistics_active(iteration: int, config: Config) -> bool:
 
 
 def densifications_left(iteration: int, config: Config) -> int:
-    """Number of densifications from this one, at which density control runs, to the last, both included; at least 1."""
+    """Number of densifications from this one, at which density control runs, to the last, both included; at least 1.
+
+    The last one is that before `density.until`, also in a run that ends earlier.
+    """
     density = config.density
     last = (density.until - 1) // density.interval
     return max(1, last - (iteration - 1) // density.interval)

@@ -1,9 +1,9 @@
 """The state of a training, and its constants.
 
 `TrainingState` has everything that changes between iterations. A checkpoint stores it without `ahead` and `drawn`,
-which are recomputed, and without `making`. Everything else (targets, atoms, rates) is a function of the state, the
-sequence and the configuration; a resumed run is therefore bitwise equal to an uninterrupted one. This module computes
-no gradient.
+which are recomputed, and without `making` and `coarse_until`, which forecasts alone read. Everything else (targets,
+atoms, rates) is a function of the state, the sequence and the configuration; a resumed run is therefore bitwise equal
+to an uninterrupted one. This module computes no gradient.
 """
 
 from dataclasses import dataclass
@@ -68,8 +68,8 @@ class TrainingConstants:
     config: Config
     spectral: Spectral
     extent: float
-    supports: Kept[int, tuple[PackedMask, ...]]  # of the pyramid, by frame, filled at first use
-    bridged: BridgedTargets  # between the frames, filled at first use
+    supports: Kept[int, tuple[PackedMask, ...]]  # of the pyramid, by frame, cached at first use
+    bridged: BridgedTargets  # between the frames, cached at first use
     depth: float = 1.0  # median depth of the tissue, scene units; computed only if poses are corrected
 
     def observed(self, view: View) -> tuple[Targets, Camera]:
@@ -88,7 +88,7 @@ class TrainingConstants:
         return rates if given is None else rates | {"pose_translation": cast(float, given) * self.depth}
 
     def targets_of(self, index: int) -> Targets:
-        """The targets of a frame. The supports of its pyramid are cached."""
+        """The targets of a frame: cached supports of the pyramid; image and depth, computed at every visit."""
         sequence, config, precision = self.sequence, self.config, self.config.training.precision
         mask, rule, supports = sequence.masks[index], config.loss.upsampling, None
         depth = optional_depth_target(sequence.depth[index].astype(precision, copy=False), mask, config)
@@ -100,7 +100,7 @@ class TrainingConstants:
 def training_constants(sequence: Sequence, config: Config) -> TrainingConstants:
     """Spectral constants and scene extent of a sequence.
 
-    The targets of the frames and of the times between them may each use 25 % of `sequence.memory`.
+    The pyramid supports of the frames, and the targets between them, may each use 25 % of `sequence.memory`.
     """
     keep_freed_memory()
     limit = memory_limit(config.sequence.memory) / 4

@@ -80,9 +80,9 @@ def train(
 
     With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
     This pre-training is not checkpointed: after an interruption it restarts and gives the same weight.
-    Raises: Diverged (a FloatingPointError) with iteration, frame and term if a loss or a gradient is not finite; the
-            state is then unchanged since the previous iteration. ValueError with array and index if the state has a
-            non-finite number.
+    Raises: Diverged (a FloatingPointError) with iteration, frame and term if a loss or a gradient is not finite; no
+            parameter and no moment has then changed since the previous iteration. ValueError with array and index if a
+            parameter of the state is not finite. Errors of the calibration as in `calibrated_weight`.
     """
     check_state(state)
     watch = DivergenceWatch(state.gaussians)
@@ -117,7 +117,8 @@ def train(
 def calibrated_weight(sequence: Sequence, config: Config) -> float:
     """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate.
 
-    Raises: FloatingPointError with iteration, frame and term if a loss or a gradient of the base model is not finite.
+    Raises: FloatingPointError with iteration, frame and term if a loss or a gradient of the base model is not finite;
+            CalibrationError if equation (7) has no solution.
     """
     model = msgspec.structs.replace(config.model, appearance=False, spectral_motion=False, laplacian=False)
     loss = msgspec.structs.replace(config.loss, lambda_lap=0.0)
@@ -252,7 +253,7 @@ def _refuse_not_finite(
     gradients: Mapping[str, FloatArray | None],
     rng_state: RngState,
 ) -> None:
-    """Raise `Diverged` for the first non-finite loss term or gradient, before anything is updated."""
+    """Raise `Diverged` for the first non-finite loss term or gradient, before any parameter or moment is updated."""
     broken = next(((name, str(float(v))) for name, v in terms.items() if not math.isfinite(v)), None)
     broken = broken or not_finite(gradients)
     if broken:

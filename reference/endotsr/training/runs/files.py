@@ -32,7 +32,7 @@ PAGES = {  # a file that makes its folder one of results, and the names of its p
     "windows.json": ("report.html", "view.html"),
     "tradeoff.json": ("tradeoff.html",),
 }
-HEAD = 4096  # bytes; every format of pictures, video and arrays has a zero byte there, and no text has one
+HEAD = 4096  # bytes; a zero byte there is the sign of a picture, a video or an array: text in UTF-8 has none
 
 
 def refuse_folder(path: Path) -> None:

@@ -1,8 +1,8 @@
 """Settings for a given training time: length, points and Gaussians grow together.
 
-`paced(x)` is the preset `quick` at x = 0 and `sharp` on 55 training frames at x = 1. The three counts are geometric in
-x up to 1; above 1 only the length grows. The speed of the machine is measured on the clip itself, with a few iterations
-of a model without motion.
+On the settings of `sharp`, `paced(x)` is the preset `quick` at x = 0, and at x = 1 `sharp` on 55 training frames with
+growth to a budget. The length is geometric in x, and up to x = 1 the numbers of points and Gaussians are too. The speed
+of the machine is measured on the clip itself, with a few iterations of a model without motion.
 """
 
 import statistics
@@ -22,7 +22,7 @@ from endotsr.training.fitting.state import new_training, training_constants
 from endotsr.training.fitting.trainer import training_step
 
 SHARP_LENGTH = lengthened(SHARP, 55).training.iterations  # on 55 training frames
-SHORTEST, LONGEST = -1.5, 5.0  # range of x: 490 iterations, and 23 times the iterations of x = 1
+SHORTEST, LONGEST = -1.5, 5.0  # range of x; one more in x is SHARP_LENGTH / the length of `quick` times longer
 COARSE_BELOW = 0.5  # largest x with a coarse start at half size
 HALVINGS = 20  # of the range in the bisection
 WARM, TIMED = 4, 9  # iterations

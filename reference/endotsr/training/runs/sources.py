@@ -27,7 +27,7 @@ ARRAYS = ("images", "masks", "depth", "times")
 
 
 def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> Sequence:
-    """The complete sequence in memory, checked. Raises InputError for unusable input."""
+    """The complete sequence, checked, in arrays as in `FrameStore`. Raises InputError for unusable input."""
     if source == SIMULATED:
         return _simulated(simulated_settings(simulator, config), config)
     if source == IN_MEMORY:

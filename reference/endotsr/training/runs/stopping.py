@@ -80,7 +80,7 @@ def stop_asked() -> bool:
 def leaving_at_once(last_words: Callable[[], object], code: int) -> Iterator[None]:
     """In the block, a signal ends the process after LONGEST_WAIT even while compiled code, such as LLVM, runs.
 
-    Python runs its handlers between two instructions of the main thread, of which LLVM executes none for a minute.
+    Python runs its handlers between two instructions of the main thread, of which none is executed while LLVM compiles.
     Here a thread waits for the number that the operating system's handler writes. Use it for work that leaves nothing
     behind; threads other than the main one run the block as it is.
 

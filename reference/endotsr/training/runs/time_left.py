@@ -25,7 +25,7 @@ LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
 # Of a long run, this fraction is remembered instead: other programs can slow a machine for half a minute, and 200
 # iterations of a large scene take no longer than that.
 REMEMBERED = 0.125
-SPIKE = 4.0  # medians; longer iterations compiled or loaded code and are left out; a coarse check takes three
+SPIKE = 4.0  # medians; longer iterations are left out, such as those that compiled or loaded code
 # Seconds, times the threads, by which one second of the second thread prolongs the iterations: 0.82 and 0.83 on two
 # cores, in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. A guess at the cause: of three threads on
 # two cores, a parallel loop waits for the one that shares a core.
@@ -100,7 +100,7 @@ class TimeLeft:
 
 
 def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
-    """Seconds per unit of work, without iterations that compiled code; None = too few iterations.
+    """Seconds per unit of work, without the iterations beyond SPIKE medians; None = too few iterations.
 
     slowed   seconds that one of the second thread costs the iterations, unless these wait for targets meanwhile
 

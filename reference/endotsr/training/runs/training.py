@@ -6,8 +6,8 @@ to continue. This module prints nothing itself but the line of a stop during the
 
 A checkpoint is written at least every `training.checkpoint_every` iterations, and whenever `LARGEST_LOSS` of the
 training time (between `FEWEST_SECONDS` and `MOST_SECONDS`) has passed since the last one. A kill therefore costs at
-most about that part of the training. Slow checkpoints are written less often, to take at most `LARGEST_FRACTION` of the
-time. Results do not depend on when checkpoints are written.
+most about that part of the training. Of slow checkpoints, those due by time are written less often, to take at most
+`LARGEST_FRACTION` of it. Results do not depend on when checkpoints are written.
 """
 
 import contextlib
@@ -63,7 +63,10 @@ class Observer(Protocol):
 def train_new_run(
     out: "Path", record: RunRecord, sequence: "Sequence", config: Config, observer: Observer
 ) -> RunFolder:
-    """Create a run folder and train to the end; without a checkpoint it is removed. Errors as in `train_run`."""
+    """Create a run folder and train to the end; errors as in `train_run`.
+
+    The folder is removed if a write fails before the first checkpoint.
+    """
     from endotsr.clips.sequences.record import record_of
     from endotsr.training.fitting.state import new_training
 
@@ -111,8 +114,8 @@ def _without_leftovers(folder: RunFolder) -> list[str]:
 def extend_run(folder: RunFolder, iterations: int) -> None:
     """Set a larger number of iterations in config.toml and the checkpoint; no other setting changes.
 
-    Milestones keep their iterations. Learning rates that decay over the whole run follow the decay of the new length
-    from the next iteration on, and therefore jump up.
+    Milestones keep their iterations. Learning rates whose decay ends with the run follow the decay of the new length
+    from the next iteration on: they jump up where their decay had begun.
     """
     from endotsr.training.runs.model import save_training
 

@@ -8,8 +8,8 @@ Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. A survivor 
 reaches `gradient_threshold` is cloned if its largest semi-axis is at most `dense_fraction` x extent. Otherwise it is
 split: two children, sampled from the parent and smaller by `SHRINK`, replace it. `growth = "budget"` selects the
 Gaussians with the largest gradients instead; their number is the room below `maximum` after pruning, divided by the
-remaining densifications. Scales are canonical, not deformed. Children inherit every other array. Optimiser moments
-start at zero for clones and children (`GatherPlan`). Clones are not split in the same call.
+remaining densifications and rounded up. Scales are canonical, not deformed. Children inherit every other array.
+Optimiser moments start at zero for clones and children (`GatherPlan`). Clones are not split in the same call.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,10 @@
 """Initialisation, equation (B12): Gaussians on back-projected training pixels.
 
-The first training frame contributes `first_frame_points` tissue pixels with depth. Every other training frame k (every
-second frame of clips beyond 150 frames) contributes up to int(other_frame_points / n) such pixels that are unseen in
-the first frame or whose depth has changed by more than `motion_threshold`. Held-out frames are never read. Pixels of
-different frames are compared at equal image positions, following the published rule.
+The first training frame k_0 contributes `first_frame_points` tissue pixels with depth. Every other training frame k
+contributes up to int(other_frame_points / n) such pixels that are unseen in the first frame or whose depth has changed
+by more than `motion_threshold`; n is the number of frames of the clip, held-out ones included. In clips beyond 150
+frames only those with odd k - k_0 contribute; with the split `every_second` there is none. Held-out frames are never
+read. Pixels of different frames are compared at equal image positions, following the published rule.
 
 In: a `Sequence`. Out: `Gaussians`. This module is independent of the optimiser.
 """
@@ -28,7 +29,7 @@ from endotsr.training.scene.tracked_motion import with_tracked_motion
 START_OPACITY = 0.1
 SQUARED_DISTANCE_FLOOR = 1e-7  # scene units squared; duplicates and single points get this
 NEIGHBOURS = 3
-LONG_CLIP = 150  # frames; beyond it every second frame is visited
+LONG_CLIP = 150  # frames; beyond it the frames at an odd distance from the first are visited
 
 
 def initialise(
@@ -42,7 +43,7 @@ def initialise(
 
     returns  positions on the pixels' rays at prior depth, colour of the pixel, opacity 0.1, unit quaternion,
              isotropic scale = root mean squared distance to the three nearest points; FDM weights 0;
-             motion coefficients of the tracks (B15) if configured
+             canonical positions and motion coefficients of the tracks (B15) if configured
 
     Edges:  fewer pixels than requested -> all pixels; fewer than four points -> mean over the existing neighbours;
             one point or duplicates -> the floor of the squared distance.

@@ -1,9 +1,9 @@
 """The common workload: N Gaussians on a wavy, tissue-like surface, seen by one camera.
 
-The Gaussians are flat discs, most of which face the camera. `SIGMA_PIXELS` is their mean projected sigma by number. The
-part `OPAQUE_FRACTION` is nearly opaque (0.6 to 0.98), the rest faint (0.03 to 0.5). The surface extends beyond each
-image border by `BORDER` of the image. All draws are seeded: equal arguments give equal arrays. Scene units are
-arbitrary; the depth is about 4.
+The Gaussians are flat discs, most of which face the camera. `SIGMA_PIXELS` is the median of their semi-axes in pixels,
+without the thin one, by number. The part `OPAQUE_FRACTION` is nearly opaque (0.6 to 0.98), the rest faint (0.03 to
+0.5). The surface extends beyond each image border by `BORDER` of the image. All draws are seeded: equal arguments give
+equal arrays. Scene units are arbitrary; the depth is about 4.
 """
 
 import numpy as np
@@ -65,7 +65,7 @@ def gaussians(count: int, config: Config, seed: int = 7, size: float = 1.0) -> G
 
 
 def _facing(rng: np.random.Generator, count: int) -> FloatArray:
-    """Quaternions (4, N): a random spin, then a tilt of about 17 degrees about a random axis in the picture plane."""
+    """Quaternions (4, N): a random spin, then a tilt (normal, 0.3 rad) about a random axis in the picture plane."""
     tilt, azimuth, spin = rng.normal(0, 0.3, count) / 2, rng.uniform(0, 2 * np.pi, count), rng.uniform(0, np.pi, count)
     cos, sin_x, sin_y = np.cos(tilt), np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)
     w, z = np.cos(spin), np.sin(spin)
@@ -94,7 +94,7 @@ def _normal(
 ) -> FloatArray:
     """Normal numbers about `middle` (one per index of the second axis).
 
-    Drawing row by row avoids a float64 copy of the whole array, which would exceed the peak memory of a training.
+    Drawing row by row avoids a float64 copy of the whole array.
     """
     out = np.empty(shape, dtype)
     for block in out:
