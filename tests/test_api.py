@@ -1,6 +1,7 @@
 """The Python interface: the same numbers as the command line, stable names, and an import that loads nothing heavy."""
 
 import dataclasses
+import errno
 import json
 import re
 import shutil
@@ -202,6 +203,27 @@ def test_the_callback_stops_and_the_run_resumes_to_the_same_bits(sequence, run, 
         assert half.record["resumed"][0]["after_iteration"] == 3
         assert arrays(half) == arrays(run)
         assert without_seconds(half.log) == without_seconds(run.log)
+
+
+def test_a_finished_run_resumes_without_effect(run, tmp_path):
+    """Nor does it need its clip, or write the threads and seconds of a training that did not take place."""
+    opened = endotsr.open_run(run.save(tmp_path / "done"), tmp_path / "no clip")
+    opened.config = msgspec.structs.replace(
+        opened.config, training=msgspec.structs.replace(opened.config.training, threads=2)
+    )
+    before, said = dict(opened.record), []
+    assert opened.resume(on_message=said.append) is opened
+    assert opened.record == before and arrays(opened) == arrays(run) and said == []
+
+
+def test_a_full_disk_ends_a_save_with_an_input_error_and_leaves_nothing(run, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(endotsr.api, "save_training", full)
+    with pytest.raises(endotsr.InputError, match=r"mine: the disk is full"):
+        run.save(tmp_path / "mine")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_callback_reaches_the_model_of_each_iteration(sequence, run):

@@ -35,7 +35,7 @@ from endotsr.method.splatting.render import RenderOut
 from endotsr.training.fitting.records import LogEntry
 from endotsr.training.runs import folder as run_folders
 from endotsr.training.runs import sources
-from endotsr.training.runs.files import refuse_replacing
+from endotsr.training.runs.files import os_error_line, refuse_replacing
 from endotsr.training.runs.log import RunLog, log_until
 from endotsr.training.runs.machine import now, peak_memory_bytes
 from endotsr.training.runs.model import Model, load_model, load_training, save_training
@@ -395,7 +395,10 @@ class Run:
         from endotsr.training.fitting.compile_ahead import compile_ahead
         from endotsr.training.fitting.trainer import train as train_to_the_end
 
-        state, sequence = self._training(), self.sequence
+        state = self._training()
+        if state.iteration >= self.config.training.iterations and self.record.get("status") == "finished":
+            return self
+        sequence = self.sequence
         threads = use_threads(self.config.training.threads)
         if 0 < state.iteration < self.config.training.iterations:
             entry: ResumedEntry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
@@ -442,8 +445,10 @@ class Run:
                 log.append(entry)
             log.close()
             save_training(folder, state, self.config)
-        except BaseException:
+        except BaseException as error:
             shutil.rmtree(folder.path, ignore_errors=True)
+            if isinstance(error, OSError):
+                raise InputError(os_error_line(error, folder.path)) from None
             raise
         return folder.path
 

@@ -15,7 +15,7 @@ LEFT = 0.02  # largest accepted fraction of the first distance
 
 
 def best_number(off: Callable[[float], NDArray | None], rest: float, before: NDArray | None) -> float | None:
-    """The number with the smallest distance, by secants; None if it has no influence or none fits.
+    """The number at which secants of the differences end; None if it has no influence or does not fit.
 
     off      number -> differences; None = undefined
     rest     the number that changes nothing

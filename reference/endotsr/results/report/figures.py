@@ -168,7 +168,7 @@ def colour_table(name: str) -> ByteImage:
 def encode(image: ByteImage, kind: str = "png") -> bytes:
     """An (H, W, 3) image, or (H, W, 4) with opacity, as the bytes of a file.
 
-    kind   `png` (lossless) or `webp` (quality 90, about 10 % of the size)
+    kind   `png` (lossless) or `webp` (quality 90)
     """
     from PIL import Image
 

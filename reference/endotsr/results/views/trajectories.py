@@ -24,7 +24,7 @@ LEVELS_16, LEVELS_8 = 65535, 255
 ROTATION_LEVELS = 127  # largest level of a quaternion component, either sign
 OPACITY_STEP = 1 / 255  # Gaussians with a lower opacity are never drawn
 POSITION, LOG_SCALE, COLOUR = slice(0, 3), slice(3, 6), slice(6, 9)  # rows that are quantised within their range
-COMPRESSION = 6  # level of zlib; higher levels take much longer and save 1 %
+COMPRESSION = 6  # level of zlib
 
 
 class TrajectoryHeader(TypedDict):
