@@ -321,7 +321,7 @@ assert error[-1, one] > 1, "found again, on other tissue"
 #     position   (n, 3, N) scene units; followed (n, N)
 #     omega      (F,) frequencies, cycles per sequence; rho (F,) their Matern weights
 #
-#     Edges:  a static point has coefficients 0, to rounding, and keeps its position.
+#     Edges:  a static point has coefficients 0 and keeps its position, both to rounding.
 #     """
 #     atoms = np.stack([dictionary_forward(float(t), omega)[0] for t in times])
 #     design = np.concatenate([np.ones((len(times), 1)), atoms], axis=1)  # (n, 1 + 2F)
