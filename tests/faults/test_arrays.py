@@ -2,6 +2,8 @@
 
 import io
 import struct
+import tracemalloc
+import zipfile
 
 import numpy as np
 import pytest
@@ -74,3 +76,36 @@ def test_named_arrays_of_an_archive_are_read_and_others_left_alone(tmp_path):
     assert list(found) == ["a"] and found["a"].tolist() == [0, 1, 2]
     with pytest.raises(InputError, match=r"a.npz: b: it holds Python objects"):
         read_npz(tmp_path / "a.npz", ("a", "b"), 1000)
+
+
+@pytest.mark.parametrize("sides", [f"(0, {1 << 70})", f"(0, {1 << 62}, {1 << 62})", f"(0, {1 << 62})"])
+def test_an_empty_array_of_impossible_sides_is_refused(sides, tmp_path):
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {sides}}}"
+    (tmp_path / "a.npy").write_bytes(stored(header))
+    with pytest.raises(InputError, match=r"a\.npy: not a plain NumPy array file: "):
+        read_npy(tmp_path / "a.npy", 1000)
+
+
+def test_an_entry_that_states_more_bytes_than_it_has_is_refused_before_its_array_is_allocated(tmp_path):
+    size = 1 << 28
+    header = f"{{'descr': '|u1', 'fortran_order': False, 'shape': ({size},)}}"
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("a.npy", stored(header))
+    content = bytearray((tmp_path / "a.npz").read_bytes())
+    place = content.find(b"PK\x01\x02") + 24  # the size in the central directory
+    content[place : place + 4] = struct.pack("<I", len(stored(header)) + size)
+    (tmp_path / "a.npz").write_bytes(content)
+    tracemalloc.start()
+    with pytest.raises(InputError, match="an entry states"):
+        read_npz(tmp_path / "a.npz", ["a"], 1 << 30)
+    largest = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert largest < 1 << 20
+
+
+def test_a_name_with_and_without_its_ending_is_one_name(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        for name in ("a", "a.npy"):
+            archive.writestr(name, b"")
+    with pytest.raises(InputError, match="an entry is listed twice"):
+        read_npz(tmp_path / "a.npz", ["a"], 1 << 20)

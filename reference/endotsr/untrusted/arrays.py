@@ -1,7 +1,8 @@
-"""Arrays from .npy and .npz files: plain numbers only, no pickled objects, no more memory than the file has bytes.
+"""Arrays from .npy and .npz files: plain numbers only, no pickled objects, no more memory than the caller allows.
 
-A header whose size contradicts the file size is refused before any allocation. Entries of an .npz must be uncompressed
-unless the caller allows compression: a small file cannot become a large array.
+A header whose size contradicts that of the file or entry is refused before its array is allocated. Entries of an .npz
+must be uncompressed unless the caller allows compression: without compression, an array needs no more bytes than its
+file has; with it, at most the limit of the caller.
 """
 
 import ast
@@ -45,7 +46,7 @@ def read_npy(path: Path, largest: int) -> NDArray:
 
 
 def array_from(file: io.BufferedIOBase, length: int) -> NDArray:
-    """One array in .npy format that fills the next `length` bytes of a stream. Raises RefusedArray."""
+    """One array in .npy format that fills the next `length` bytes of a stream, its last ones. Raises RefusedArray."""
     shape, fortran, dtype, start = _header(file)
     size = math.prod(shape) * dtype.itemsize
     if size != length - start:
@@ -53,8 +54,10 @@ def array_from(file: io.BufferedIOBase, length: int) -> NDArray:
     data = bytearray(size)
     if file.readinto(data) != size or file.read(1):
         raise RefusedArray("the data ends early")
-    array = np.frombuffer(data, dtype)
-    return array.reshape(shape, order="F" if fortran else "C")
+    try:
+        return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+    except ValueError as error:  # a side of 0 beside sides beyond NumPy's
+        raise RefusedArray(plain_line(str(error))) from None
 
 
 def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, int]:
@@ -116,7 +119,7 @@ class NpzFile:
         return list(self._entries)
 
     def read(self, name: str) -> NDArray:
-        """One array, its checksum verified. Raises RefusedArray."""
+        """One of the `names`, its checksum verified. Raises RefusedArray; KeyError for another name."""
         entry = self._entries[name]
         try:
             with self._archive.open(entry) as stream:
@@ -134,8 +137,9 @@ def open_npz(path: Path, largest: int, *, compressed: bool = False) -> Iterator[
     largest      upper limit in bytes, for the file and for the sum of its arrays
     compressed   allow compressed entries
 
-    Raises: InputError if it is not an .npz file, if an entry is listed twice, encrypted or (unless allowed) compressed,
-            or if the arrays together exceed `largest`.
+    Raises: InputError if it is not an .npz file, if two entries have one name (with or without `.npy`), if an entry is
+            encrypted, compressed without permission or other than by deflate, or states another size than it has, or
+            if the arrays together exceed `largest`.
     """
     with open_regular(path, largest) as file:
         try:
@@ -164,7 +168,7 @@ def read_npz(path: Path, names: Collection[str], largest: int) -> dict[str, NDAr
 
 
 def _check_entries(path: Path, entries: list[zipfile.ZipInfo], largest: int, compressed: bool) -> None:
-    names = [entry.filename for entry in entries]
+    names = [entry.filename.removesuffix(".npy") for entry in entries]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: an entry is listed twice; allowed: every array once")
     if sum(entry.file_size for entry in entries) > largest:
@@ -174,5 +178,7 @@ def _check_entries(path: Path, entries: list[zipfile.ZipInfo], largest: int, com
             raise InputError(
                 f"{path}: an entry is compressed or encrypted; allowed: arrays as `numpy.savez` stores them"
             )
+        if entry.compress_type == zipfile.ZIP_STORED and entry.compress_size != entry.file_size:
+            raise InputError(f"{path}: damaged: an entry states {entry.file_size} bytes and has {entry.compress_size}")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise InputError(f"{path}: an entry is compressed in an unknown way; allowed: as `numpy.savez` does it")

@@ -1,8 +1,8 @@
 """Opening and reading files of unknown origin, and renaming files that another program may be reading.
 
 Only regular files are opened: a named pipe would block the command indefinitely, and a device may never end. The caller
-limits the size. Reading happens in the calling thread or in daemon threads (`in_threads`): Ctrl-C ends a command even
-while a file system does not respond.
+limits the size. Reading happens in the calling thread or in daemon threads (`in_threads`): Ctrl-C does not wait for a
+daemon thread whose file system does not respond.
 """
 
 import io
@@ -59,7 +59,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
     with open_regular(path, largest) as file:
         try:
             size = os.fstat(file.fileno()).st_size
-            data = file.read(size + 1)  # allocates no more than the file size
+            data = file.read(size + 1)  # allocates one byte more than the file size
         except OSError as error:
             raise _refusal(path, error) from None
     if len(data) > size:
@@ -81,7 +81,8 @@ def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
 def rename(source: Path, target: Path) -> None:
     """Rename a file or folder, replacing the target, as `os.replace`.
 
-    Windows refuses while another program, such as a virus scanner, has either one open. The call is then retried.
+    Windows refuses while another program, such as a virus scanner, has either one open. The call is then retried for
+    `PATIENCE` seconds.
     Raises: OSError of the file system.
     """
     ends = time.monotonic() + (PATIENCE if os.name == "nt" else 0.0)

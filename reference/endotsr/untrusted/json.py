@@ -31,14 +31,18 @@ def read_json(path: Path, largest: int = LARGEST_TEXT) -> Keys:
 
 
 def parsed(text: str | bytes, where: str) -> Any:
-    """JSON text as Python values. Raises InputError for invalid JSON, NaN, infinity, and excessive nesting."""
+    """JSON text as Python values. Raises InputError for anything else.
+
+    Refused are invalid JSON, NaN, infinity, numbers beyond the largest float, integers of more than `MOST_DIGITS`
+    characters, unpaired surrogates and excessive nesting.
+    """
     try:
         found = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_integer)
         json.dumps(found, ensure_ascii=False).encode()  # refuses unpaired surrogates
         return found
     except RecursionError:
         raise InputError(f"{where}: cannot be read: it is nested too deeply") from None
-    except ValueError as error:  # of JSON, of UTF-8, and of an integer with thousands of digits
+    except ValueError as error:  # of JSON, of UTF-8, and of a number that is too long or too large
         raise InputError(f"{where}: cannot be read: {str(error).splitlines()[0]}") from None
 
 
@@ -70,7 +74,7 @@ def _refuse_constant(name: str) -> Any:
 
 
 def number(value: Any, where: str, low: float = -math.inf, high: float = math.inf) -> float:
-    """A finite number in [low, high]. Raises InputError for anything else, including True and False."""
+    """A number in [low, high], at most 1.7e308 in size. Raises InputError for anything else, also True and False."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         if low <= value <= high and abs(value) <= 1.7e308:  # refuses NaN, infinity and integers beyond any float
             return float(value)

@@ -24,11 +24,15 @@ EXPORT = "s = toStruct(OBJECT); save('FILE.mat', '-struct', 's', '-v7') in MATLA
 
 
 def read_mat(path: Path, largest: int = LARGEST_FILE) -> Keys:
-    """The variables of a file. A struct is a mapping, a cell a list, a row or a column a list, 1x1 a number.
+    """The variables of a file. A struct is a mapping, several structs and a cell are lists, 1x1 is a number.
+
+    Other numbers are an array without axes of length 1, so a row and a column have one axis. Cells of several columns
+    are listed row by row. Of a text with several rows, the first one is kept.
 
     largest   size limit of the unpacked file, bytes
 
-    Raises:  InputError for a file of another version, a damaged or oversized one, and objects of classes.
+    Raises:  InputError for a file of another version, a damaged or oversized one, complex and sparse arrays, functions,
+             and objects of classes.
     """
     data = _unpacked(path, largest)
     from scipy.io import loadmat
@@ -53,7 +57,7 @@ def _name(word: Any) -> str:
 
 
 def _plain(value: Any, where: str, depth: int) -> Any:
-    """A value as mappings, lists, numbers and texts. Raises InputError for anything else."""
+    """A value as mappings, lists, arrays, numbers and texts. Raises InputError for anything else."""
     if depth > DEEPEST or not isinstance(value, np.ndarray | np.void):
         raise InputError(f"{where}: holds neither numbers nor texts; use plain values: {EXPORT}")
     if isinstance(value, np.void):
@@ -71,7 +75,7 @@ def _plain(value: Any, where: str, depth: int) -> Any:
 
 
 def _number(value: float) -> float | int:
-    """MATLAB stores whole numbers as doubles."""
+    """The number, as an integer if it is whole: MATLAB stores whole numbers as doubles."""
     return int(value) if float(value).is_integer() else value
 
 

@@ -56,7 +56,9 @@ def check_elements(data: bytes, order: Order, path: Path) -> None:
         arrays = [element for element in found if element.kind == MATRIX]
         count += len(arrays)
         if depth > DEEPEST or count > MOST_ELEMENTS or len(found) > MOST_ELEMENTS:
-            raise InputError(f"{path}: structs and cells within one another; use at most {DEEPEST} levels")
+            raise InputError(
+                f"{path}: structs and cells within one another; use at most {DEEPEST} levels and {MOST_ELEMENTS} arrays"
+            )
         fault = _unfilled(found, start, end) or (_fault(data, found, order) if depth and found else "")
         if fault:
             raise InputError(f"{path}: damaged MAT-file: {fault}")

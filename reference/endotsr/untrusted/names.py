@@ -25,7 +25,8 @@ def file_name(name: object, where: str) -> str:
     where    file and key that contain the name, for the message
 
     Raises: InputError for anything but text, an empty or hidden name, `..`, an absolute path or any separator, control
-            characters, a device name (`NUL`, `con.png`), a final dot or space, and more than 200 bytes.
+            characters, a device name (`NUL`, `con.png`), a final dot or space, and more than 200 bytes. On Windows also
+            for a character that its file names cannot have.
     """
     reason = _obstacle(name)
     if reason:
@@ -73,7 +74,7 @@ def shown(value: object, longest: int = 80) -> str:
 
 
 def plain_line(text: str) -> str:
-    """`visible` text on one line; every run of white space becomes one space."""
+    """`visible` text on one line; every run of spaces, tabs and ends of lines becomes one space."""
     return visible(re.sub(r"[ \t\n\r\f\v]+", " ", text).strip())
 
 

@@ -1,7 +1,7 @@
 """The vertices of PLY files: ASCII, little-endian and big-endian, with any properties that are plain numbers.
 
-The header is checked against the size of the file before anything is allocated. Elements behind the vertices, such as
-faces, are not read.
+The header is checked against the size of the file before the vertices are allocated. Elements behind the vertices, such
+as faces, are not read.
 """
 
 from pathlib import Path

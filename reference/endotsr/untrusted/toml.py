@@ -25,7 +25,10 @@ def read_toml(path: Path) -> Keys:
 
 
 def toml_text(data: Keys) -> str:
-    """TOML of plain values and one level of sections. Keys outside a section whose value is None are omitted."""
+    """TOML of plain values and one level of sections. Keys outside a section whose value is None are omitted.
+
+    Keys are bare, and no value inside a section is None.
+    """
     lines, sections = [], []
     for key, value in data.items():
         if isinstance(value, dict):
@@ -39,7 +42,8 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
+        # A JSON string is a valid TOML basic string, except for the character DEL, which TOML wants escaped.
+        return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
         return "[\n" + "".join(f"    {_toml_value(row)},\n" for row in value) + "]"  # a matrix: one line per row
     if isinstance(value, list | tuple):

@@ -47,7 +47,7 @@ def replace_text(path: Path, text: str) -> None:
 def replacing_folder(path: Path, *, replace: bool = True, then: Callable[[], object] = lambda: None) -> Iterator[Path]:
     """A temporary folder next to `path`. It is renamed to `path` after the block, or removed if the block fails.
 
-    replace   False: InputError is raised if a folder has appeared at `path` in the meantime; that folder is kept
+    replace   False: InputError is raised if something has appeared at `path` in the meantime, which is kept
     then      called after the renaming, to write what describes the new folder; if it fails or is interrupted, the old
               folder is put back
 
@@ -99,7 +99,8 @@ def new_folder(path: Path, mark: str = "", written: tuple[str, ...] = ()) -> Ite
     """A temporary folder next to `path`. It becomes `path` after the block, or is removed if the block fails.
 
     mark     an existing folder that contains this file is replaced; "": no folder is replaced
-    written  names in such a folder; with any other one it is kept, because that would be lost
+    written  names in such a folder, in lower case; with any other one it is kept, because that would be lost. Hidden
+             names (`.NAME`) and files of the system do not count, and are lost
 
     Raises:  InputError if `path` is anything else, or cannot be written.
     """
@@ -118,7 +119,7 @@ def new_folder(path: Path, mark: str = "", written: tuple[str, ...] = ()) -> Ite
 
 
 def _refuse_others(path: Path, written: tuple[str, ...]) -> None:
-    """Raises InputError for a folder with other entries than these. Files of the system do not count."""
+    """Raises InputError for a folder with other entries than these, hidden ones and files of the system."""
     others = sorted(entry.name for entry in path.iterdir() if entry.name.lower() not in (*written, *OF_SYSTEMS))
     others = [name for name in others if not name.startswith(".")]
     if others:

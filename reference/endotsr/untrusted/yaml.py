@@ -12,19 +12,33 @@ from endotsr.untrusted.json import Keys
 from endotsr.untrusted.names import plain_line
 
 LARGEST_FILE = 1 << 20  # bytes
+MOST_VALUES = 1 << 20
 DIRECTIVE = "%YAML"  # written by OpenCV with a colon, which is not YAML
 
 
 def read_yaml(path: Path) -> Keys:
     """The mapping of a file. An OpenCV matrix becomes a mapping with rows, cols and data.
 
-    Edges:   several documents that differ in `header` alone, as `rostopic echo` prints them, are one.
-    Raises:  InputError if the file cannot be read or is not a mapping. Tags never create objects.
+    Edges:   several documents that differ in `header` alone, as `rostopic echo` prints them, are one: the first.
+    Raises:  InputError if the file cannot be read, is not a mapping, or has several documents that differ. Tags create
+             only the values of the YAML standard, such as dates and sets, and no other objects.
     """
     import yaml
 
     class Loader(yaml.SafeLoader):
-        """Plain values only."""
+        """Plain values only. An alias counts as all values that it repeats, and one in its own value as too many."""
+
+        count = 0
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            alias, before = self.check_event(yaml.AliasEvent), self.count
+            node = super().compose_node(parent, index)
+            self.count += getattr(node, "values_inside", MOST_VALUES + 1) if alias else 1
+            if not alias:
+                node.values_inside = self.count - before
+            if self.count > MOST_VALUES:
+                raise yaml.YAMLError(f"more than {MOST_VALUES} values with those that aliases repeat")
+            return node
 
     Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
     text = read_text(path, LARGEST_FILE)
@@ -32,7 +46,8 @@ def read_yaml(path: Path) -> Keys:
         text = text.partition("\n")[2]
     try:
         documents = [document for document in yaml.load_all(text, Loader) if document is not None]
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
+    # PyYAML passes on the errors of a value that its tag does not allow, such as `!!bool maybe`.
+    except (yaml.YAMLError, RecursionError, ValueError, LookupError, AttributeError, TypeError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f" (line {mark.line + 1})" if mark is not None else ""
         said = getattr(error, "problem", None) or (str(error).splitlines() or ["too deep"])[0]

@@ -95,6 +95,14 @@ def test_a_mask_becomes_polygons_within_a_pixel():
     assert shapes_of(np.zeros((HEIGHT, WIDTH), bool), "carried") == []
 
 
+def test_a_region_inside_a_hole_is_kept():
+    y, x = np.mgrid[:200, :200]
+    far = np.hypot(y - 100, x - 100)
+    mask = ((far > 60) & (far < 90)) | (far < 30)
+    found = filled(shapes_of(mask, "drawn"), 200, 200)
+    assert found[100, 100] and (found != mask).mean() < 0.01
+
+
 def test_a_file_gives_its_masks(tmp_path):
     found = key_masks(read(tmp_path, content(never=[square(points=[[0, 30], [50, 30], [50, 40], [0, 40]])])))
     assert sorted(found.keys) == [0, 2] and not found.keys[2].any() and found.keys[0].sum() == 150

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from moving_clip import moving_views, still_views
+from scipy.spatial.transform import Rotation
 
 from endotsr.clips.poses.agreement import agreement
 from endotsr.clips.poses.matches import matcher_of
@@ -32,6 +33,16 @@ def test_a_misreading_is_named_with_its_remedy(wrong):
     found = agreement(MATCHER, wrong.poses, PAIRS)
     assert (found.verdict, found.reading) == ("misread", OPPOSITE[wrong.name])
     assert found.remedy and found.reading in found.sentence
+
+
+@pytest.mark.parametrize(("order", "name"), [([3, 0, 1, 2], "w x y z"), ([1, 2, 3, 0], "x y z w")])
+def test_the_remedy_of_quaternions_names_the_order_of_the_file(order, name):
+    """A file of w x y z, read as x y z w; and one of x y z w that was turned from w x y z once too often."""
+    true = Rotation.random(5, random_state=1)
+    read = Rotation.from_quat(true.as_quat()[:, order]).as_matrix()
+    found = {one.name: one for one in readings([CameraPose(turn.T, np.zeros(3)) for turn in read])}
+    undone = np.array([pose.rotation.T for pose in found[f"quaternions {name}"].poses])
+    np.testing.assert_allclose(undone, true.as_matrix(), atol=1e-12)
 
 
 def test_poses_of_another_path_are_wrong_without_a_remedy():

@@ -81,6 +81,14 @@ def test_a_record_from_before_seconds_were_kept_is_read(tmp_path):
     assert checked_record(data, "a").duration == 0
 
 
+def test_a_record_with_a_mirrored_camera_is_refused(tmp_path):
+    written(tmp_path, frame_rate=25.0)
+    data = msgspec.to_builtins(record_of(read_sequence(tmp_path, WHOLE, 0.2)))
+    data["cameras"][0]["rotation"] = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    with pytest.raises(InputError, match="cameras: 0: rotation: its rows are a mirror image"):
+        checked_record(data, "a")
+
+
 def test_without_masks_every_pixel_is_tissue(tmp_path):
     written(tmp_path, masks=False)
     sequence = read_sequence(tmp_path, WHOLE, 0.2)

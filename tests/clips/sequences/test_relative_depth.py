@@ -191,3 +191,11 @@ def test_a_clip_without_depth_is_told_the_ways_of_one_camera(tmp_path, capsys):
     assert "--kind relative" in capsys.readouterr().out.splitlines()[-1]
     assert main(["check", str(where)]) != 0 and "--kind relative" in capsys.readouterr().out
     assert main(["train", str(where), "--out", str(tmp_path / "r")]) == 2 and "--flat" in capsys.readouterr().err
+
+
+def test_a_value_that_is_not_finite_has_no_depth_within_assumed_limits_either():
+    line = StraightLine(0.5, 0.1)
+    r = np.array([[np.inf, -np.inf, np.nan, 1.0]])
+    np.testing.assert_array_equal(line.depth(r, 4.0) > 0, [[False, False, False, True]])
+    np.testing.assert_array_equal(line.depth(r) > 0, [[False, False, False, True]])
+    assert line.depth(np.array([[-9.0]]), 4.0).item() == 4.0

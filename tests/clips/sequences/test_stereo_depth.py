@@ -214,5 +214,6 @@ def test_depth_beyond_the_steps_of_the_first_frame_is_said(tmp_path):
         np.save(tmp_path / "other" / f"{i:06d}.npy", np.full((HEIGHT, WIDTH), 500.0 if i == 3 else 10.0 + i))
     report = write_depth(tmp_path / "clip", from_files(tmp_path / "clip", tmp_path / "other", "depth", 1.0))
     assert report.note == (
-        f"{HEIGHT * WIDTH} pixels are clipped at 131.07, eight times the usual depth of the first frame"
+        f"{HEIGHT * WIDTH} pixels are clipped at 131.07, at least eight times the usual largest depth of the first"
+        " frame"
     )

@@ -1,7 +1,7 @@
 """Smoke and blur: frames with much less fine contrast than the others.
 
 The sharpness of a frame is the mean squared Laplacian over tissue at full size, less the contribution of noise, divided
-by the squared brightness. It is invariant to gain. Blur lowers the sharpness and does not change the darkest tissue.
+by the squared brightness. It is invariant to gain. Blur lowers the sharpness and hardly changes the darkest tissue.
 Smoke adds light everywhere, which also raises the dark channel (the smallest channel, tenth percentile over tissue).
 Both are found only if they vary: a clip that is blurred throughout has no sharp frame for comparison. A frame without
 tissue shows neither, and no other frame is compared with it.

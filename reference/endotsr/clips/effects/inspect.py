@@ -2,7 +2,7 @@
 
 The tests of blur, smoke, motion, light and topology use the noise. Frames with blur or smoke, and those
 without tissue, are excluded as reference and from motion. The test of light depends on the results of the tests of
-motion and of the camera.
+motion and of the camera, that of topology on that of the camera.
 """
 
 from typing import Any, NamedTuple

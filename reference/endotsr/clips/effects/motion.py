@@ -2,8 +2,8 @@
 
 The flow of a tile counts as motion if its root mean square over time exceeds both `LEAST_MOTION` pixels and
 `NULL_FACTOR` times the flow caused by noise in that tile, in at least `LEAST_TILES` tiles and `TILE_FRACTION` of them.
-For a moving camera, the flow of the best-fitting rigid scene is removed first, tiles next to excluded pixels are
-ignored, and the round-trip error of the flow counts as noise (rigid.py).
+For a moving camera, the flow of the best-fitting rigid scene is removed first, `RIGID_ERROR` of its size is added to
+the limit, tiles next to excluded pixels are ignored, and the round-trip error of the flow counts as noise (rigid.py).
 """
 
 import numpy as np

@@ -38,8 +38,9 @@ class Line(NamedTuple):
 
 
 def spectral_lines(tiles: FloatArray, times: FloatArray, frames: int, null: FloatArray) -> list[Line]:
-    """Lines of the tile flow (m, 2, U), strongest first. `null` (U,) is the noise flow, which weights the tiles.
+    """Lines of the tile flow (m, 2, U), the least probable in noise first.
 
+    null     (U,) the noise flow, which weights the tiles
     frames   of the whole sequence: the highest tested rate is frames / 2.2
     """
     m = len(times)
@@ -71,7 +72,7 @@ def _lines_of(course: FloatArray, times: FloatArray, frames: int) -> list[Line]:
 
 
 def _strongest(course: FloatArray, times: FloatArray, frames: int, base: FloatArray) -> Line | None:
-    """The rate that explains most of the variance, if it passes all conditions."""
+    """The rate whose wave is the least probable in noise, if it passes all conditions."""
     left, m = residual(base, course), len(times)
     total = float(left @ left)
     highest = frames / 2.2

@@ -143,7 +143,7 @@ def _assembled(
 
 
 def carried(inspection: Inspection, config: Config) -> Dictionary:
-    """The largest part of the configured dictionary that the training stamps determine."""
+    """The largest part of the configured dictionary that the training stamps determine; else one frequency."""
     model, times = config.model, inspection.clip.times
     configured = report_atoms(times, frequencies(model.frequencies, model.frequency_min, model.frequency_max))
     nyquist = inspection.clip.frames / SAMPLES_A_CYCLE

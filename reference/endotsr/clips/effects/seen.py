@@ -106,7 +106,10 @@ def quantisation(depth: np.ndarray, known: np.ndarray) -> float:
 
 
 def temporal_flicker(clip: ReducedFrames) -> float:
-    """The smaller of the MADs of the second differences over time and over the picture, scene units."""
+    """The flicker of depth as a standard deviation, scene units: the median over frames.
+
+    Of a frame it is the smaller of two estimates, by the median absolute second difference over time and along rows.
+    """
     found = []
     for k in range(1, clip.count - 1):
         d = clip.depth[k - 1 : k + 2].astype(np.float64)

@@ -33,7 +33,7 @@ class EffectVerdict(NamedTuple):
     present: bool
     kind: str  # one or two words: "none", "periodic", "white balance"
     statistic: float
-    threshold: float  # of the statistic; the effect is present at or above it
+    threshold: float  # of the statistic; the effect is present at or above it, and above it for a fact
     unit: str  # of both
     test: str  # description of the statistic
     false_positive_rate: float | None  # designed rate; 0 for a fact, None where the threshold has no rate

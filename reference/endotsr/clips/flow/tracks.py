@@ -23,7 +23,9 @@ from endotsr.method.splatting.camera import Camera, backproject, project
 OUTSIDE = -1e6  # column and row of a point behind the camera
 CONSISTENT = 0.01  # of the squared lengths of forward and backward flow
 TOLERANCE = 0.5  # px^2
-DEPTH_JUMP = 0.1  # of the depth; a larger change between frames or from the expected depth is another surface
+# Of the depth: a change of more than twice this between frames, or of a quarter of it where a lost point is found
+# again, is another surface.
+DEPTH_JUMP = 0.1
 NEIGHBOURS = 8  # followed points that move a lost point
 KEPT_PAIRS = 64  # frame pairs whose flows are cached for the way back; further ones are recomputed
 FEWEST = 16  # followed points; with fewer, lost points stay in place

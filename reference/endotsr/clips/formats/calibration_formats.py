@@ -64,7 +64,10 @@ class Format(NamedTuple):
 
 
 def distortion_of(numbers: FloatArray, where: str) -> tuple[float, ...]:
-    """Four, five or eight coefficients; trailing zeros are dropped. Raises InputError for other counts."""
+    """No, four, five or eight coefficients. Other counts above four lose trailing zeros down to the next of these.
+
+    Raises:  InputError for a count that is none of these then.
+    """
     values = [float(value) for value in numbers.ravel()]
     while len(values) > 4 and values[-1] == 0 and len(values) not in (5, 8):
         values.pop()
@@ -149,7 +152,7 @@ def _number(word: str) -> float:
 
 
 def read_matrix(path: Path) -> FloatArray:
-    """K (3, 3) from three lines of three numbers, or of four (Hamlyn) with a last column of 0. Raises InputError."""
+    """K (3, 3) from nine numbers row by row, or twelve (3x4, Hamlyn) with a last column of 0. Raises InputError."""
     text = read_text(path, LARGEST_MATRIX)
     words = text.replace(",", " ").replace("[", " ").replace("]", " ").split()
     try:
@@ -176,7 +179,7 @@ def _checked_matrix(rows: FloatArray, path: Path) -> FloatArray:
 def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
     """cam0 of Kalibr's camchain.yaml, and cam1 with T_cn_cnm1, which maps cam0 to cam1 in metres, if there is one.
 
-    Raises:  InputError for another model than pinhole with radtan.
+    Raises:  InputError for another model than pinhole with radtan or none.
     """
     if not isinstance(keys.get("cam0"), dict):
         return None

@@ -15,7 +15,7 @@ from endotsr.method.splatting.camera import CameraPose
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
 LEAST_VIEW, MOST_VIEW = 1, 170  # degrees, of `--field-of-view`
-SPREAD = 0.003  # of the focal length and the picture: 1 px at the border of a picture of 640 px
+SPREAD = 0.003  # of the focal length: 1 px at the border of a picture of 640 px; of the picture; of a coefficient
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 # x right, y down, z forward; x right, y up, z backward; x down, y right, z backward. x_opencv = AXES[name] @ x_name.
 AXES = {
@@ -180,8 +180,8 @@ def opencv_matrix(intrinsics: Intrinsics) -> FloatArray:
 def shared_intrinsics(cameras: list[Intrinsics], where: object, notes: list[str]) -> Intrinsics:
     """The median of the cameras of single pictures, which a reconstruction estimates one by one; noted if they differ.
 
-    Raises:  InputError for several picture sizes, or focal lengths and principal points that differ by more than
-             `SPREAD`.
+    Raises:  InputError for several picture sizes, or focal lengths (relative), principal points (over width and height)
+             or distortion coefficients that differ from their median by more than `SPREAD`.
     """
     if len(set(cameras)) == 1:
         return cameras[0]

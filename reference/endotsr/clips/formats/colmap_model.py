@@ -18,7 +18,7 @@ from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import read_bytes, read_text
 from endotsr.untrusted.names import counted
 
-LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations
+LARGEST_FILE = 1 << 31  # bytes of images.bin: 24 for an observation, enough for more than eighty million
 
 # Name -> (number in binary files, parameter indices of fx fy cx cy and of the distortion k1 k2 p1 p2 ...).
 MODELS: dict[str, tuple[int, tuple[int, int, int, int], tuple[int | None, ...]]] = {

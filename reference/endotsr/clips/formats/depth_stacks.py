@@ -45,6 +45,8 @@ def array_of(path: Path, kinds: str = "fiu") -> NDArray:
 
     kinds    the kinds of numbers that count, as NumPy names them
 
+    Edges:   an array with a side of 2 or 3, as colours and matrices have, does not count: a clip of two or three frames
+             is not read.
     Raises:  InputError for a file without exactly one such array, and for what is no regular file.
     """
     with open_regular(path, LARGEST_FILE) as file:

@@ -57,7 +57,7 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bo
     rate      pictures per second
     lossless  PNG pictures, which `video_pictures` returns exactly; few players support them
     comment   that the file states
-    Raises:   InputError without pictures or without an encoder for the format.
+    Raises:   InputError without pictures or without an encoder for the format; OSError of the file system.
     """
     import av
     import av.error

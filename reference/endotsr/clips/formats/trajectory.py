@@ -141,7 +141,10 @@ def _by_numbers(
 
 
 def poses_at(trajectory: Trajectory, times: FloatArray, longest: float) -> list[CameraPose | None]:
-    """Poses at times, interpolated; None outside the trajectory and in gaps longer than 2 `longest`, seconds."""
+    """Poses at times, interpolated between stamps that are at most 2 `longest` apart, seconds.
+
+    Edges:   elsewhere the nearest pose if it is at most `longest` / 2 away, else None.
+    """
     stamps, found = trajectory.stamps, []
     for t in times:
         after = int(np.searchsorted(stamps, t))

@@ -8,7 +8,8 @@ sides are blended by time,
 
     c_i = (1 - s) m_i + s m'_i,   s = (i - a) / (b - a),
 
-and the mask is c_i > 1/2. With a margin, it is c_i > 1/4, grown by `margin` pixels: in the middle between two keys one
+and the mask is c_i > 1/2. With a margin, it is c_i >= 1/4, grown by `margin` pixels. Blends are stored in steps of
+1/255, and compared after rounding. In the middle between two keys one
 side is enough, near a key the far side alone is not. A mask that is too large costs less than one that is too small.
 
 Tissue that an instrument uncovers has no place in the frame before, where the flow of that side is wrong; the other

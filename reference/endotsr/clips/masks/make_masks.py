@@ -160,12 +160,12 @@ def drawing_for(clip: Clip, keys: Path | None, wanted: int) -> DrawnClip:
 def enter_masks(folder: Path, replace: bool = False, propose: Propose | None = None) -> Proposal:
     """Propose masks for a folder in the common format and record them. Without a proposal the folder is unchanged.
 
-    A mask that is equal in all frames, such as a field of view, is united with the proposal.
+    A mask that is equal in all frames, such as a field of view, is united with the proposal, unless `replace`.
 
     replace   whether existing masks may be replaced
     propose   where the masks come from; None = by colour and motion
 
-    Raises:  InputError, leaving the folder unchanged.
+    Raises:  InputError, leaving the folder unchanged, unless the overlay alone cannot be written.
     """
     clip = describe_prepared(folder)
     static = None if replace else _static_mask(clip)

@@ -50,7 +50,7 @@ def inside_polygon(points: FloatArray, width: int, height: int) -> BoolArray:
     """Pixels (H, W) whose centre is inside the polygon (n, 2) by the even-odd rule; fewer than 3 points: none.
 
     An edge crosses the row of a pixel centre at x if one end is at most as low as the row and the other lower. Every
-    crossing switches the pixels to its right.
+    crossing switches the pixels whose centre is at x or to its right.
     """
     switches = np.zeros((height, width + 1), np.int64)
     ends = np.roll(points, -1, axis=0)
@@ -111,7 +111,8 @@ def _count(ends: NDArray[np.int64], low: FloatArray, high: FloatArray) -> None:
 def shapes_of(mask: BoolArray, origin: Origin) -> list[MaskShape]:
     """Polygons whose area is a mask (H, W), within TOLERANCE of its outline; holes are polygons that erase.
 
-    Regions below LEAST_AREA are left out.
+    The largest comes first, so that a hole is erased before the region inside it is drawn. Regions and holes below
+    LEAST_AREA, and outlines of more than MOST_POINTS points, are left out.
     """
     from endotsr.clips.opencv import outlines
 
@@ -119,7 +120,7 @@ def shapes_of(mask: BoolArray, origin: Origin) -> list[MaskShape]:
     kept = [(points, hole) for points, hole in found if 3 <= len(points) <= MOST_POINTS and _area(points) >= LEAST_AREA]
     return [
         MaskShape(tool="polygon", points=[(float(x), float(y)) for x, y in points], erase=hole, origin=origin)
-        for points, hole in sorted(kept, key=lambda pair: pair[1])
+        for points, hole in sorted(kept, key=lambda pair: -_area(pair[0]))
     ]
 
 

@@ -73,7 +73,8 @@ class _Region(NamedTuple):
 def propose_masks(pictures: Iterable[Picture]) -> Proposal:
     """Instrument masks for the pictures (H, W, 3) of a clip, in time order.
 
-    Edges:  a single picture: motion is not used. A clip without colour: no proposal.
+    Edges:  a single picture: motion is not used. A clip without colour: the dark border alone, or without one no
+            proposal.
     """
     small, sizes = [], []
     for picture in pictures:

@@ -1,4 +1,5 @@
-"""The only room that calls OpenCV: PNG files, Canny edges, flow, resizing; `stereo` and `pictures`.
+"""The only room that works with OpenCV: PNG files, Canny edges, flow, warps, regions, resizing. See also `pictures`,
+`geometry` and `stereo`.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
 (BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) do not leave this room. `library`
@@ -128,13 +129,14 @@ def dense_flow(source: Array, target: Array) -> NDArray[np.float32]:
 
 
 def warp_cubic(image: Array, flow: Array) -> NDArray[np.float32]:
-    """As `warp_bilinear`, with bicubic interpolation, which preserves the finest detail of pictures.
+    """As `warp_bilinear`, with bicubic interpolation, which keeps more of the fine detail of pictures.
 
     image    (H, W) or (C, H, W) float32
     flow     (2, H, W) pixels, x first
     returns  float32 of the same shape; values may overshoot the range of the image
 
-    OpenCV 4 rounds positions to 1/32 pixel, and OpenCV 5 does not. The kernel is that of Keys with a = -3/4.
+    OpenCV 4 rounds positions to 1/32 pixel, and OpenCV 5 does not. The kernel is that of Keys with a = -3/4, which does
+    not reproduce a linear slope exactly.
     """
     cv2 = _cv2()
     height, width = image.shape[-2:]
@@ -159,7 +161,10 @@ def warp_bilinear(image: Array, flow: Array) -> Array:
 
 
 def gaussian_blur(plane: Array, deviation: float) -> NDArray[np.float32]:
-    """A float32 plane (H, W) convolved with a Gaussian of this standard deviation, px; mirrored at the border."""
+    """A float32 plane (H, W) convolved with a Gaussian of this standard deviation, px, cut at four of them.
+
+    At the border the plane is mirrored about the centres of the outermost pixels, which are not repeated.
+    """
     return _cv2().GaussianBlur(plane, (0, 0), deviation)
 
 
@@ -195,7 +200,8 @@ def grown(mask: NDArray[np.bool_], pixels: float) -> NDArray[np.bool_]:
 def nearest_pixels(missing: NDArray[np.bool_]) -> NDArray[np.intp]:
     """(H, W) flat index of the nearest pixel that is not missing; its own, if a pixel is not missing itself.
 
-    Distances are those of OpenCV's mask of 5x5 pixels, within 2 % of the Euclidean ones.
+    Distances are those of OpenCV's mask of 5x5 pixels, within 2 % of the Euclidean ones. The pixel that is found can
+    therefore be up to 4 % farther than the nearest one.
 
     Edges:   at least one pixel must not be missing.
     """
@@ -214,7 +220,8 @@ def outlines(mask: NDArray[np.bool_], tolerance: float) -> list[tuple[NDArray[np
     tolerance   px between an outline and its polygon
 
     The centre of the first pixel is at (0.5, 0.5). OpenCV follows the centres of the outermost pixels; the mask is
-    therefore enlarged, so that the polygon passes within a quarter of a pixel of the edge between two pixels.
+    therefore enlarged, so that the outline passes within a quarter of a pixel of the edge between two pixels. The
+    polygon is within `tolerance` of that outline.
     """
     cv2, factor = _cv2(), 2
     large = np.kron(mask, np.ones((factor, factor), bool)).astype(np.uint8)

@@ -73,7 +73,8 @@ def pose_by_consensus(
 
     points   (3, M) scene units, M >= 4
     pixels   (2, M) in the picture of `camera`, whose intrinsics are used
-    start    rotation and translation with which the search begins
+    start    rotation and translation with which the least squares over the agreeing points begin; the samples do not
+             use it, and a start far from the pose can end in another minimum
     """
     cv2 = cv2_library()
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])

@@ -57,7 +57,7 @@ def marks_of(data: bytes) -> dict[str, Any]:
 
 
 def _png(data: bytes) -> dict[str, Any]:
-    """Chunks up to the pixels; their value is what a decoder would do with them."""
+    """The first `MOST_FIELDS` chunks; their value is what a decoder would do with them."""
     found: dict[str, Any] = {}
     for kind, content in _chunks(data):
         value: Any = True

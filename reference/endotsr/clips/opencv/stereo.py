@@ -43,6 +43,8 @@ def rectification_maps(
     """Maps that align the rows of the two pictures; each camera has its own distortion.
 
     rotation, translation   x_right = rotation @ x_left + translation
+
+    Edges:   cameras that are farther apart vertically than horizontally: OpenCV aligns columns, and the baseline is 0.
     """
     cv2 = cv2_library()
     lefts, rights = (np.ascontiguousarray(values, np.float64).reshape(-1, 1) for values in distortions)
@@ -59,7 +61,7 @@ def rectification_maps(
 
 
 def undistortion_maps(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> Maps:
-    """Maps that undistort the picture of one camera. The new picture shows only pixels of the old one."""
+    """Maps that undistort the picture of one camera. The new one shows the old one alone, to a fraction of a pixel."""
     cv2 = cv2_library()
     column = np.ascontiguousarray(distortion, np.float64).reshape(-1, 1)
     new, _ = cv2.getOptimalNewCameraMatrix(matrix, column, (width, height), 0)
@@ -84,7 +86,7 @@ def remapped(picture: Array, maps: Maps, nearest: bool = False) -> Array:
 class Matching(NamedTuple):
     """Disparities of the left picture, pixels, and measures of their quality."""
 
-    disparity: NDArray[np.float32]  # (H, W) smoothed; NaN where unknown
+    disparity: NDArray[np.float32]  # (H, W) smoothed, if that was asked for; NaN where unknown
     raw: NDArray[np.float32]  # (H, W) before smoothing
     confidence: NDArray[np.float32]  # (H, W) in [0, 1]
     disagreement: NDArray[np.float32]  # (H, W) px between left and right disparity; infinite where unknown
@@ -124,7 +126,10 @@ def _pixels(fixed: Array, lowest: int) -> NDArray[np.float32]:
 
 
 def left_right_disagreement(left: Array, right: Array) -> NDArray[np.float32]:
-    """|d_left(x) - d_right(x - d_left(x))|, px; infinite where either is unknown or outside the picture."""
+    """|d_left(x) - d_right(x - d_left(x))|, px; infinite where either is unknown or outside the picture.
+
+    The right disparity is that of the nearest column.
+    """
     height, width = left.shape
     columns = np.arange(width)[None, :] - np.where(np.isfinite(left), left, 0)
     there = np.rint(columns).astype(np.intp)

@@ -23,7 +23,7 @@ LEAST_OVERLAP, LEAST_SEEN = 0.3, 80  # fraction and number of the points of a pa
 FLOOR = 0.05  # least robust scale, local standard deviations
 SCALES, STEPS = 2, 3  # estimates of the scales at each level, and steps tried after each
 DAMPING, SOFTER, HARDER = 1e-4, 0.3, 10.0  # of the normal equations: at first, after a success, after a failure
-ENOUGH = 2e-5  # rad, and fraction of the depth: a shorter step ends a level
+ENOUGH = 2e-5  # rad, and fraction of the depth: after a shorter step, the scales are estimated again
 
 
 class PairFit(NamedTuple):
@@ -32,7 +32,7 @@ class PairFit(NamedTuple):
     scale: float  # median robust standard deviation, local standard deviations of the picture
     agreeing: float  # of the points, weighted as they agree
     pairs: int
-    steps: int  # accepted
+    steps: int  # accepted at this level
 
 
 class Bundle(NamedTuple):
@@ -56,7 +56,7 @@ def adjusted(
     levels: list[PyramidLevel], poses: list[CameraPose], depth: float, on_step: Callable[[], object] = lambda: None,
     returns: Sequence[tuple[int, int]] = (),
 ) -> Bundle:  # fmt: skip
-    """The poses that minimise the residuals of all pairs.
+    """The poses near the given ones that minimise the residuals of all pairs, as far as the steps lead.
 
     levels    from coarse to fine
     poses     one per frame, near the solution

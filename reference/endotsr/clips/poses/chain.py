@@ -2,8 +2,8 @@
 
 In: a `Matcher`. Out: `Chain`, with None for frames that show too little. A frame is tried against the keyframe, then
 against the last frame with a pose, by flow; after a gap also by features. Too few matches, or matches that do not look
-alike, are not used, so nothing is registered across a cut. A keyframe is replaced when too few of its usable points
-are found or agree.
+alike, are not used, so flow registers nothing across a cut to another scene. A keyframe is replaced when too few of its
+usable points are found or agree, and after a frame that is registered to another one.
 """
 
 from collections.abc import Callable
@@ -54,8 +54,8 @@ def chained(
     on_frame  called with the chain after each frame
     begun     the chain of an interrupted call, which continues
 
-    Raises:  InputError if no two frames can be registered, or if more than `LONGEST_GAP` frames in a row have no pose
-             between frames that have one.
+    Raises:  InputError if no frame has enough usable pixels with depth, if no later frame can be registered to the
+             first one that has, or if more than `LONGEST_GAP` frames in a row after it have no pose, also at the end.
     """
     chain = begun or _beginning(matcher)
     first = next(k for k, pose in enumerate(chain.poses) if pose is not None)

@@ -38,7 +38,7 @@ class PathEstimate(NamedTuple):
     left: float  # median pixels that the poses leave of the flow between frames, at the size of the flow
     still: float  # median pixels that no motion leaves
     returns: list[Return]  # to places seen before
-    own: float  # median motion of the tissue beside the rigid one, between frames `APART` apart
+    own: float  # median motion of the tissue beside the rigid one, between frames at most `APART` apart
 
     @property
     def without(self) -> list[int]:
@@ -75,7 +75,7 @@ def estimated(
     known     from `movement_of`, if it was called
     with_returns   whether places that are seen again hold the path against drift
 
-    Raises:  InputError for a clip of one frame, without depth, or with a gap that is too long.
+    Raises:  InputError for a clip of one frame or without depth, and as `chained`.
     """
     if views.count < 2:
         raise InputError("one frame: there is no motion to estimate")

@@ -1,7 +1,8 @@
 """Pictures, masks and points of all frames at one level of a pyramid, for the direct bundle adjustment.
 
 The local mean of a picture is removed, and the rest divided by the local standard deviation: light that moves with the
-scope, exposure and vignetting cancel. Both are taken over usable pixels alone, so an instrument leaves no rim.
+scope, exposure and vignetting cancel as far as they are even over the window and the contrast is well above `FAINT`.
+Both are taken over usable pixels alone, so that an instrument hardly leaves a rim.
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ from endotsr.clips.poses.views import Views, known_depth, usable_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import backproject
 
-SMOOTH, LOCAL = 1.0, 8.0  # pixels: standard deviation of the first blur, and of the window of mean and contrast
+SMOOTH, LOCAL = 1.0, 8.0  # pixels, standard deviations: blur at full size; window of mean and contrast at every level
 FAINT = 16.0  # grey levels^2: added to the local variance
 MOST_POINTS = 4000  # of a frame
 
@@ -52,7 +53,7 @@ def _plane(
 
 
 def normalised(grey: NDArray[np.float32], mask: BoolArray) -> NDArray[np.float32]:
-    """(grey - local mean) / local standard deviation, both over the mask; 0 far from it. (H, W)."""
+    """(grey - local mean) / local standard deviation, both over the mask, (H, W); without meaning far from it."""
     weight = mask.astype(np.float32)
     total = np.maximum(gaussian_blur(weight, LOCAL), np.float32(1e-6))
     mean = gaussian_blur(grey * weight, LOCAL) / total

@@ -15,7 +15,7 @@ from endotsr.clips.poses.views import ViewFrame, Views, known_depth, usable_pixe
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera, backproject
 
-POINTS, LEAST_STEP = 600, 4  # number of grid points of a picture, and their least distance in pixels
+POINTS, LEAST_STEP = 600, 4  # about the most grid points of a picture, and their least distance in pixels
 RETURN, RETURN_FRACTION = 1.0, 0.03  # accepted error of flow there and back: pixels, and fraction of the flow
 SMOOTH = 2.0  # pixels: standard deviation of the blur before pictures are compared
 STRONGEST = 800  # features of a frame in `by_strongest`
@@ -28,8 +28,8 @@ class Matches(NamedTuple):
     points: FloatArray  # (3, M) in the axes of the source camera, scene units
     source: FloatArray  # (2, M) pixels, the centre of the first pixel is (0.5, 0.5)
     target: FloatArray  # (2, M) pixels
-    usable: int  # grid points of the source frame that could have matched
-    likeness: float = 1.0  # correlation of the smoothed luminance of the points between both frames
+    usable: int  # grid points, or features, of the source frame that could have matched
+    likeness: float = 1.0  # correlation of the equalised, smoothed luminance of the points; 1 for features
 
     @property
     def support(self) -> float:

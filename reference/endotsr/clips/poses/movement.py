@@ -17,7 +17,7 @@ LEAST_FLOW = 0.7  # pixels: with less, the picture hardly moves
 DRIFT = 0.05  # of the width: the flow of the whole picture, added up
 MOST_PAIRS, LEAST_PAIRS = 24, 4
 GAPS = (1, 2, 4, 8, 16)  # frames
-WANTED = 4.0  # pixels that the picture moves between the frames of a pair
+WANTED = 4.0  # pixels that the picture moves between the frames of a pair; half of it is enough
 LEAST_MATCHES = 25
 Answer = Literal["moving", "still", "unclear"]
 
@@ -52,7 +52,7 @@ class Movement(NamedTuple):
         if self.pairs < LEAST_PAIRS:
             return "too few frames match one another: whether the scope moves cannot be told"
         if self.flow < LEAST_FLOW:
-            return f"the picture moves by {self.flow:.1f} pixels at most: the scope is still"
+            return f"the picture moves by {self.flow:.1f} pixels in the median: the scope is still"
         words = {
             "moving": "the scope moves",
             "still": "the scope is still, and the tissue moves",
@@ -64,7 +64,9 @@ class Movement(NamedTuple):
 
 
 def pairs_that_move(matcher: Matcher) -> list[FramePair]:
-    """Up to `MOST_PAIRS` pairs, each with the smallest gap at which the picture moves enough.
+    """Up to `MOST_PAIRS` pairs, each with a gap at which the picture moves enough, or else the widest that matches.
+
+    The search starts from the gap that served last, or from the one below where the picture moved far.
 
     The first and the last frame are left out: a time that is shifted by a frame has no pose there.
     """

@@ -14,7 +14,8 @@ from endotsr.method.splatting.camera import CameraPose
 OPENGL = np.diag([1.0, -1.0, -1.0])  # x right, y up, z backward: the columns of a camera-to-world rotation
 LLFF = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # columns down, right, back to right, up, back
 TO_MM = 1000.0
-ORDERS = {"w x y z": [3, 0, 1, 2], "x y z w": [1, 2, 3, 0]}
+# Order that the file has -> places of the true x y z w in the quaternion that was read as x y z w.
+ORDERS = {"w x y z": [1, 2, 3, 0], "x y z w": [3, 0, 1, 2]}
 
 
 class Reading(NamedTuple):

@@ -18,7 +18,7 @@ from endotsr.method.splatting.camera import Camera, CameraPose, project
 LEAST = 12  # matches, and matches that agree
 LEAST_AGREEING = 0.3  # of the matches that agree
 ROUNDS = 12  # of the least squares
-TUKEY, MAD = 4.685, 1.4826  # 95 % efficiency; standard deviation over median absolute deviation
+TUKEY = 4.685  # 95 % efficiency
 FLOOR = 0.9  # pixels: least width of the weights
 ENOUGH = 1e-7  # rad, and fraction of the depth: a shorter step ends the rounds
 
@@ -39,10 +39,10 @@ class Resection(NamedTuple):
 def resection(
     matches: Matches, camera: Camera, start: CameraPose = IDENTITY, consensus: bool = True
 ) -> Resection | None:
-    """The relative pose that explains the matches best; None if fewer than `LEAST` agree.
+    """The relative pose that explains the matches best; None if fewer than `LEAST` or `LEAST_AGREEING` of them agree.
 
-    start       where the search begins
-    consensus   whether random samples look for a better beginning
+    start       where the least squares begin
+    consensus   whether the pose on which random samples agree takes the place of `start`
     """
     if matches.count < LEAST:
         return None
@@ -77,7 +77,7 @@ def _errors(pose: CameraPose, matches: Matches, camera: Camera) -> tuple[FloatAr
     u, v, z = project(placed, matches.points)
     error = np.where(z > 0, np.stack([u, v]) - matches.target, 0.0)
     distance = np.where(z > 0, np.hypot(*error), np.inf)
-    width = max(FLOOR, TUKEY * 1.2 * float(np.median(distance)))  # 1.2: standard deviation over median length
+    width = max(FLOOR, TUKEY * 1.2 * float(np.median(distance)))  # 1.2: root mean square over median length
     ratio = np.minimum(distance / width, 1.0)
     return error, distance, (1 - ratio**2) ** 2
 

@@ -122,9 +122,10 @@ def _nearest(times: FloatArray, wanted: FloatArray) -> NDArray[np.intp]:
 def written_times(
     clip: Clip, frames: list[int], rate: float | None, notes: list[str]
 ) -> tuple[list[float] | None, float]:
-    """The times for `sequence.toml`, None for evenly spaced frames, and the mean frame rate.
+    """The times for `sequence.toml`, None for evenly spaced frames, and the frame rate; 0 if it is unknown.
 
-    rate     the requested frame rate, or None
+    rate     the requested frame rate, or None. Evenly spaced frames have it, or else, without gaps, that of the source;
+             others have their mean rate
     """
     times = clip.times_of(frames)
     if len(frames) < 2:

@@ -25,7 +25,7 @@ from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replace_text
 
 KEPT, MODEL = "masks_kept", "sparse/0"
-POINTS, FRAMES_OF_POINTS = 2000, 16  # points per frame; frames with points
+POINTS, FRAMES_OF_POINTS = 2000, 16  # points per frame, or up to twice as many; frames with points
 THOUSANDTHS = 1e3  # nerfstudio reads depth in thousandths of the unit of its matrices
 
 

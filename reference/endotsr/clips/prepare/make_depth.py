@@ -117,11 +117,11 @@ def depth_of_values(
     """Depth (H, W) in the unit of the sequence and at its size, 0 = none, from the values of another program.
 
     values  as stored. Disparities refer to the left picture, in pixels at the width of the file. Their sign is reversed
-            if all of them are negative.
+            if none of them is positive.
     kind    of the values
     scale   length, or pixels of disparity, per stored unit
 
-    Raises:  InputError for another aspect ratio, or for disparities without a baseline.
+    Raises:  InputError for another aspect ratio, for disparities without a baseline, or with a median beyond the width.
     """
     numbers = values.astype(np.float64) * scale
     numbers[~np.isfinite(numbers)] = 0.0
@@ -209,7 +209,8 @@ def write_depth(
             on_frame(k + 1, len(names))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
-    lost = f"{clipped} pixels are clipped at {65535 * step:g}, eight times the usual depth of the first frame"
+    usual = "at least eight times the usual largest depth of the first frame"
+    lost = f"{clipped} pixels are clipped at {65535 * step:g}, {usual}"
     notes = [made.note] * bool(made.note) + [lost] * bool(clipped)
     return DepthReport(file, coverage, float(np.median(medians)), "; ".join(notes))
 

@@ -42,9 +42,9 @@ class StraightLine(NamedTuple):
     def depth(self, relative: FloatArray, farthest: float = np.inf) -> NDArray[np.float32]:
         """z (H, W) of r (H, W); 0 = none, where r is not finite or the inverse depth is not positive.
 
-        farthest   if finite, z is clipped to [1, farthest]
+        farthest   if finite, z is clipped to [1, farthest], and an inverse depth that is not positive gives `farthest`
         """
-        inverse = self.scale * relative + self.shift
+        inverse = np.where(np.isfinite(relative), self.scale * relative + self.shift, np.nan)
         if np.isfinite(farthest):
             inverse = np.clip(inverse, 1 / farthest, 1)
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):

@@ -2,8 +2,8 @@
 
     z = f B / d          f, B: focal length (px) and baseline; d: disparity (px)
 
-In: left and right pictures, the intrinsics and the baseline. Out: depth (H, W) with unfilled holes (0), and a
-confidence. A pixel has depth if left and right agree, the match is confident and the depth is within range.
+In: left and right pictures, the intrinsics and the baseline. Out: depth (H, W) with unfilled holes (0). A
+pixel has depth if left and right agree, the match is confident and the depth is within range.
 """
 
 from typing import Literal
@@ -43,7 +43,7 @@ class StereoSettings(Section, frozen=True, kw_only=True):
 def disparity_range(settings: StereoSettings, intrinsics: Intrinsics, baseline: float) -> tuple[int, int]:
     """Lowest disparity and number of disparities, a multiple of 16, for the searched depths.
 
-    Raises:  InputError for depths that are not ascending, or a range beyond the width of the pictures.
+    Raises:  InputError for depths that are not ascending, or a range beyond `MOST` or the width of the pictures.
     """
     if not 0 < settings.nearest < settings.farthest < np.inf:
         raise InputError(

@@ -127,7 +127,7 @@ class Clip:
         return np.array(frames) / (self.rate or 1.0) if self.times is None else self.times[list(frames)]
 
     def duration(self, frames: Numbers) -> float:
-        """Seconds from time 0 to time 1 of these frames, n / (n - 1) (s_{n-1} - s_0); 0 where the rate is unknown."""
+        """Seconds from time 0 to time 1 of these frames, n / (n - 1) (s_{n-1} - s_0); 0 for one frame or no rate."""
         if not self.rate or len(frames) < 2:
             return 0.0
         first, last = frames[0], frames[-1]

@@ -9,7 +9,8 @@ sequence of 63 frames, a third of whose pixels have no depth:
 | `gt_masks`, right polarity | 0.093 / 1.000 | 66 / -3 |
 
 The wrong polarity swaps each pair, while the tissue fraction (0.34 and 0.27) still looks plausible. Stereo depth is
-missing on instruments and at borders: if enough of it is missing, depth determines the polarity, otherwise colour does.
+missing on instruments and at borders. A polarity is refused if depth, where enough of it is missing, or colour
+contradicts it and the other one does not support it.
 """
 
 from pathlib import Path
@@ -142,7 +143,7 @@ def check_single_masks(
 
 
 def sparse_step(height: int) -> int:
-    """The step between sampled rows and columns that leaves about 128 rows, enough for a fraction or a median."""
+    """The step between sampled rows and columns that leaves 128 to 255 rows of a picture with so many or more."""
     return max(1, height // 128)
 
 

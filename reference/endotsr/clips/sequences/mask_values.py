@@ -59,8 +59,8 @@ def levels_of(values: Iterable[int], where: object, coded: bool = False) -> Mask
 
     coded    the pictures are stored with loss, see `is_coded`
 
-    Two numbers, the smaller at most half of the larger, are black and white. Otherwise white is 255, or 65535 where a
-    number exceeds 255.
+    Two numbers of pictures without loss, the smaller at most half of the larger, are black and white. Otherwise black
+    is 0, and white 1 where that is the largest number, 255, or 65535 where a number exceeds 255.
 
     Raises:  InputError for numbers of objects (the largest is 2 to 31), and for pictures that do not reach white.
     """
@@ -92,7 +92,7 @@ def is_coded(file: Path) -> bool:
 
 
 def levels_of_set(read: Callable[[int], NDArray], files: list[Path], where: object) -> MaskLevels:
-    """As `levels_of`, from up to 64 evenly spaced pictures of a set, or from all if none of these reaches white.
+    """As `levels_of`, from up to 64 evenly spaced pictures of a set, and from others until one reaches `DECIDED`.
 
     read     the plane of a picture; an unreadable one is passed over, because its own reading reports it
 
@@ -115,8 +115,9 @@ def white_pixels(
 ) -> tuple[NDArray[np.bool_], int]:
     """The white pixels of one picture (H, W), and the number of pixels that are neither black nor white.
 
-    Raises:  InputError for a picture with more than 5 % of its pixels farther than an eighth from black and white, and,
-             unless the set is graded, for areas of another number.
+    Raises:  InputError for a picture with more than 5 % of its pixels farther than an eighth from black and white, with
+             numbers that are not whole or above white, of 8 bits where white is 65535, and, unless the set is graded,
+             with areas of another number.
     """
     refuse_parts(plane, name)
     white = np.greater_equal(plane, levels.least, out=out)

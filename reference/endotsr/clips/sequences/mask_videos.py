@@ -33,7 +33,7 @@ def mask_files(path: Path) -> list[Path] | None:
         raise InputError(
             f"{path}: {counted(facts.count, 'mask')} of {facts.width}x{facts.height} pixels; allowed: a video of at"
             f" most {MOST_BYTES} pixels, or a folder of pictures"
-            f" (`ffmpeg -i {path.name} masks/%06d.png -start_number 0`)"
+            f" (`ffmpeg -i {path.name} -start_number 0 masks/%06d.png`)"
         )
     return [path / f"{k:06d}" for k in range(facts.count)]
 

@@ -25,7 +25,7 @@ def threshold_masks(
     raw      n pictures (H, W) of integers
     out      (n, H, W) array to fill and return; None = a new array
     levels   meaning of the numbers; None: by these pictures, as `mask_values.levels_of`
-    returns  (n, H, W) bool, True = white: at least half of full white
+    returns  (n, H, W) bool, True = white: at least half-way from black to white
 
     `notes` receives the count of intermediate values. Raises InputError as `white_pixels`, for numbers of objects, or
     for a picture of another bit depth than most if white is 65535.

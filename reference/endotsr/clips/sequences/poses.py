@@ -121,7 +121,7 @@ def _pose(
 
 
 def rows_from_cameras(cameras: list[Camera], far: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Pose rows (n, 17) of cameras, with bounds 0 and `far` (n,). The inverse of `cameras_from_rows`.
+    """Pose rows (n, 17) of cameras, with bounds 0 and `far` (n,). The inverse of `cameras_of_rows`.
 
     Raises:  InputError for a camera outside the format (two focal lengths, principal point off centre).
     """

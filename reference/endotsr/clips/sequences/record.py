@@ -164,3 +164,6 @@ def _check_cameras(found: SequenceRecord, where: str) -> None:
             for j, other in enumerate(camera.rotation):
                 if abs(sum(a * b for a, b in zip(row, other)) - (i == j)) > ROTATION_TOLERANCE:
                     raise InputError(f"{where}: cameras: {k}: rotation: its rows are not perpendicular unit vectors")
+        (a, b, c), (d, e, f), (g, h, i) = camera.rotation
+        if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
+            raise InputError(f"{where}: cameras: {k}: rotation: its rows are a mirror image, not a rotation")

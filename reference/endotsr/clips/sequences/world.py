@@ -2,9 +2,9 @@
 
 Positions are trained in float32. Its resolution at distance D from the origin is about 6e-8 D, and a pixel at depth z
 is z / f wide: for D / z = 100 and a focal length of 2000, the resolution is a hundredth of a pixel. For larger D / z,
-the origin moves to the middle of the camera centres. Lengths among the settings (learning rates, thresholds, the
-extent) are in millimetres and were chosen for tissue at about 60 mm. A sequence of arbitrary unit is scaled to this
-median depth. A sequence in millimetres near the origin is unchanged, bit by bit.
+the origin moves to the middle of the box around the camera centres. Lengths among the settings (learning rates,
+thresholds, the extent) are in millimetres and were chosen for tissue at about 60 mm. A sequence of arbitrary unit is
+scaled to this median depth. A sequence in millimetres near the origin is unchanged, bit by bit.
 """
 
 from typing import NamedTuple
@@ -49,7 +49,10 @@ def fitting_world(centres: FloatArray, depth: NDArray[np.float32], arbitrary: bo
 
 
 def usual_depth(depth: NDArray[np.float32]) -> float | None:
-    """The median depth of about 100,000 pixels over all frames; None without depth."""
+    """The median depth among 100,000 to 200,000 pixels over all frames; None without depth.
+
+    Smaller sequences, and those with depth at none of these pixels, count whole.
+    """
     sparse = depth.reshape(-1)[:: max(1, depth.size // 100_000)]
     values = sparse[sparse > 0]
     if not values.size:

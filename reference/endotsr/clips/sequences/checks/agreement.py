@@ -1,7 +1,7 @@
 """Poses, pictures and depth held against one another, for `check` and `prepare`.
 
-In: a `Clip` and its cameras. Out: findings. Frames are read on demand: at most 48 of them, whatever the length of the
-clip.
+In: a `Clip` and its cameras. Out: findings. Frames are read on demand, whatever the length of the clip: for each of at
+most 24 pairs its first frame, and those at the gaps that are tried, usually one.
 """
 
 from endotsr.clips.poses.agreement import Agreement, agreement

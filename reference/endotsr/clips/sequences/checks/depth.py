@@ -242,7 +242,10 @@ def light_finding(correlations: list[float], where: str) -> list[Finding]:
 
 
 def depth_note(depth: NDArray[np.float32], near: float, where: Path, unit: str) -> str:
-    """The note on the prior depth (n, H, W) of a folder, in this unit. Raises InputError if there is no depth."""
+    """The note on the prior depth (n, H, W) of a folder, in this unit. Raises InputError without depth.
+
+    Raises it also for depth that lies before the near plane as a whole.
+    """
     rows = [_extent(plane, near) for plane in depth]  # frame by frame, without an array over all frames
     known, before = sum(row.known for row in rows), sum(row.before for row in rows)
     if not known:

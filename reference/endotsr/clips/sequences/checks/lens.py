@@ -36,7 +36,7 @@ TANGENTIAL = 0.03  # a guess: the one real calibration at hand has 0
 
 
 def _tangential_warnings(distortion: FloatArray) -> list[str]:
-    """A warning on tangential coefficients that are as large as radial ones."""
+    """A warning on tangential coefficients beyond `TANGENTIAL`, as radial ones are."""
     found = np.ravel(distortion)
     if found.size < 4 or np.abs(found[2:4]).max() <= TANGENTIAL:
         return []
