@@ -25,27 +25,11 @@ def read_yaml(path: Path) -> Keys:
     """
     import yaml
 
-    class Loader(yaml.SafeLoader):
-        """Plain values only. An alias counts as all values that it repeats, and one in its own value as too many."""
-
-        count = 0
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            alias, before = self.check_event(yaml.AliasEvent), self.count
-            node = super().compose_node(parent, index)
-            self.count += getattr(node, "values_inside", MOST_VALUES + 1) if alias else 1
-            if not alias:
-                node.values_inside = self.count - before
-            if self.count > MOST_VALUES:
-                raise yaml.YAMLError(f"more than {MOST_VALUES} values with those that aliases repeat")
-            return node
-
-    Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
     text = read_text(path, LARGEST_FILE)
     if text.startswith(DIRECTIVE):
         text = text.partition("\n")[2]
     try:
-        documents = [document for document in yaml.load_all(text, Loader) if document is not None]
+        documents = [document for document in yaml.load_all(text, _loader()) if document is not None]
     # PyYAML passes on the errors of a value that its tag does not allow, such as `!!bool maybe`.
     except (yaml.YAMLError, RecursionError, ValueError, LookupError, AttributeError, TypeError) as error:
         mark = getattr(error, "problem_mark", None)
@@ -59,6 +43,32 @@ def read_yaml(path: Path) -> Keys:
     if not isinstance(found, dict):
         raise InputError(f"{path}: holds no keys; allowed: YAML of the form `key: value`")
     return found
+
+
+def _loader() -> Any:
+    """A loader of plain values and OpenCV's matrices.
+
+    An alias counts as all values that it repeats, and one in its own value as too many.
+    """
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Counts the values."""
+
+        count = 0
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            alias, before = self.check_event(yaml.AliasEvent), self.count
+            node: Any = super().compose_node(parent, index)
+            self.count += getattr(node, "values_inside", MOST_VALUES + 1) if alias else 1
+            if not alias:
+                node.values_inside = self.count - before
+            if self.count > MOST_VALUES:
+                raise yaml.YAMLError(f"more than {MOST_VALUES} values with those that aliases repeat")
+            return node
+
+    Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
+    return Loader
 
 
 def _matrix(loader: Any, node: Any) -> dict[Any, Any]:

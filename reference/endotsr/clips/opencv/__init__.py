@@ -1,4 +1,4 @@
-"""The only room that works with OpenCV: PNG files, Canny edges, flow, warps, regions, resizing. See also `pictures`,
+"""The room that works with OpenCV: PNG files, Canny edges, flow, warps, regions, resizing. See also `pictures`,
 `geometry` and `stereo`.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions

@@ -196,9 +196,8 @@ def _write_frames(
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
-        notes.append(
-            f"{saturated} pixels are clipped at {65535 * depth_scale:g}, at least eight times the usual largest depth"
-        )
+        limit = f"{65535 * depth_scale:g}, at least eight times the usual largest depth"
+        notes.append(f"{saturated} pixels are clipped at {limit}")
     masks = mask_entry(clip, folder, len(chosen), seen, settings.border, notes)
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(clip, straight, turned, chosen, masks, depth_scale, settings, notes)
