@@ -59,6 +59,7 @@ from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.writing import leftover_notes, new_folder
 
 LARGEST = 99.8  # percentile taken as the largest depth of a frame, without outliers
+FAR_BEYOND = "at least eight times the usual largest depth"  # where the largest level is, see `step_of_depth`
 OnFrame = Callable[[int, int], None]
 
 
@@ -196,8 +197,7 @@ def _write_frames(
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
-        limit = f"{65535 * depth_scale:g}, at least eight times the usual largest depth"
-        notes.append(f"{saturated} pixels are clipped at {limit}")
+        notes.append(f"{saturated} pixels are clipped at {65535 * depth_scale:g}, {FAR_BEYOND}")
     masks = mask_entry(clip, folder, len(chosen), seen, settings.border, notes)
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(clip, straight, turned, chosen, masks, depth_scale, settings, notes)
