@@ -24,7 +24,7 @@ from endotsr.untrusted.yaml import matrix, read_yaml
 
 HALF_A_PIXEL = "its pixel centres are at integers, as in OpenCV: half a pixel was added to cx and cy"
 LARGEST_MATRIX, LARGEST_INI = 1 << 16, 1 << 20  # bytes
-COEFFICIENTS, FEWEST = 8, (8, 5, 4)  # kc_0 .. kc_7 of an ini file; the numbers of them that OpenCV allows
+COEFFICIENTS = 8  # kc_0 .. kc_7 of an ini file
 KALIBR_MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radtan", "none")}
 ROS_MODELS, ROS_MARK = ("plumb_bob", "rational_polynomial"), "projection_matrix"
 ECHO = {"k": "camera_matrix", "d": "distortion_coefficients", "r": "rectification_matrix", "p": ROS_MARK,
@@ -110,9 +110,9 @@ def _ini_camera(parser: configparser.ConfigParser, section: str, path: Path) -> 
     width, height = (_ini_number(parser, section, key, path) for key in ("res_x", "res_y"))
     if width < 1 or height < 1 or width % 1 or height % 1:
         raise InputError(f"{path}: [{section}] res_x = {width:g}, res_y = {height:g}: allowed: whole numbers > 0")
-    given = sum(f"kc_{k}" in parser[section] for k in range(COEFFICIENTS))
-    count = next((number for number in FEWEST if given >= number), 0)
-    distortion = tuple(_ini_number(parser, section, f"kc_{k}", path) for k in range(count))
+    count = max((k + 1 for k in range(COEFFICIENTS) if f"kc_{k}" in parser[section]), default=0)
+    given = [_ini_number(parser, section, f"kc_{k}", path) for k in range(count)]
+    distortion = distortion_of(np.array(given), f"{path}: [{section}] kc_0 .. kc_{COEFFICIENTS - 1}")
     return StoredIntrinsics(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]), distortion, (int(width), int(height)))
 
 
