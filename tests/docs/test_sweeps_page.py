@@ -5,6 +5,7 @@ import json
 import pytest
 from pages.full_size import sweeps
 from pages.store.intervals import interval
+from pages.store.program import RESULTS
 
 from endotsr.errors import InputError
 
@@ -127,3 +128,16 @@ def test_a_gains_by_colour_alone():
         assert mean > half
     mean, half = interval([a - b for a, b in zip(frozen, fixed)])
     assert abs(mean) < half
+
+
+def test_an_exposure_does_not_do_what_a_does():
+    """The sentences on `light`; its base is that of the other sweep, and A stands in the record of the claims."""
+    rows, others = sweeps.rows_of(FILES["light"]), sweeps.rows_of(FILES["frozen_geometry"])
+    base = [[row for row in found if row["configuration"] == "base"] for found in (rows, others)]
+    assert base[0] == base[1] and configurations("light")["base"] == configurations("frozen_geometry")["base"]
+    exposure = sweeps.differences(rows, "exposure", "base", "psnr_full")
+    mean, half = interval(exposure)
+    assert len(exposure) == 3 and abs(mean) < half
+    stored = json.loads((RESULTS / "ablation_pulling.json").read_text(encoding="utf-8"))["rows"]
+    psnr = {(row["configuration"], row["seed"]): row["psnr_full"] for row in stored}
+    assert all(psnr["A", seed] - psnr["base", seed] > exposure[seed] for seed in range(3))
