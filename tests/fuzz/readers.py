@@ -273,6 +273,8 @@ READERS = {
         "sequence.toml", recordings.sequence_file_seeds, mutate.lines, recordings.read_sequence_file
     ),
     "calibration (ini)": Reader("StereoCalibration.ini", recordings.rig_seeds, mutate.lines, recordings.read_rig),
+    "calibration (yaml)": Reader("rig.yaml", recordings.yaml_seeds, mutate.lines, recordings.read_rig),
+    "calibration (xml)": Reader("rig.xml", recordings.storage_seeds, mutate.lines, recordings.read_rig),
     "trajectory": Reader("groundtruth.txt", recordings.trajectory_seeds, mutate.lines, recordings.read_trajectory),
     "list of pictures": Reader("rgb.txt", recordings.list_seeds, mutate.lines, recordings.read_list),
     "list of nanoseconds": Reader("data.csv", recordings.rows_seeds, mutate.lines, recordings.read_rows),

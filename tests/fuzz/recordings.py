@@ -12,6 +12,7 @@ import field_inputs
 import made_videos
 import numpy as np
 import raw_sources
+import yaml
 from PIL import Image
 from scipy.io import savemat
 
@@ -126,6 +127,35 @@ def read_sequence_file(path: Path) -> object:
 def rig_seeds() -> list[bytes]:
     """A stereo calibration."""
     return [raw_sources.ini((0.01,) * 8, (0.01,) * 8, translation=(-4.2, 0.0, 0.1)).encode()]
+
+
+def _storage(kind: str) -> bytes:
+    """A pair as OpenCV stores it; kind: ".yml" or ".xml"."""
+    out = cv2.FileStorage(f"pair{kind}", cv2.FileStorage_WRITE | cv2.FileStorage_MEMORY)
+    for name in ("M1", "M2"):
+        out.write(name, np.array([[60.0, 0, 31], [0, 61, 24], [0, 0, 1]]))
+    for name in ("D1", "D2"):
+        out.write(name, np.array([[0.1, 0.01, 0.0, 0.0]]))
+    out.write("R", np.eye(3))
+    out.write("T", np.array([[-4.2], [0.0], [0.1]]))
+    out.write("image_width", 64)
+    out.write("image_height", 48)
+    return out.releaseAndGetString().encode()
+
+
+@cache
+def yaml_seeds() -> list[bytes]:
+    """A pair of OpenCV, a camera of ROS as `rostopic echo` prints it, a chain of Kalibr, and aliases."""
+    repeated = "k: &k [60.0, 0, 31, 0, 61, 24, 0, 0, 1]\nd: &d [0.1, 0, 0, 0]\ncamera_matrix: {data: *k}\n"
+    repeated += "distortion_coefficients: {data: *d}\nimage_width: !!int 64\nimage_height: 48\n"
+    plain = (field_inputs.ECHO, {"cam0": field_inputs.CHAIN, "cam1": field_inputs.CHAIN})
+    return [_storage(".yml"), *(yaml.safe_dump(keys).encode() for keys in plain), repeated.encode()]
+
+
+@cache
+def storage_seeds() -> list[bytes]:
+    """A pair of OpenCV as XML."""
+    return [_storage(".xml")]
 
 
 def read_rig(path: Path) -> object:

@@ -42,7 +42,14 @@ def read_yaml(path: Path) -> Keys:
         raise InputError(f"{path}: {len(documents)} documents that differ; use a file with one")
     if not isinstance(found, dict):
         raise InputError(f"{path}: holds no keys; allowed: YAML of the form `key: value`")
-    return found
+    return _with_names(found)
+
+
+def _with_names(value: Any) -> Any:
+    """The value, with the keys of every mapping as texts: YAML also has numbers, dates and nothing as keys."""
+    if isinstance(value, dict):
+        return {str(key): _with_names(entry) for key, entry in value.items()}
+    return [_with_names(entry) for entry in value] if isinstance(value, list) else value
 
 
 def _loader() -> Any:
@@ -83,7 +90,7 @@ def matrix(value: Any, where: str, *shapes: tuple[int, ...]) -> NDArray[np.float
     stored = value.get("data") if isinstance(value, dict) else value
     try:
         numbers = np.array(stored, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.full(1, np.nan)
     for shape in shapes:
         if numbers.size == np.prod(shape) or (-1 in shape and numbers.size):

@@ -179,15 +179,17 @@ def _checked_matrix(rows: FloatArray, path: Path) -> FloatArray:
 def read_kalibr(path: Path, keys: Keys) -> StoredCalibration | None:
     """cam0 of Kalibr's camchain.yaml, and cam1 with T_cn_cnm1, which maps cam0 to cam1 in metres, if there is one.
 
-    Raises:  InputError for another model than pinhole with radtan or none.
+    Raises:  InputError for another model than pinhole with radtan or none, and for a cam1 without fields.
     """
     if not isinstance(keys.get("cam0"), dict):
         return None
+    if not isinstance(keys.get("cam1", {}), dict):
+        raise InputError(f"{path}: cam1: allowed: the fields of a camera, as of cam0")
     left = _kalibr_camera(path, keys["cam0"], "cam0")
     notes = [note for name in ("cam0", "cam1") for note in KALIBR.noted(keys.get(name) or {}, f"{path}: {name}")]
     if more := sorted(set(keys) - {"cam0", "cam1"}):
         notes.append(f"{path}: not used: {shortened([plain_line(name) for name in more])}; a pair has cam0 and cam1")
-    if not isinstance(keys.get("cam1"), dict):
+    if "cam1" not in keys:
         return StoredCalibration(left, notes=tuple(notes))
     where = f"{path}: cam1: T_cn_cnm1"
     turn, shift = rows_of_motion(matrix(keys["cam1"].get("T_cn_cnm1"), where, (4, 4)), where)

@@ -14,6 +14,7 @@ from endotsr.method.splatting.camera import CameraPose
 
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
+LARGEST_SIDE = 1 << 16  # pixels of a stated picture
 LEAST_VIEW, MOST_VIEW = 1, 170  # degrees, of `--field-of-view`
 SPREAD = 0.003  # of the focal length: 1 px at the border of a picture of 640 px; of the picture; of a coefficient
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
@@ -153,10 +154,12 @@ def intrinsics_of_matrix(
 def checked_intrinsics(found: Intrinsics, where: object) -> Intrinsics:
     """The intrinsics, checked.
 
-    Raises:  InputError for values that are not finite, a focal length that is not positive, a principal point far
-             outside the picture, or another number of distortion coefficients than 0, 4, 5 or 8.
+    Raises:  InputError for values that are not finite, a focal length that is not positive, a picture that no file has,
+             a principal point far outside the picture, or another number of distortion coefficients than 0, 4, 5 or 8.
     """
     fx, fy, cx, cy, width, height, distortion = found
+    if max(width, height) > LARGEST_SIDE:
+        raise InputError(f"{where}: states a picture of more than {LARGEST_SIDE} pixels on a side; state its true size")
     if not np.isfinite([fx, fy, cx, cy, *distortion]).all():
         raise InputError(f"{where}: camera: allowed: finite numbers, got {found[:4]} and distortion {distortion}")
     if fx <= 0 or fy <= 0:
