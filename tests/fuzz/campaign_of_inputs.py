@@ -102,12 +102,23 @@ def fuzz(name: str, count: int, seed: int, seconds: float, keep: bool = True) ->
     return row
 
 
+def kept_rows(file: Path, about: dict[str, Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows in the order of the readers, with those of other readers that the file has of this day and machine."""
+    found = json.loads(file.read_text()) if file.exists() else {}
+    if any(found.get(key) != value for key, value in about.items()):
+        return rows
+    by_reader = {row["reader"]: row for row in [*found["readers"], *rows]}
+    return [by_reader[name] for name in READERS if name in by_reader]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=100_000, help="of each reader")
     parser.add_argument("--seconds", type=float, default=1e9, help="most for each reader")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--reader", choices=list(READERS), action="append")
+    parser.add_argument(
+        "--reader", choices=list(READERS), action="append", help="the rest of the record of today stays"
+    )
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     rows = [fuzz(name, asked.inputs, asked.seed, asked.seconds) for name in asked.reader or READERS]
@@ -115,6 +126,7 @@ def main() -> int:
         from endotsr.training.runs.machine import machine
 
         about = {"date": datetime.date.today().isoformat(), "seed": asked.seed, "machine": machine(), "memory": MEMORY}
+        rows = kept_rows(asked.json, about, rows) if asked.reader else rows
         asked.json.write_text(json.dumps(about | {"readers": rows}, indent=1) + "\n")
     return 1 if any(row["findings"] for row in rows) else 0
 
