@@ -7,7 +7,6 @@ method.
 """
 
 from collections import Counter
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +19,7 @@ from endotsr.clips.opencv import pictures as stored
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array, FloatArray
+from endotsr.method.kernels.memory import Kept
 from endotsr.results.evaluation.doubts import doubt
 from endotsr.results.evaluation.evaluate import evaluate_model
 from endotsr.results.evaluation.lpips import LpipsWeights
@@ -30,7 +30,7 @@ from endotsr.untrusted.arrays import read_npy
 KINDS = (".npy", ".png", *stored.TIFF_ENDINGS, ".bmp")  # lossless; the first kind found in a folder is read
 CHANNELS = 3
 LARGEST_FILE = 1 << 32  # bytes
-PICTURES_KEPT = 64  # in memory after they are read; further ones are read again for the metrics
+KEPT_BYTES = 1 << 28  # of the last pictures in memory; others are read again for the metrics
 LARGEST = 16.0  # display units; a larger value means 8-bit or 16-bit levels, not an overshoot
 LOWEST = -0.5  # display units; a lower value means pictures from -1 to 1, not an undershoot
 
@@ -210,7 +210,10 @@ def measure_pictures(
     """
     shape = sequence.images.shape[1:]
     training = [int(i) for i in sequence.train_index if int(i) in pictures.files]
-    read = lru_cache(PICTURES_KEPT)(lambda index: pictures.read(index, shape))
+    kept: Kept[int, FloatArray] = Kept(KEPT_BYTES)
+
+    def read(index: int) -> FloatArray:
+        return kept.get(index, lambda: pictures.read(index, shape))
 
     said = doubt(sequence, read)
     metrics = evaluate_model(sequence, read, weights, training)
