@@ -2,6 +2,7 @@
 
 import json
 
+import numba
 import numpy as np
 import pytest
 from made_up_sequence import made_up
@@ -10,6 +11,7 @@ from data_folder import data_folder
 from endotsr.results.evaluation import evaluate
 from endotsr.results.evaluation.baselines import two_neighbours, unit_image
 from endotsr.results.evaluation.lpips import LpipsWeights
+from endotsr.results.evaluation.metrics import image_metrics
 
 
 @pytest.fixture
@@ -121,7 +123,7 @@ def test_training_sample_takes_training_frames_only(sequence):
 
 def test_baseline_rows_rank_as_the_data_says(sequence):
     """Brightness rises linearly: the two-neighbour blend beats the copy, the copy beats the mean over time."""
-    table = evaluate.baseline_table(sequence)
+    table = evaluate.evaluate_model(sequence, lambda i: unit_image(sequence, i))["baselines"]
     assert list(table) == list(evaluate.EVERY_BASELINE)
     values = [table[k]["mean"]["psnr_tissue"] for k in ("temporal_mean", "nearest_frame", "two_neighbours")]
     assert values == sorted(values) and values[2] > values[1] + 1
@@ -140,6 +142,38 @@ def test_methods_share_the_maps_of_a_frame_and_not_their_rows(monkeypatch):
     assert len(asked) == 2 * 2 + 2 * 6
     alone = {name: evaluate.evaluate_frames(sequence, [0, 1], render, weights) for name, render in methods.items()}
     assert found == alone and found["+ 0.0"]["mean"]["lpips"] == 0 < found["+ 0.1"]["mean"]["lpips"]
+
+
+def test_model_baselines_and_cross_fade_share_the_maps_of_a_frame(monkeypatch):
+    """One map of the frame for each range, whatever the number of methods; the cross-fade is its own blend."""
+    rng, asked = np.random.default_rng(3), []
+    sequence = made_up(rng.integers(0, 255, (3, 3, 40, 40)).astype(np.uint8), [1], np.ones((3, 40, 40), bool))
+    weights = LpipsWeights((), (), (np.ones(3, np.float32),), np.zeros(3), np.ones(3))
+    monkeypatch.setattr(evaluate, "feature_maps", lambda image, *_: asked.append(0) or [image])
+    found = evaluate.evaluate_model(
+        sequence, lambda i: unit_image(sequence, i), weights, cross_fade=lambda i: two_neighbours(sequence, i)
+    )
+    assert len(asked) == 2 * (1 + 2 + len(evaluate.EVERY_BASELINE))
+    assert found["cross_fade"]["mean"] == found["baselines"]["two_neighbours"]["mean"]
+    assert found["held_out"]["mean"]["lpips"] == 0 < found["cross_fade"]["mean"]["lpips"]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_metrics_are_bitwise_equal_for_every_number_of_threads(threads):
+    """Renders measured two at a time give what `image_metrics` gives for each alone."""
+    rng = np.random.default_rng(4)
+    sequence = made_up(rng.integers(0, 255, (2, 3, 20, 24)).astype(np.uint8), [0], rng.random((2, 20, 24)) < 0.8)
+    renders = {str(k): rng.random((3, 20, 24)).astype(np.float32) for k in range(3)}
+    before = numba.get_num_threads()
+    numba.set_num_threads(threads)
+    try:
+        found = evaluate.evaluate_methods(sequence, [1], {k: lambda i, k=k: renders[k] for k in renders})
+    finally:
+        numba.set_num_threads(before)
+    for name, render in renders.items():
+        alone = image_metrics(render, unit_image(sequence, 1), sequence.masks[1])
+        row = found[name]["per_frame"][0]
+        assert {key: row[key] for key in alone} == alone
 
 
 @pytest.mark.data

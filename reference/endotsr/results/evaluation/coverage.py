@@ -46,9 +46,15 @@ def seen_metrics(render: FloatArray, truth: FloatArray, mask: BoolArray, seen: T
     Edges:   no such pixel: None; equal images: inf
     """
     shown = np.clip(render, 0.0, 1.0)
-    values = {key: psnr_tissue(shown, truth, mask & (seen >= least)) for key, least in LEAST_SEEN.items()}
-    empty = {key: not (mask & (seen >= least)).any() for key, least in LEAST_SEEN.items()}
-    return {key: None if empty[key] else value for key, value in values.items()}
+    by_count: dict[int, float | None] = {0: None}  # pixels seen twice are seen once: equal counts, equal sets
+    found = {}
+    for key, least in LEAST_SEEN.items():
+        pixels = mask & (seen >= least)
+        count = int(np.count_nonzero(pixels))
+        if count not in by_count:
+            by_count[count] = psnr_tissue(shown, truth, pixels)
+        found[key] = by_count[count]
+    return found
 
 
 def coverage(sequence: Sequence, indices: Iterable[int], seen: TimesSeen) -> list[FrameCoverage]:

@@ -10,13 +10,14 @@ A frame without tissue has no metrics.
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.kernels.threads import parallel_calls
 from endotsr.results.evaluation.baselines import BASELINES, unit_image
 from endotsr.results.evaluation.coverage import TimesSeen, coverage, extrapolated, seen_metrics, times_seen
 from endotsr.results.evaluation.lpips import InputRange, LpipsWeights, feature_maps, lpips_obstacle, map_distances
@@ -36,6 +37,9 @@ RenderFrame = Callable[[int], FloatArray]
 FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
 LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
 EVERY_BASELINE = {**BASELINES, **TISSUE_BASELINES}
+MODEL = ""  # key of the model among the methods
+CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
+AT_A_TIME = 2  # renders measured at a time; LPIPS of one needs 44 MB at 640x512, 280 MB at 1920x1080
 EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
 
 
@@ -54,7 +58,7 @@ def evaluate_frames(
 
     Raises   ValueError naming the frame if the shapes of render and frame differ
     """
-    return evaluate_methods(sequence, indices, {"": render_frame}, lpips_weights, seen)[""]
+    return evaluate_methods(sequence, indices, {MODEL: render_frame}, lpips_weights, seen)[MODEL]
 
 
 def evaluate_methods(
@@ -64,24 +68,23 @@ def evaluate_methods(
     lpips_weights: LpipsWeights | None = None,
     seen: TimesSeen | None = None,
 ) -> dict[str, FramesMeasured]:
-    """`evaluate_frames` for several methods, which share the feature maps of the true frames."""
+    """`evaluate_frames` for several methods, which share the feature maps of the true frames.
+
+    Methods are rendered one after the other, and two renders are measured at a time.
+    """
     rows: dict[str, list[FrameMetrics]] = {name: [] for name in methods}
     bad = dict.fromkeys(methods, 0)
     for index in (int(i) for i in indices):
-        truth, mask = unit_image(sequence, index), sequence.masks[index]
-        distance = _Distance(truth, mask, lpips_weights)
+        truth = _Truth(sequence, index, lpips_weights, seen)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
-        for name, render_frame in methods.items():
-            render = np.asarray(render_frame(index))
-            if render.shape != truth.shape:
-                raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
-            found = image_metrics(render, truth, mask) | distance.of(render)
-            if seen is not None:
-                found |= seen_metrics(render, truth, mask, seen)
-            values = {key: _finite(value) for key, value in found.items()}
-            if mask.any():
-                bad[name] += sum(values[key] is None and found[key] is not None for key in found)
-            rows[name].append(cast(FrameMetrics, about | values))
+        names = list(methods)
+        for pair in (names[k : k + AT_A_TIME] for k in range(0, len(names), AT_A_TIME)):
+            renders = [truth.checked(methods[name](index)) for name in pair]
+            for name, found in zip(pair, parallel_calls(*(partial(truth.metrics, render) for render in renders))):
+                values = {key: _finite(value) for key, value in found.items()}
+                if truth.mask.any():
+                    bad[name] += sum(values[key] is None and found[key] is not None for key in found)
+                rows[name].append(cast(FrameMetrics, about | values))
     return {name: measured_rows(rows[name], bad[name]) for name in methods}
 
 
@@ -123,15 +126,6 @@ def left_out(evaluation: EvaluationRecord) -> list[str]:
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
 
 
-def baseline_table(
-    sequence: Sequence, lpips_weights: LpipsWeights | None = None, seen: TimesSeen | None = None
-) -> dict[str, LabelledFrames]:
-    """Held-out metrics of the baselines, in the order of `EVERY_BASELINE`; `seen` as in `evaluate_frames`."""
-    methods = {name: make(sequence) for name, (_, make) in EVERY_BASELINE.items()}
-    measured = evaluate_methods(sequence, sequence.test_index, methods, lpips_weights, seen)
-    return {name: {"label": label, **measured[name]} for name, (label, _) in EVERY_BASELINE.items()}
-
-
 def training_sample(sequence: Sequence) -> list[int]:
     """Every sixth training frame, starting with the first."""
     return [int(i) for i in sequence.train_index[::EVERY_TRAINING_FRAME]]
@@ -142,17 +136,23 @@ def evaluate_model(
     render_frame: RenderFrame,
     lpips_weights: LpipsWeights | None = None,
     training: Iterable[int] | None = None,
+    cross_fade: RenderFrame | None = None,
 ) -> EvaluationRecord:
     """The content of metrics.json for the renders of a sequence.
 
     training   training frames to evaluate too, without LPIPS; default: `training_sample`
+    cross_fade blend of the model's renders at the two neighbouring training times
     returns    {"format", "frames", "held_out", "training", "temporal_gap", "baselines", "lpips_reason",
-               "not_finite"}; `temporal_gap` is the training mean minus the held-out mean of each metric;
-               `lpips_reason` is None if LPIPS was computed
+               "not_finite"}, and "cross_fade" if it is given; `temporal_gap` is the training mean minus the held-out
+               mean of each metric; `lpips_reason` is None if LPIPS was computed; `not_finite` does not count the
+               cross-fade
     """
     chosen = training_sample(sequence) if training is None else [int(i) for i in training]
     seen = times_seen(sequence)
-    held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights, seen)
+    methods = {MODEL: render_frame} | {name: make(sequence) for name, (_, make) in EVERY_BASELINE.items()}
+    if cross_fade is not None:
+        methods[CROSS_FADE] = cross_fade
+    held_out = evaluate_methods(sequence, sequence.test_index, methods, lpips_weights, seen)
     inside = evaluate_frames(sequence, chosen, render_frame)
     frames: FramesPart = {
         "total": len(sequence.images),
@@ -164,7 +164,13 @@ def evaluate_model(
         "coverage": None if seen is None else coverage(sequence, sequence.test_index, seen),
     }
     obstacle = lpips_obstacle(lpips_weights, *sequence.images.shape[2:])
-    return evaluation_record(frames, held_out, inside, baseline_table(sequence, lpips_weights, seen), obstacle)
+    baselines: dict[str, LabelledFrames] = {
+        name: {"label": label, **held_out[name]} for name, (label, _) in EVERY_BASELINE.items()
+    }
+    record = evaluation_record(frames, held_out[MODEL], inside, baselines, obstacle)
+    if cross_fade is not None:
+        record["cross_fade"] = {"label": CROSS_FADE, **held_out[CROSS_FADE]}
+    return record
 
 
 def evaluation_record(
@@ -187,27 +193,44 @@ def evaluation_record(
     }
 
 
-class _Distance:
-    """LPIPS from one true frame, with excluded pixels 0; the feature maps of the frame are computed once."""
+class _Truth:
+    """One true frame, against which several renders are measured; its feature maps (LPIPS) are computed once."""
 
-    def __init__(self, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> None:
-        usable = weights is not None and lpips_obstacle(weights, *mask.shape) is None and bool(mask.any())
-        self._mask, self._weights = mask, weights if usable else None
-        self._truth = {key: self._maps(truth, how) for key, how in LPIPS_KEYS.items()} if usable else {}
+    def __init__(self, sequence: Sequence, index: int, weights: LpipsWeights | None, seen: TimesSeen | None) -> None:
+        self.index, self.mask = index, sequence.masks[index]
+        self._image, self._seen = unit_image(sequence, index), seen
+        usable = weights is not None and lpips_obstacle(weights, *self.mask.shape) is None and bool(self.mask.any())
+        self._weights = weights if usable else None
+        self._maps = {key: self._features(self._image, how) for key, how in LPIPS_KEYS.items()} if usable else {}
 
-    def of(self, render: FloatArray) -> Means:
+    def checked(self, render: FloatArray) -> FloatArray:
+        """The render as an array. Raises ValueError unless it has the shape of the frame."""
+        render = np.asarray(render)
+        if render.shape != self._image.shape:
+            raise ValueError(f"frame {self.index}: the render is {render.shape}, the frame {self._image.shape}")
+        return render
+
+    def metrics(self, render: FloatArray) -> Means:
+        """Every metric of a render; inf and nan as `image_metrics`."""
+        found = image_metrics(render, self._image, self.mask) | self._distances(render)
+        if self._seen is not None:
+            found |= seen_metrics(render, self._image, self.mask, self._seen)
+        return found
+
+    def _distances(self, render: FloatArray) -> Means:
         """Both LPIPS values of a render, clipped; None without weights or tissue, or for a small picture."""
         if self._weights is None:
             return dict.fromkeys(LPIPS_KEYS)
         shown = np.clip(render, 0, 1)
         return {
-            key: math.fsum(map_distances(self._maps(shown, how), self._truth[key], self._weights))
+            key: math.fsum(map_distances(self._features(shown, how), self._maps[key], self._weights))
             for key, how in LPIPS_KEYS.items()
         }
 
-    def _maps(self, image: FloatArray, how: InputRange) -> list[FloatArray]:
+    def _features(self, image: FloatArray, how: InputRange) -> list[FloatArray]:
+        """Feature maps of an image with excluded pixels 0."""
         assert self._weights is not None
-        return feature_maps(np.where(self._mask, image, 0), self._weights, how)
+        return feature_maps(np.where(self.mask, image, 0), self._weights, how)
 
 
 def difference(inside: Means, outside: Means) -> Means:

@@ -27,14 +27,12 @@ def psnr(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
     Raises:  ValueError for different shapes or a mask that is not boolean.
     Oracle:  skimage.metrics.peak_signal_noise_ratio of the zeroed images.
     """
-    squared, count = _squared_error(render, truth, mask)
-    return _decibel(squared / render.size) if count else math.nan
+    return _both_psnr(render, truth, mask)[0]
 
 
 def psnr_tissue(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
     """PSNR (M1) in dB over tissue pixels only: `psnr` + 10 log10(tissue fraction). Edges as `psnr`."""
-    squared, count = _squared_error(render, truth, mask)
-    return _decibel(squared / count) if count else math.nan
+    return _both_psnr(render, truth, mask)[1]
 
 
 def ssim_full(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
@@ -71,12 +69,13 @@ def image_metrics(render: FloatArray, truth: FloatArray, mask: BoolArray) -> dic
             `_8bit` of the images rounded to 8 bits; inf and nan as in each function
     """
     pictures = {"": (np.clip(render, 0.0, 1.0), truth), "_8bit": (round_8bit(render), round_8bit(truth))}
-    functions = {"psnr_full": psnr, "psnr_tissue": psnr_tissue, "ssim_full": ssim_full, "ssim_tissue": ssim_tissue}
-    return {
-        name + ending: measure(seen, wanted, mask)
-        for ending, (seen, wanted) in pictures.items()
-        for name, measure in functions.items()
-    }
+    found = {}
+    for ending, (seen, wanted) in pictures.items():
+        both = zip(("psnr_full", "psnr_tissue"), _both_psnr(seen, wanted, mask), strict=True)
+        found |= {name + ending: value for name, value in both}
+        found["ssim_full" + ending] = ssim_full(seen, wanted, mask)
+        found["ssim_tissue" + ending] = ssim_tissue(seen, wanted, mask)
+    return found
 
 
 def mean_metrics(rows: Iterable[Mapping[str, float | None]]) -> dict[str, float | int | None]:
@@ -95,10 +94,13 @@ def mean_metrics(rows: Iterable[Mapping[str, float | None]]) -> dict[str, float 
     return result
 
 
-def _squared_error(render: FloatArray, truth: FloatArray, mask: BoolArray) -> tuple[float, int]:
-    """Sum of squared differences on tissue, and its number of terms."""
+def _both_psnr(render: FloatArray, truth: FloatArray, mask: BoolArray) -> tuple[float, float]:
+    """`psnr` and `psnr_tissue`, from the squared differences on tissue."""
     difference = _wide("render", render, mask)[:, mask] - _wide("truth", truth, mask)[:, mask]
-    return float(np.sum(difference * difference)), difference.size
+    if not difference.size:
+        return math.nan, math.nan
+    squared = float(np.sum(difference * difference))
+    return _decibel(squared / render.size), _decibel(squared / difference.size)
 
 
 def _wide(name: str, image: FloatArray, mask: BoolArray) -> NDArray[np.float64]:

@@ -16,13 +16,11 @@ from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, backproject, camera_centre, degrees_between, project
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation.baselines import neighbours
-from endotsr.results.evaluation.coverage import times_seen
 from endotsr.results.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.results.evaluation.lpips import LpipsWeights
 from endotsr.results.evaluation.measures import measured
 from endotsr.results.evaluation.records import (
     EvaluationRecord,
-    LabelledFrames,
     LabelledMeans,
     Means,
     MotionPart,
@@ -38,7 +36,6 @@ from endotsr.training.runs.records import REPORTED, RunRecord
 from endotsr.training.runs.sources import run_source, true_positions_of
 
 COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, translation residual"}
-CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
 
 RENDERS_KEPT = 32  # cached held-out renders; further frames are rendered again
@@ -94,8 +91,7 @@ def measure_model(
         return (held_out if index in sequence.test_index else render)(index).colour
 
     held_out: RenderFrame = lru_cache(RENDERS_KEPT)(render)
-    metrics = evaluate_model(sequence, colour, weights)
-    metrics["cross_fade"] = _cross_fade(sequence, colour, weights)
+    metrics = evaluate_model(sequence, colour, weights, cross_fade=_cross_fade(sequence, colour))
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
     metrics["trajectories"] = None if motion is None else cast(MotionPart, motion._asdict() | {"unit": sequence.unit})
     metrics["pose_correction"] = pose_change(given, sequence)
@@ -103,10 +99,8 @@ def measure_model(
     return metrics, held_out
 
 
-def _cross_fade(
-    sequence: Sequence, render: Callable[[int], FloatArray], weights: LpipsWeights | None
-) -> LabelledFrames:
-    """Held-out metrics of the blend of the model's renders at the two neighbouring training times.
+def _cross_fade(sequence: Sequence, render: Callable[[int], FloatArray]) -> Callable[[int], FloatArray]:
+    """The blend of the model's renders at the two neighbouring training times, by the number of a held-out frame.
 
     A model that is no better gains no accuracy from its motion between its training frames.
     """
@@ -116,8 +110,7 @@ def _cross_fade(
         before, after = render(near.before), render(near.after)
         return before + before.dtype.type(near.fraction) * (after - before)
 
-    measured = evaluate_frames(sequence, sequence.test_index, blend, weights, times_seen(sequence))
-    return {"label": CROSS_FADE, **measured}
+    return blend
 
 
 def _components(
