@@ -1,5 +1,6 @@
 """Editing a clip: frames by number and second, frames left out, a crop, masks united, a folder replaced."""
 
+import shutil
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
@@ -213,6 +214,19 @@ def test_a_folder_is_replaced_by_an_edit_of_itself_and_nothing_else_is(tmp_path,
     words[3] = str(tmp_path / "mine")
     assert main(words) == 2 and "holds no sequence.toml" in capsys.readouterr().err
     assert (tmp_path / "mine/letter.txt").exists()
+
+
+def test_what_a_replaced_folder_loses_is_noted(tmp_path, capsys):
+    """Depth that took minutes, masks and poses went without a word; an edit of the folder itself keeps them."""
+    written(tmp_path / "clip", poses=moving())
+    shutil.copytree(tmp_path / "clip/images", tmp_path / "raw")
+    edit = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "clip"), "--replace"]
+    assert main(edit) == 0 and "the replaced folder had" not in capsys.readouterr().out
+    camera = ["--camera", "60", "60", "16", "12"]
+    assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), "--replace", *camera]) == 0
+    said = capsys.readouterr().out
+    for what in ("masks", "depth", "poses"):
+        assert f"the replaced folder had {what} (" in said and f"`endotsr {what}` makes them again" in said
 
 
 def broken(clip, what):

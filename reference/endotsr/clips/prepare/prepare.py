@@ -27,6 +27,7 @@ from endotsr.clips.prepare.editing import (
     written_times,
 )
 from endotsr.clips.prepare.prepared_masks import mask_entry, write_mask
+from endotsr.clips.prepare.replaced import lost_notes, replaced_file
 from endotsr.clips.prepare.stated_depth import refuse_no_lengths
 from endotsr.clips.prepare.straighten import Straightener, straightener
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
@@ -102,10 +103,11 @@ def prepare(
     if not chosen:
         raise InputError(f"{clip.where}: no frame is left")
     notes += leftover_notes(Path(out))
+    before = replaced_file(out) if replace else None
     with new_folder(Path(out), FILE_NAME if replace else "", WRITTEN) as folder:
         found = _write_frames(clip, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
-        notes += _checked_depth(folder, found) + _checked_poses(folder, found)
+        notes += _checked_depth(folder, found) + _checked_poses(folder, found) + lost_notes(before, found)
     return found, notes
 
 
