@@ -142,7 +142,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "cold": not spoken.said["start"]["compiled"], "register_bytes": REGISTER,
         "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
         "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise,
-        "forecast_after": progress.FORECAST_AFTER, "curve": spoken.curve,
+        "forecast_after": progress.FORECAST_AFTER, "passes": 1, "curve": spoken.curve,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
         "processor": here.get("processor"), "machine": here, "date": now()[:10],

@@ -15,6 +15,7 @@ QUALITY = (("psnr_full", 2), ("psnr_tissue", 2), ("lpips", 4))
 COLOURS = (BLUE, GREEN, ORANGE, INK)
 CLOCKS = {"processor": "processor time of one thread", "wall": "two threads on the clock"}
 FORMERLY = 30  # iterations before the forecast of rows that do not state it
+PASSES = 3  # of the evaluation over the held-out frames, of rows that do not state it
 VECTORS = {64: "AVX-512", 32: "AVX2", 0: ""}  # by the bytes of a register; 0: not recorded
 
 
@@ -28,9 +29,12 @@ def told(row: dict[str, Any], when: str) -> str:
 
 
 def today(row: dict[str, Any]) -> str:
-    """What the first line would say with the constants of today, where it assumed the speed of a known processor."""
+    """What the first line would say with the constants of today, where it assumed the speed of a known processor.
+
+    "-" also for a row whose evaluation made several passes over the held-out frames, which took longer.
+    """
     start, register = row["said"]["start"], row["register_bytes"]
-    if start["speed"] != "assumed" or not register:
+    if start["speed"] != "assumed" or not register or row.get("passes", PASSES) > 1:
         return "-"
     config = with_iterations(PRESETS[row["preset"]], row["iterations"])
     frames = forecasts.expected_frames(row["frames"], config)
@@ -79,10 +83,20 @@ def about(rows: list[dict[str, Any]]) -> str:
     sizes, clocks = sorted({row["size"] for row in rows}), sorted({CLOCKS[row["clock"]] for row in rows})
     machines = sorted({row["processor"] for row in rows})
     after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
+    former = max((row["date"] for row in rows if row.get("passes", PASSES) > 1), default="")
+    note = (
+        ""
+        if not former
+        else (
+            f" It is of rows with the present evaluation; the others, of {former} or before, made three passes over the"
+            " held-out frames."
+        )
+    )
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "
         "that of the time left over its smallest value before. *Today* is the first line with the present constants."
+        f"{note}"
     )
 
 
