@@ -3,6 +3,7 @@
 import io
 import json
 
+import msgspec
 import numpy as np
 import pytest
 from made_up_model import CAMERA, moving_scene
@@ -13,7 +14,7 @@ from endotsr.method.splatting.render import check_scene
 from endotsr.results.export.files import Content, export
 from endotsr.results.export.model import load_slim_model
 from endotsr.results.export.ply import read_gaussians
-from endotsr.results.export.scene import open_scene
+from endotsr.results.export.scene import MovingScene, open_scene
 from endotsr.results.export.times import Times
 
 plyfile = pytest.importorskip("plyfile", reason="plyfile, an outside reader of ply files, is not installed")
@@ -209,6 +210,28 @@ def test_the_filter_of_mip_splatting_widens_the_gaussians_and_keeps_their_integr
     (narrow, opacity), (wide, less) = found
     np.testing.assert_allclose(wide**2, narrow**2 + 4, rtol=1e-5)
     np.testing.assert_allclose(less * wide.prod(), opacity * narrow.prod(), rtol=1e-5)
+
+
+@pytest.mark.parametrize("logit", [40.0, 800.0, -800.0])
+def test_the_filter_keeps_gaussians_whose_opacity_rounds_to_a_whole_number(logit, tmp_path):
+    """An opacity of 1 in float64 became an infinite logit, and the Gaussian was left out."""
+    names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 filter_3D".split()
+    vertices = np.ones(2, [(name, "f4") for name in names])
+    vertices["opacity"], vertices["filter_3D"] = logit, [0.0, 1e-3]
+    out = io.BytesIO()
+    plyfile.PlyData([plyfile.PlyElement.describe(vertices, "vertex")]).write(out)
+    (tmp_path / "a.ply").write_bytes(out.getvalue())
+    read = read_gaussians(tmp_path / "a.ply")
+    assert read.count == 2 and read.opacity_logit[0] == logit and read.opacity_logit[1] < logit + 1e-3
+
+
+def test_the_comments_of_a_ply_file_are_single_lines_of_plain_numbers(tmp_path):
+    """The unit is text of a file: one with a line break wrote an element into the header."""
+    made = moving_scene()
+    record = msgspec.structs.replace(made.record, unit="mm\nelement vertex 3")
+    export(MovingScene(record, made.model), tmp_path / "a.ply", Times(times=(np.float64(0.4),)))
+    data = plyfile.PlyData.read(tmp_path / "a.ply")
+    assert "lengths in mm element vertex 3" in data.comments and "time 0.4" in data.comments
 
 
 def test_gaussians_of_another_writer_are_read(tmp_path):

@@ -99,7 +99,8 @@ def test_without_a_rate_a_frame_takes_a_fifteenth_of_a_second(tmp_path):
 
 @pytest.mark.parametrize(
     ("times", "content", "said"),
-    [((0.5, 0.2), Content(), "must ascend"), ((0.5,), Content("mesh"), "a .glb stores points"),
+    [((0.5, 0.2), Content(), "must ascend"), ((0.5, 0.6, 0.6 + 1e-12), Content(), "must ascend"),
+     ((0.5,), Content("mesh"), "a .glb stores points"),
      ((0.5,), Content(least_opacity=1.0), "no Gaussian has opacity 1 or more")],
 )  # fmt: skip
 def test_points_that_cannot_be_animated_are_refused(times, content, said, tmp_path):

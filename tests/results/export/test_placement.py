@@ -10,12 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from endotsr.clips.sequences.record import recorded
 from endotsr.errors import InputError
+from endotsr.method.splatting.camera import project
 from endotsr.method.splatting.harmonics import harmonics_forward
 from endotsr.method.splatting.render import Scene
 from endotsr.results.export import placement
 from endotsr.results.export.files import Content, export
 from endotsr.results.export.ply import read_gaussians
-from endotsr.results.export.scene import MovingScene, open_scene
+from endotsr.results.export.scene import MovingScene, facing_camera, open_scene
 from endotsr.results.export.times import Times
 from endotsr.results.views.pictures import Look, rendered, requested_views, write_pictures
 from endotsr.results.views.plan import ViewRequest
@@ -136,3 +137,33 @@ def test_an_endonerf_world_is_turned_without_rounding():
         before, after = (np.sort(np.abs(getattr(one, name)), axis=0) for one in (scene, turned))
         np.testing.assert_array_equal(after, before)
     assert placement.placed_scene(scene, placement.HERE) is scene
+
+
+def test_the_axes_of_a_ply_file_are_not_said_to_be_those_of_a_camera(tmp_path):
+    """A file of another program has axes of its own, and the export keeps them."""
+    export(scene_seen_by("EndoNeRF"), tmp_path / "a.ply", Times(times=(TIME,)))
+    export(open_scene(tmp_path / "a.ply"), tmp_path / "b.ply", Times(), Content("points"))
+    (said,) = [c for c in plyfile.PlyData.read(tmp_path / "b.ply").comments if c.startswith("axes")]
+    assert said == "axes: those of the ply file that this file was made from"
+
+
+def test_a_corrected_pose_of_the_first_frame_is_the_one_of_the_exports():
+    """The first camera of sequence.json is not corrected; the placement is that of the corrected one."""
+    made = moving_scene(exposure=True)
+    turn = np.tile(np.float32([[0.1], [0.0], [0.0]]), 3)
+    frames = made.model.frames._replace(pose_rotation=turn, pose_translation=turn)
+    scene = MovingScene(made.record, made.model._replace(frames=frames))
+    recorded_first = placement.placement_of(scene.record.frame_cameras[0])
+    assert np.abs(scene.placement.rotation - recorded_first.rotation).max() > 0.05
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_facing_camera_shows_the_middle_of_every_axis(seed):
+    """The positions between the quantiles 2 % and 98 % of every axis are in the picture."""
+    rng = np.random.default_rng(seed)
+    position = rng.standard_t(1 + seed, (3, 20000)) * rng.uniform(0.1, 10, (3, 1))
+    camera = facing_camera(position, 512)
+    low, high = np.quantile(position, [0.02, 0.98], axis=1)
+    u, v, z = project(camera, position)
+    shown = (z > 0) & (u >= 0) & (u <= 512) & (v >= 0) & (v <= 512)
+    assert shown[((position.T >= low) & (position.T <= high)).all(axis=1)].all()

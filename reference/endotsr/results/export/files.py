@@ -36,6 +36,7 @@ class Content(NamedTuple):
 
 ALL_TIMES, GAUSSIANS = Times(), Content()
 AXES = "axes: x right, y down, z forward in the camera of the first frame"
+KEPT_AXES = "axes: those of the ply file that this file was made from"
 
 
 def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> None:
@@ -129,7 +130,8 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
     """Write one ply file; returns the number of Gaussians, points or triangles."""
     unit = scene.record.unit
-    comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}", AXES)
+    axes = KEPT_AXES if scene.one_time else AXES
+    comments = (f"endotsr {content.kind}", f"time {float(time)!r}", f"lengths in {unit}", axes)
     placement = scene.placement
     if content.kind == "mesh":
         found = surface(scene, time, content.voxel, content.taken_out)

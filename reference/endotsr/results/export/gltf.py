@@ -2,11 +2,10 @@
 
 In: a scene and times. Out: a point cloud at the first time, a morph target (displacements) for every other time, and an
 animation of their weights. Positions between two times are interpolated linearly. The node transforms the axes of the
-exports (y down, z forward) to those of glTF (y up, z backward), and millimetres to metres. Colours are those of the
-first time, converted from display RGB to linear RGB by the sRGB curve.
+exports (y down, z forward) to those of glTF (y up, z backward), and millimetres to metres; another unit keeps its
+numbers. Colours are those of degree 0 at the first time, converted from display RGB to linear RGB by the sRGB curve.
 """
 
-import itertools
 import json
 import struct
 from pathlib import Path
@@ -58,9 +57,12 @@ def write_animated_points(
 
     least_opacity   minimum opacity of the Gaussians whose centres are exported
 
-    Raises: InputError for times that do not ascend, for a scene without such a Gaussian, and above 4 GB.
+    Raises: InputError for times that do not ascend in float32, for a scene without such a Gaussian, and above 4 GB.
     """
-    if any(b <= a for a, b in itertools.pairwise(times)):
+    record = scene.record
+    seconds = np.multiply(times, record.duration or record.count / UNKNOWN_RATE)
+    seconds = (seconds - seconds[0]).astype("<f4")
+    if (np.diff(seconds) <= 0).any():
         raise InputError(f"{file}: the times of an animation must ascend; allowed: each later than the previous one")
     shown = [point_vertices(placed_scene(scene.at(t, taken_out), scene.placement), least_opacity) for t in times]
     if not shown[0].size:
@@ -69,9 +71,7 @@ def write_animated_points(
         raise InputError(f"{file}: {shown[0].size} points at {len(times)} times need more than 4 GB; allowed: --count")
     points = [np.stack([each[axis] for axis in "xyz"], axis=1) for each in shown]
     levels = np.stack([shown[0][name] for name in ("red", "green", "blue")], axis=1)
-    record = scene.record
-    seconds = np.multiply(times, record.duration or record.count / UNKNOWN_RATE)
-    content = _glb(points, levels, (seconds - seconds[0]).astype("<f4"), times, record.unit)
+    content = _glb(points, levels, seconds, times, record.unit)
     replace_file(file, lambda temporary: temporary.write_bytes(content))
     return len(levels)
 

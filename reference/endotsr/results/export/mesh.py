@@ -1,9 +1,9 @@
 """The visible surface at one time as a triangle mesh, by volumetric fusion of rendered depth.
 
-In: a scene, a time, and the cameras of its frames. Every camera renders depth divided by opacity. Their truncated
-signed distances (Curless and Levoy, 1996) are averaged in a voxel grid, and marching cubes of scikit-image extracts the
-zero level set. Out: vertices, triangles and colours of the observed surface. scikit-image is an optional package
-(`pip install 'endotsr[mesh]'`), imported on first use.
+In: a scene, a time, and the cameras of its frames: the first one if the camera is static, else evenly spaced ones. Each
+renders depth divided by opacity. The truncated signed distances (Curless and Levoy, 1996) are averaged in a voxel grid,
+and marching cubes of scikit-image extracts the zero level set. Out: vertices, triangles and colours of the observed
+surface. scikit-image is an optional package (`pip install 'endotsr[mesh]'`), imported on first use.
 """
 
 from collections.abc import Iterator

@@ -3,8 +3,9 @@
 Training uses the world coordinates of the sequence, which depend on its layout: EndoNeRF has y up and z backward. All
 exports (ply, point cloud, mesh, camera paths) use the camera axes of the first frame: x right, y down, z forward,
 origin at its optical centre. A camera with the identity pose therefore shows the first frame. The conversion takes
-place on export only: checkpoints, sequence.json and slim models keep the training coordinates bitwise, and `cameras[0]`
-of their records is the transformation to the exports.
+place on export only: checkpoints, sequence.json and slim models keep the training coordinates. The pose of
+`MovingScene.cameras[0]` is the transformation to the exports. In the record of a slim model this is `cameras[0]`; in
+sequence.json, `cameras[0]` lacks the pose correction of the model, if it has one.
 """
 
 from typing import NamedTuple
@@ -29,7 +30,7 @@ class Placement(NamedTuple):
 
     @property
     def unchanged(self) -> bool:
-        """Whether exports and training have the same axes."""
+        """Whether exports and training have the same axes and origin."""
         return bool((self.rotation == np.eye(3)).all()) and not np.any(self.translation)
 
 

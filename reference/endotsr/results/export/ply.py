@@ -93,10 +93,10 @@ def write_ply(
 ) -> None:
     """Write vertices and optional triangles (F, 3) atomically.
 
-    comments   single lines of ASCII
+    comments   lines; white space becomes a space, a character beyond ASCII a question mark
     """
     names = vertices.dtype.names or ()
-    head = ["ply", "format binary_little_endian 1.0", *(f"comment {line}" for line in comments)]
+    head = ["ply", "format binary_little_endian 1.0", *(f"comment {' '.join(line.split())}" for line in comments)]
     head += [f"element vertex {vertices.size}"]
     head += [f"property {TYPE_NAMES[vertices.dtype[name]]} {name}" for name in names]
     body = vertices.tobytes()
@@ -149,8 +149,9 @@ def _filtered(found: Gaussians, width: FloatArray) -> Gaussians:
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # `sound` leaves out what is not finite
         wide = 0.5 * np.logaddexp(2 * found.log_scale, 2 * np.log(np.abs(width)))
-        opacity = np.exp((found.log_scale - wide).sum(axis=0)) / (1 + np.exp(-found.opacity_logit))
-        logit = np.log(opacity) - np.log1p(-opacity)
+        shrunk = (found.log_scale - wide).sum(axis=0)  # logarithm of the ratio of the opacities
+        opacity = shrunk - np.logaddexp(0, -found.opacity_logit)  # logarithm: an opacity near 1 has no room in float64
+        logit = np.where(shrunk == 0, found.opacity_logit, opacity - np.log(-np.expm1(opacity)))
     return found._replace(log_scale=wide, opacity_logit=logit)
 
 

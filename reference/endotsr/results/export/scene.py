@@ -39,7 +39,7 @@ class MovingScene:
     record: SequenceRecord
     loaded: Model | None = None
     folder: RunFolder | None = None
-    one_time: bool = False  # from a ply file, which has export coordinates
+    one_time: bool = False  # from a ply file, whose coordinates are kept
     notes: tuple[str, ...] = ()  # on parts of the file that are not used
 
     @cached_property
@@ -57,7 +57,7 @@ class MovingScene:
 
     @property
     def placement(self) -> Placement:
-        """The transformation from training to export coordinates; a ply file already has export coordinates."""
+        """The transformation from training to export coordinates; the coordinates of a ply file are kept."""
         return HERE if self.one_time else placement_of(self.cameras[0])
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
@@ -124,7 +124,10 @@ def _from_ply(path: Path) -> MovingScene:
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:
-    """A camera looking along +z at the middle of the positions; all but a few per cent are in the picture."""
+    """A camera looking along +z at the positions.
+
+    Those between the quantiles 0.02 and 0.98 of every axis are in the picture.
+    """
     low, high = np.quantile(position.astype(np.float64), [0.02, 0.98], axis=1)
     reach = max(float((high - low)[:2].max()) / 2, 1e-6)
     distance = MARGIN * 2 * FOCAL * reach + float(high[2] - low[2]) / 2

@@ -14,7 +14,7 @@ class Times(NamedTuple):
 
     times: tuple[float, ...] = ()  # normalised, in [0, 1]
     frames: Literal["test", "train", "all"] | None = None
-    count: int | None = None  # evenly spaced over [0, 1], both ends included
+    count: int | None = None  # evenly spaced over [0, 1], both ends included; 1 = time 0
 
     @property
     def chosen(self) -> bool:
