@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endotsr.errors import InputError
-from endotsr.method.splatting.camera import Camera, camera_centre
+from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
 from endotsr.results.views.cameras import along, fitted, path_cameras, pivot_depth_of, read_cameras, shifted, turned
 
 CAMERA = Camera(np.eye(3), np.array([0.1, -0.2, 0.3]), 50.0, 52.0, 31.0, 24.5, 64, 48)
@@ -115,6 +115,13 @@ def test_a_file_without_cameras_is_refused(content, tmp_path):
         read_cameras(tmp_path / "path.json", CAMERA)
     with pytest.raises(InputError, match=r"none\.json: cannot be read"):
         read_cameras(tmp_path / "none.json", CAMERA)
+
+
+def test_sway_moves_right_first_and_no_turn_exceeds_the_angle():
+    sway, orbit = (path_cameras(path, [CAMERA] * 16, 60.0, 7.0) for path in ("sway", "orbit"))
+    assert camera_centre(sway[4])[0] > 0 > camera_centre(sway[12])[0]
+    turns = [degrees_between(CAMERA.rotation, camera.rotation) for camera in (*sway, *orbit)]
+    assert max(turns) <= 60 + 1e-9 and degrees_between(CAMERA.rotation, orbit[0].rotation) == pytest.approx(60)
 
 
 def test_cameras_between_two_are_on_the_way():

@@ -80,6 +80,24 @@ def test_key_times_are_those_of_the_frames_or_fewer():
     assert list(key_times(still, 32)) == [0.0]
 
 
+def test_a_still_scene_whose_exposure_changes_has_the_times_of_the_frames():
+    """The colours of the page have the exposure: with one key time, those of the first frame stayed."""
+    scene = moving_scene(exposure=True)
+    still = scene.model.gaussians._replace(fdm_weight=None, appearance_coefficients=None, motion_coefficients=None)
+    still = type(scene)(scene.record, scene.model._replace(gaussians=still))
+    times = key_times(still, 32)
+    assert list(times) == [0.0, 0.25, 0.5, 0.75, 1.0]
+    colours = trajectories(still, times).bytes[4:7]
+    assert (colours[:, 0] != colours[:, 2]).any()
+
+
+def test_of_moving_gaussians_without_deformation_the_key_times_are_even():
+    scene = moving_scene()
+    only = scene.model.gaussians._replace(fdm_weight=None, appearance_coefficients=None)
+    assert list(key_times(type(scene)(scene.record, scene.model._replace(gaussians=only)), 3)) == [0.0, 0.5, 1.0]
+    assert key_times(type(scene)(scene.record, scene.model._replace(gaussians=only)), 32).size == 32
+
+
 def test_the_page_is_one_file_without_a_network(tmp_path):
     text = page(moving_scene(), 'a "<b>@SCRIPT@', 8)
     about = json.loads(re.search(r'id="about">(.*?)</script>', text, re.S)[1])

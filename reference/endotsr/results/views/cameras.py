@@ -56,9 +56,9 @@ def fitted(camera: Camera, width: int, height: int) -> Camera:
 
 
 def path_cameras(path: str, cameras: list[Camera], angle: float, pivot_depth: float) -> list[Camera]:
-    """The cameras moved along a path, with one period over all pictures, so a film loops.
+    """The cameras moved along a path, with one period over all pictures: the last one precedes the first.
 
-    path     observed: unchanged; sway: left, right and back; orbit: around a circle
+    path     observed: unchanged; sway: right, left and back; orbit: around a circle
     angle    largest rotation, degrees
     """
     radians, count = math.radians(angle), max(len(cameras), 1)
@@ -110,7 +110,8 @@ def checked_side(side: Any, where: str) -> None:
 def along(cameras: list[Camera], count: int) -> list[Camera]:
     """`count` cameras along the given ones, interpolated with `camera_between`, including the first and the last.
 
-    The size is that of the first camera. If `count` cameras are given, they are returned unchanged.
+    One camera is the first. The size is that of the first camera, and intrinsics are not converted to it. If `count`
+    cameras are given, they are returned unchanged.
     """
     if len(cameras) == count:
         return list(cameras)

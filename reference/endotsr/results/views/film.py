@@ -1,7 +1,7 @@
 """Films: a series of pictures as one mp4, webm or gif file, written atomically.
 
-In: pictures of one size. Out: a file. mp4 uses H.264, which browsers, PowerPoint and QuickTime play (VP9 without an
-encoder); webm uses VP9; gif has 256 colours and plays everywhere.
+In: pictures of one size. Out: a file. mp4 uses H.264, which browsers, PowerPoint and QuickTime play, or VP9 if FFmpeg
+has no encoder of H.264; webm uses VP9; gif has 256 colours and needs no FFmpeg.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,7 +18,7 @@ from endotsr.untrusted.writing import replace_file
 
 KINDS = (".mp4", ".webm", ".gif")
 GIF_COLOURS = 256
-PALETTE_FRAMES = 8  # pictures that determine the palette of a gif
+PALETTE_FRAMES = 8  # pictures that determine the palette of a gif: fewer than twice as many, or all of a short one
 LOWEST, USUAL = 0.1, (1.0, 60.0)  # pictures per second
 HUNDREDTHS = 100  # units of time per second in a gif
 

@@ -39,7 +39,7 @@ ABOUT_DEPTH = {
     "normalised": "normalised by opacity",
 }
 DEPTH_LEVELS = 65535  # of a 16-bit picture
-DEPTH_HEADROOM = 1.5  # factor on the largest prior depth, because rendered depth may exceed it
+DEPTH_HEADROOM = 1.5  # factor on the largest depth of the prior and the first view; other views may exceed it
 
 
 class PictureEntry(TypedDict):

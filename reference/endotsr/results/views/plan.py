@@ -13,14 +13,14 @@ from endotsr.results.export.placement import HERE, Placement, training_camera
 from endotsr.results.export.times import Times
 from endotsr.results.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
-LARGEST_ANGLE = 89.0  # degrees; a scene observed from one side is not visible beyond it
+LARGEST_ANGLE = 89.0  # degrees; at 90 a surface that faces the observed camera is seen edge-on
 
 
 class PlannedView(NamedTuple):
     """Time, camera and name of one picture."""
 
     time: float
-    frame: int  # the frame of the camera, or of the start of its path
+    frame: int  # the frame given as camera, else the frame nearest in time
     label: str
     camera: Camera
     exact: bool  # whether time and camera are exactly those of the frame, which allows a comparison

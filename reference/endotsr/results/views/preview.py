@@ -1,7 +1,7 @@
 """The animated preview of a report: the scene over all times, small enough to embed.
 
 In: a scene. Out: an animated WebP of at most PREVIEW_BYTES: on the left from the observed camera, on the right from a
-camera that moves left and right. Rendering at this small size is cheap compared with an evaluation.
+camera that moves left and right.
 """
 
 import io

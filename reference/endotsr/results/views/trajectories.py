@@ -22,7 +22,7 @@ from endotsr.training.scene.parameters import exposure_at
 
 LEVELS_16, LEVELS_8 = 65535, 255
 ROTATION_LEVELS = 127  # largest level of a quaternion component, either sign
-OPACITY_STEP = 1 / 255  # Gaussians with a lower opacity are never drawn
+OPACITY_STEP = 1 / 255  # Gaussians with a lower opacity are left out: below the default alpha_cutoff
 POSITION, LOG_SCALE, COLOUR = slice(0, 3), slice(3, 6), slice(6, 9)  # rows that are quantised within their range
 COMPRESSION = 6  # level of zlib
 
@@ -47,10 +47,17 @@ class Trajectories(NamedTuple):
 
 
 def key_times(scene: MovingScene, most: int) -> FloatArray:
-    """Key times: the frames' times and 1, or at most `most` evenly spaced ones; one for a static scene."""
+    """Key times: the frames' times and 1, or `most` evenly spaced ones if these are more.
+
+    Spectral motion alone has `most` evenly spaced ones; a static scene without an exposure of its frames has one.
+    """
     times = np.unique(np.append(np.asarray(scene.record.times, np.float64), 1.0))
-    if scene.model.gaussians.fdm_weight is None and scene.model.gaussians.appearance_coefficients is None:
-        return times[:1] if scene.model.gaussians.motion_coefficients is None else np.linspace(0, 1, most)
+    gaussians, frames = scene.model.gaussians, scene.model.frames
+    if gaussians.fdm_weight is None and gaussians.appearance_coefficients is None:
+        if gaussians.motion_coefficients is not None:
+            return np.linspace(0, 1, most)
+        if frames is None or frames.exposure_log_gain is None:
+            return times[:1]
     return times if times.size <= most else np.linspace(0, 1, most)
 
 
