@@ -1,5 +1,5 @@
 from endotsr.clips.sequences.checks.check import Checked
-from endotsr.clips.sequences.checks.kinds import finding
+from endotsr.clips.sequences.checks.kinds import KINDS, finding
 from endotsr.results.report.check_page import check_page
 
 
@@ -26,3 +26,9 @@ def test_the_cost_has_units():
                          ("Gaussians at the end", "64&#8239;000"), ("frames", "24")):  # fmt: skip
         assert f"<dt>{label}</dt><dd>{value}</dd>" in page
     assert "file of the frames" not in page, "they are in memory"
+
+
+def test_a_clip_that_ends_the_check_early_is_not_said_to_be_checked_for_everything():
+    """A refused folder without pictures is checked for little more than its layout."""
+    page = check_page(Checked("clip", [finding("disk", "clip", "odd")], {}, []))
+    assert "were checked" not in page and f"{len(KINDS)} kinds of findings" in page

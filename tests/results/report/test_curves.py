@@ -116,3 +116,19 @@ def test_no_number_on_an_axis_is_cut_off_at_the_edge(last):
     for chart in curves.charts(log):
         seen = np.asarray(Image.open(io.BytesIO(curves.chart_png(chart, "light"))))[..., 3]
         assert not seen[:, -2:].any() and not seen[:, :2].any() and not seen[-2:].any(), chart.title
+
+
+def test_terms_without_a_positive_value_have_no_chart():
+    """A logarithmic axis has no place for them: the chart was empty."""
+    assert curves.charts([{"iteration": 1, "depth": 0.0, "ssim": 1.0}]) == []
+    assert [c.title for c in curves.charts([{"iteration": 1, "depth": 0.0, "ssim": 0.5}])] == ["Loss terms"]
+
+
+def test_the_level_of_the_held_out_frames_is_that_of_the_tables():
+    """Extrapolated frames are not in the means of the tables and cards."""
+    rows = [{"frame": frame, "name": "", "time": 0.0, "psnr_tissue": value} for frame, value in ((1, 30.0), (9, 20.0))]
+    evaluation = {"held_out": {"mean": {"psnr_tissue": 25.0}, "per_frame": rows}, "frames": {"extrapolated": [9]}}
+    (chart,) = curves.charts([{"iteration": 1, "psnr": 20.0}], evaluation)
+    axes = style.new_figure(4, 3).subplots()
+    curves.draw_chart(axes, chart, style.LIGHT, title=False)
+    assert "held-out frames, end 30.00" in axes.get_legend_handles_labels()[1]

@@ -54,7 +54,7 @@ def test_undecided_tests_do_not_make_the_tissue_static(found):
     still = {name: v._replace(present=False, kind="none") for name, v in inspection.verdicts.items()}
     unknown = still | {"motion": still["motion"]._replace(kind="unknown")}
     for verdicts, said in (
-        (still, "No effect was found: the tissue is static."),
+        (still, "No effect was found: to these tests, the tissue is static."),
         (unknown, "No effect was found. Undecided: motion."),
     ):
         assert said in Reader(inspection_html("clip", inspection._replace(verdicts=verdicts), plan)).words
@@ -93,3 +93,15 @@ def test_no_table_is_cut_at_the_side(width, found, tmp_path):
     page = inspection_html("clip", inspection._replace(verdicts={"motion": wordy}), plan)
     (tmp_path / "page.html").write_text(page.replace("</body>", WIDTHS + "</body>"), encoding="utf-8")
     assert seen(tmp_path / "page.html", f"--window-size={width},900") == {"cut": 0}
+
+
+def test_the_savings_say_of_what_they_are_a_part(found):
+    """The memory is that of Gaussians and optimiser, not that of an iteration."""
+    inspection, plan = found
+    wanted = (
+        f"{plan.time:.0%} of the time of an iteration and {plan.memory:.0%} of the memory of Gaussians and optimiser"
+    )
+    assert f"expected saving: {wanted}" in inspection_text(inspection, plan)
+    words = Reader(inspection_html("clip", inspection, plan)).words
+    assert "expected saving, time of an iteration" in words
+    assert "expected saving, memory of Gaussians and optimiser" in words

@@ -51,4 +51,4 @@ def test_a_term_of_zero_has_no_ratio():
 def test_the_table_names_the_file_to_check_and_how_many_there_are():
     found = misfits_html(log_of(frames=40, changes={(frame, "depth"): 10 for frame in range(MOST + 1)}))
     assert found.count("prior depth") == MOST and f"{MOST} largest of {MOST + 1}" in found
-    assert "10.0" in found
+    assert "10.0" in found and "more than 3 times as large as that of the usual frame" in found

@@ -128,7 +128,7 @@ def test_the_page_says_whether_the_motion_carries_information(faded, said):
         Reader(report_html(made_up_data(evaluation=evaluation | {"cross_fade": row, "trajectories": motion}))).words
     )
     assert "Blend of its own renders" in words and said in words
-    assert ("adds information" if faded < 30.25 else "adds no information") in words
+    assert ("its motion gains PSNR" if faded < 30.25 else "its motion gains no PSNR") in words
     assert "Mean trajectory error 0.250 mm (0.50 px); mean tissue motion 1.000 mm (2.00 px)" in words
 
 
@@ -296,10 +296,10 @@ def test_nothing_is_said_of_frames_between_where_every_frame_is_extrapolated():
     """With the split `end` the blend is a copy of the last training frame, and the cross-fade a copy of its render."""
     data = made_up_data()
     data.evaluation["cross_fade"] = {"label": "Faded", "mean": metrics(31.0)}
-    assert interpolation_sentence(data.evaluation) and "its motion adds no information" in report_html(data)
+    assert interpolation_sentence(data.evaluation) and "its motion gains no PSNR" in report_html(data)
     data.evaluation["frames"] = {"extrapolated": [1, 9, 17, 25]}
     page = report_html(data)
-    assert interpolation_sentence(data.evaluation) == "" and "suffices" not in page and "its motion adds" not in page
+    assert interpolation_sentence(data.evaluation) == "" and "suffices" not in page and "its motion gains" not in page
 
 
 def test_pixels_that_training_hardly_shows_are_marked_and_left_out_in_a_table():
@@ -317,6 +317,23 @@ def test_pixels_that_training_hardly_shows_are_marked_and_left_out_in_a_table():
     assert "30.25" in folded and "30.31" in folded and "30.47" in folded
     assert "Never seen in training" in page and "Seen once" in page and page.count("<span>Seen</span>") == 1
     assert "3 px never seen in training or once" in page
+
+
+def test_the_counts_of_seldom_seen_pixels_are_of_the_frames_of_their_table():
+    """Where extrapolated frames are apart, the PSNR beside the counts is not theirs."""
+    data = made_up_data()
+    rows = [{"frame": frame, "tissue": 672, "never_seen": frame, "seen_once": 2} for frame in (1, 9, 17, 25)]
+    data.evaluation["frames"] = {"coverage": rows, "extrapolated": [25]}
+    page = report_html(data)
+    assert f"Of {3 * 672} tissue pixels" in page and "27 (1.34%) are excluded" in page
+    data.evaluation["frames"]["extrapolated"] = []
+    assert f"Of {4 * 672} tissue pixels" in report_html(data)
+
+
+def test_the_page_says_of_baselines_and_gap_what_holds_for_all_of_them(page):
+    """The temporal mean and the two of tissue show tissue behind an instrument; a gap has more than one cause."""
+    assert "behind the instrument" not in page and "not capacity" not in page
+    assert "at or above 1 of 2 baselines" in page
 
 
 def test_the_picture_marks_exactly_the_seldom_seen_tissue():

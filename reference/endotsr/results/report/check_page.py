@@ -21,7 +21,7 @@ def check_page(checked: Checked) -> str:
     counts = {level: sum(f.level == level for f in checked.findings) for level in TITLES}
     verdict = "is ready for training" if not checked.refused else "is refused"
     found = ", ".join(counted(counts[level], level) for level in TITLES)
-    lead = f"{found}; {len(KINDS)} kinds of findings were checked"
+    lead = f"{found}. There are {len(KINDS)} kinds of findings; each is checked where the clip has the files for it."
     body = [
         f'<p class="eyebrow">endotsr check</p><h1>{parts.text(checked.source)} {verdict}</h1><p class="lead">{lead}</p>'
     ]

@@ -1,8 +1,8 @@
 """Metrics as text: a comparison of methods for the terminal, and CSV for a spreadsheet or a plot.
 
 In: the dictionary of metrics.json, or the rows of `evaluation.compare.compare`. Out: a table of means and paired
-differences; or a CSV file (RFC 4180, `.` in numbers, an empty cell for no value) with one row per method and frame or
-per method and metric. Its numbers have all digits and are read back exactly.
+differences; or a CSV file (RFC 4180 but for lines that end with LF alone, `.` in numbers, an empty cell for no value)
+with one row per method and frame or per method and metric. Its numbers have all digits and are read back exactly.
 """
 
 import csv

@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.results.evaluation.evaluate import held_out_means
 from endotsr.results.evaluation.records import EvaluationRecord
 from endotsr.results.report import parts
 from endotsr.results.report.style import LIGHT, THEMES, Theme, encoded, legend, name_axes, new_figure, plain_axes
@@ -41,7 +42,7 @@ def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """Centred running mean over `window` entries, fewer at both ends. (n,) -> (n,)."""
+    """Centred running mean over `window` entries, one more if it is even, fewer at both ends. (n,) -> (n,)."""
     half = window // 2
     sums = np.concatenate([[0.0], np.cumsum(values)])
     positions = np.arange(values.size)
@@ -56,7 +57,7 @@ def charts(log: LogEntries, evaluation: EvaluationRecord | None = None) -> list[
         found.append(Chart("Loss", lambda axes, theme: _draw_loss(axes, theme, log)))
     if series(log, "psnr")[0].size:
         found.append(Chart("PSNR of the training view, tissue, dB", lambda a, t: _draw_psnr(a, t, log, evaluation)))
-    if any(series(log, key)[0].size for key in TERMS):
+    if any(_positive(log, key) for key in TERMS):
         found.append(Chart("Loss terms", lambda axes, theme: _draw_terms(axes, theme, log)))
     if series(log, "gaussians")[0].size:
         found.append(Chart("Gaussians", lambda axes, theme: _draw_count(axes, theme, log)))
@@ -113,7 +114,7 @@ def curves_png(log: LogEntries, evaluation: EvaluationRecord | None = None) -> b
 
 
 def draw_chart(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
-    """Draw a chart with names and legend; five or more curves have their names above them."""
+    """Draw a chart with names and legend; above five or more lines, room is left for the legend."""
     chart.draw(axes, theme)
     name_axes(axes, chart.along, title=chart.title if title else "", theme=theme)
     plain_axes(axes, theme)
@@ -147,15 +148,16 @@ def _draw_loss(axes: Any, theme: Theme, log: LogEntries) -> None:
 
 def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
-        positive = [
-            cast(LogEntry, {**entry, key: value})
-            for entry in log
-            if (value := minimised(entry, key)) is not None and value > 0
-        ]
-        if positive:  # a logarithmic axis has no zero
+        if positive := _positive(log, key):
             label = "1 − ssim" if key == "ssim" else key
             _curve(axes, positive, key, theme.colours[position], label, raw=False)
     _log_scale(axes, log, TERMS)
+
+
+def _positive(log: LogEntries, key: str) -> LogEntries:
+    """The entries with a positive minimised value of a term, which they have in its place; a logarithm has no zero."""
+    values = [(entry, minimised(entry, key)) for entry in log]
+    return [cast(LogEntry, {**entry, key: value}) for entry, value in values if value is not None and value > 0]
 
 
 def minimised(entry: LogEntry, key: str) -> float | None:
@@ -181,7 +183,8 @@ def _draw_psnr(axes: Any, theme: Theme, log: LogEntries, evaluation: EvaluationR
     _curve(axes, log, "psnr", theme.colours[0], "training view")
     levels = (("held_out", "held-out frames, end", "--", 1), ("training", "training frames, end", ":", 2))
     for key, label, dashes, colour in levels:
-        value = (((evaluation or {}).get(key) or {}).get("mean") or {}).get("psnr_tissue")  # as in the log
+        measured = (evaluation or {}).get(key)
+        value = held_out_means(evaluation, measured)[0].get("psnr_tissue") if evaluation and measured else None
         if value is not None:
             axes.axhline(
                 value, color=theme.colours[colour], linestyle=dashes, linewidth=1.4, label=f"{label} {value:.2f}"

@@ -85,6 +85,9 @@ def _extrapolated(data: ReportData, columns: list[Column]) -> str:
 def _seldom_seen(data: ReportData, rows: list[MetricsRow]) -> str:
     """The folded table with and without pixels that at most one training frame shows."""
     counted = (data.evaluation.get("frames") or {}).get("coverage") or []
+    if mean_of(data, "held_out", extrapolated=True):  # the rows are means over the other frames
+        outside = extrapolated_frames(data)
+        counted = [row for row in counted if row["frame"] not in outside]
     never, once, tissue = (sum(row[key] for row in counted) for key in ("never_seen", "seen_once", "tissue"))
     if not never + once:
         return ""

@@ -42,7 +42,10 @@ def inspection_text(inspection: Inspection, plan: Plan) -> str:
     ]
     lines += [f"  {key} is kept: {reason}" for key, reason in plan.kept]
     lines += [f"  {remark}" for remark in plan.remarks]
-    lines.append(f"expected saving: {plan.time:.0%} of the time and {plan.memory:.0%} of the memory per iteration")
+    lines.append(
+        f"expected saving: {plan.time:.0%} of the time of an iteration and {plan.memory:.0%} of the memory of Gaussians"
+        " and optimiser"
+    )
     return "\n".join(lines)
 
 
@@ -64,14 +67,14 @@ def _headline(title: str, inspection: Inspection, plan: Plan) -> str:
     verdicts = inspection.verdicts.values()
     present = [v.effect for v in verdicts if v.present and v.kind not in (UNKNOWN, *SMALL)]
     unknown = [v.effect for v in verdicts if v.kind == UNKNOWN]
-    static = "No effect was found." if unknown else "No effect was found: the tissue is static."
+    static = "No effect was found." if unknown else "No effect was found: to these tests, the tissue is static."
     found = f"Found: {', '.join(present)}." if present else static
     found += f" Undecided: {', '.join(unknown)}." if unknown else ""
     cards = [
         (f"{255 * inspection.noise.level:.2f}", "grey levels", "noise, standard deviation"),
         (str(inspection.clip.count), "", f"training frames of {inspection.clip.frames}"),
-        (f"{plan.time:.0%}", "", "expected time saving"),
-        (f"{plan.memory:.0%}", "", "expected memory saving"),
+        (f"{plan.time:.0%}", "", "expected saving, time of an iteration"),
+        (f"{plan.memory:.0%}", "", "expected saving, memory of Gaussians and optimiser"),
     ]
     boxes = "".join(parts.card(parts.text(value), unit, label) for value, unit, label in cards)
     return (
@@ -96,7 +99,7 @@ def _verdicts(inspection: Inspection) -> str:
     )
     note = (
         "Every test uses training frames only. Confidence measures the distance of the statistic from its threshold: "
-        "0.5 at the threshold, 1 far from it or for an exact answer."
+        "0.5 at the threshold or for unknown, towards 1 far from it, 1 for an exact answer. It is no probability."
     )
     return parts.section("Findings", tables.html_table(columns, rows), reasons, note=note)
 

@@ -1,4 +1,7 @@
-"""Labels of points, each at the first position around its point that is free of other labels and lines."""
+"""Labels of points, each at the first position around its point that is free of other labels, points and lines.
+
+A label for which lines leave no position may cross them.
+"""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -48,20 +51,25 @@ def place_labels(figure: Any, labels: list[Label]) -> None:
 
 
 def line_points(axes: Any) -> NDArray[np.float64]:
-    """Points in pixels along every line of the axes, (M, 2)."""
+    """Points in pixels along every line of the axes that is drawn between finite points, (M, 2)."""
     found = [np.empty((0, 2))]
     for line in axes.lines:
         ends = line.get_transform().transform(np.column_stack(line.get_data(orig=False)).astype(float))
-        if line.get_linestyle() in ("None", "") or len(ends) < 2 or not np.isfinite(ends).all():
+        if line.get_linestyle() in ("None", ""):
             continue
         for a, b in pairwise(ends):
+            if not (np.isfinite(a).all() and np.isfinite(b).all()):
+                continue
             count = max(2, int(np.hypot(*(b - a)) / STEP))
             found.append(a + np.linspace(0, 1, count)[:, None] * (b - a))
     return np.concatenate(found)
 
 
 def _merged(labels: list[Label]) -> list[Label]:
-    """Labels of one point joined by commas, three or more by their first and last, in the colour of the first."""
+    """Labels of one point joined by commas, three or more by their first and last, in the colour of the first.
+
+    Labels of another colour at this point are left out.
+    """
     groups: list[list[Label]] = []
     for label in labels:
         at = label.axes.transData.transform((label.x, label.y))

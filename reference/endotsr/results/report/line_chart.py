@@ -1,7 +1,6 @@
-"""A small line chart as SVG text, for a page that is rewritten frequently.
+"""A small line chart as SVG text, without matplotlib, for a page that is rewritten during training.
 
-Matplotlib, which draws the charts of a finished run (`curves.py`), would take too long for this. The surrounding page
-defines the colours, in a light and a dark scheme.
+The surrounding page defines the colours, in a light and a dark scheme.
 """
 
 import math
@@ -84,7 +83,10 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def _decades(low: float, high: float) -> list[float]:
-    """log10 of the powers of ten from low to high; on a short axis also of their multiples by 2 and 5."""
+    """log10 of the powers of ten from low to high; on a short axis also of their multiples by 2 and 5.
+
+    Both ends if there are none.
+    """
     factors = (1, 2, 5) if high - low < 2 else (1,)
     found = [k + math.log10(factor) for k in range(math.floor(low), math.ceil(high) + 1) for factor in factors]
     return [at for at in found if low <= at <= high] or [low, high]

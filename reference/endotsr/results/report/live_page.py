@@ -1,8 +1,9 @@
 """The progress page of a training: iterations, time left, curves, and a render of one frame.
 
 `training.html` is rewritten in the run folder during training, and the browser reloads it: no server and no script. The
-page renders one frame with the current parameters, without changing them. It takes at most `LARGEST_FRACTION` of the
-time, but is rewritten at least every `MOST_SECONDS`. A page that cannot be written does not stop the training. After
+page renders one frame with the current parameters, without changing them. After a page, the next follows with the first
+iteration that ends after FEWEST_SECONDS, or later if pages would otherwise take more than LARGEST_FRACTION of the time,
+but at most MOST_SECONDS later. A page that cannot be written does not stop the training. After
 the evaluation the page redirects to the report.
 """
 

@@ -18,7 +18,7 @@ from endotsr.training.fitting.records import LogEntry
 
 LATE = 0.5  # fraction of the training that is not looked at: the fit is still rough
 WORSE = 3.0  # times the median over the frames
-FEWEST = 3  # visits of a frame, and frames
+FEWEST = 3  # visits of a frame, and other frames
 MOST = 8  # rows of the table
 WORDS = {"l1": "colour", "ssim": "structure", "depth": "depth"}
 CHECKS = {"l1": "picture and mask", "ssim": "picture and mask", "depth": "prior depth"}
@@ -66,8 +66,8 @@ def misfits_html(log: list[LogEntry]) -> str:
     rows = [[parts.cell(one.frame), WORDS[one.term], f"{one.ratio:.1f}", CHECKS[one.term]] for one in found[:MOST]]
     rest = f" The table has the {MOST} largest of {len(found)}." if len(found) > MOST else ""
     sentence = (
-        f"In the second half of the training, these frames keep a term more than {WORSE:g} times as large as the usual"
-        f" frame.{rest}"
+        f"In the second half of the training, these frames keep a term more than {WORSE:g} times as large as that of"
+        f" the usual frame.{rest}"
     )
     table = html_table(["Training frame", "Term", "Times the median", "Check its"], rows)
     return f'<p class="note">{parts.text(sentence)}</p>{table}'

@@ -1,6 +1,7 @@
 """HTML elements of the report: escaping, numbers, pictures, and the style sheet.
 
-All text from a run is escaped by `text`. The pages have no script, and link only to the viewer page.
+All text from a run is escaped by `text`. The pages have no script. The report links to the viewer page, and after the
+evaluation the progress page links to the report; there are no other links.
 """
 
 import html

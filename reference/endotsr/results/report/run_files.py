@@ -27,7 +27,7 @@ from endotsr.training.runs.log import log_until
 from endotsr.untrusted.names import file_name
 from endotsr.untrusted.writing import replace_file, replace_text, replacing_folder
 
-MOST_SHOWN = 24  # the worst held-out frames, shown in the report; about 0.25 MB each
+MOST_SHOWN = 24  # the worst held-out frames, shown in the report
 
 
 def write_evaluation(

@@ -89,7 +89,7 @@ def interpolation_sentence(metrics: EvaluationRecord) -> str:
     Edges   "" if the model is level or above in PSNR of the tissue, if one of the two has no finite value, or if no
             held-out frame is between training frames. Where the model has the lower LPIPS, the sentence is
             restricted to PSNR. A second sentence follows if the model is below the blend on its own training frames
-            too: it is not fitted yet.
+            too: a longer training may then change the order.
     """
     blend = metrics["baselines"].get("two_neighbours")
     if blend is None or all_extrapolated(metrics):

@@ -48,8 +48,8 @@ def headline(data: ReportData) -> str:
 
 
 ABOUT_BASELINES = (
-    "A baseline interpolates the neighbouring pictures. It provides no geometry, no other viewpoint, no depth and no"
-    " tissue behind the instrument, but can predict the pixels of a single missing frame better."
+    "A baseline combines training pictures. It provides no geometry, no other viewpoint and no depth, but can predict"
+    " the pixels of a single missing frame better."
 )
 
 
@@ -66,7 +66,7 @@ def _verdict(data: ReportData) -> str:
     return (
         f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the best '
         f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB). "
-        f"It is above {beaten} of {len(rows)} baselines. {ABOUT_BASELINES} {_interpolation(data)}</p>"
+        f"It is at or above {beaten} of {len(rows)} baselines. {ABOUT_BASELINES} {_interpolation(data)}</p>"
     )
 
 
@@ -104,8 +104,9 @@ def temporal_gap(data: ReportData) -> str:
     chart = curves.frame_chart(data.evaluation, "psnr_tissue")
     pair = f'<div class="charts">{table}{curves.chart_figure(chart)}</div>' if chart else table
     note = (
-        "The temporal gap is the difference between training and held-out frames. A large gap means that interpolation "
-        "in time, not capacity, limits the model."
+        "The temporal gap is the mean over a sample of the training frames minus the mean over the held-out frames. A "
+        "large gap suggests that the prediction between training times limits the model more than its capacity does. "
+        "Fitted noise, and tissue that no training frame shows, widen the gap too."
     )
     return parts.section("Temporal gap", pair, _motion(data), note=note)
 
@@ -116,10 +117,10 @@ def _motion(data: ReportData) -> str:
     faded = mean_of(data, "cross_fade").get("psnr_tissue")
     ours = mean_of(data, "held_out").get("psnr_tissue")
     if faded is not None and ours is not None and not all_extrapolated(data.evaluation):
-        word, what = ("above", "adds") if ours > faded else ("below", "adds no")
+        word, what = ("above", "gains") if ours > faded else ("below", "gains no")
         sentences.append(
             f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "
-            f"two neighbouring training times: its motion {what} information between the training frames."
+            f"two neighbouring training times: its motion {what} PSNR between the training frames."
         )
     if motion := data.evaluation.get("trajectories"):
         sentences.append(trajectory_sentence(motion))
