@@ -1,8 +1,8 @@
 """Comparison of methods on the same held-out frames: means and paired differences.
 
 In: metrics.json of runs or of folders of pictures. Out: one row per method and metric. Differences to the first method
-are taken frame by frame, which cancels the difficulty of the frames. Their intervals are bootstrapped over frames: they
-cover other frames of this clip, but not other clips.
+are taken frame by frame, which cancels what the difficulty of a frame adds to both values. Their intervals resample the
+frames of this clip as if these were independent; they hold no spread between clips.
 """
 
 from typing import Any, NamedTuple, cast
@@ -87,7 +87,7 @@ def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0)
 
     metric_names   keys of the entries; a metric without any value is left out
     seed           of the resampling
-    Raises: InputError if two methods have the same label, or were measured on different frames or masks.
+    Raises: InputError if two methods have the same label, or were measured on different frames, pictures or masks.
     """
     _refuse_other_frames(methods)
     outside = {frame for method in methods for frame in method.outside}

@@ -1,7 +1,8 @@
 """Rendered depth of the held-out frames compared with their prior depth, which is no target of the training.
 
-The prior is not ground truth: it comes from stereo matching, and its errors count as errors here. The rows without a
-model predict a prior from the priors of training frames, which have similar errors; this favours them.
+Except in a simulated sequence, the prior is no ground truth: it comes from stereo matching, from a network or from
+another measurement, and its errors count as errors here. The rows without a model predict a prior from the priors of
+training frames. Errors that these have in common with it do not count against these rows, which favours them.
 """
 
 from collections.abc import Callable

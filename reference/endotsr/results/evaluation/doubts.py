@@ -1,9 +1,15 @@
 """Signs that pictures were not written as the renders of the held-out frames: their metrics would be of a mistake.
 
-In: the held-out pictures, and the sequence. Out: a sentence, or none. Besides an exchange of channels and a turn
-(`turned`), a picture is compared on tissue with what was recorded after a change from linear light, and with other
-frames. The change that brings all pictures together nearest is named, if it brings them nearer by LEAST_GAIN. A render
-between training frames resembles the frames before and after alike, and a picture with a wrong number one of them.
+In: the held-out pictures, and the sequence. Out: one sentence, or none. The signs are tested in this order, on tissue:
+
+- an exchange of channels or a turn (`turned`);
+- pictures that equal their recorded frames;
+- linear light, and a number that is off by one: the change with the largest gain is named, if all pictures together
+  come nearer to the recorded frames by more than LEAST_GAIN. For a number that is off by one, the gain is counted
+  against the own frame or the frame on the other side, whichever is nearer: a render between training frames resembles
+  the frames before and after about equally;
+- grey pictures of frames with colours;
+- another order of the held-out frames, with the same LEAST_GAIN.
 """
 
 from collections.abc import Callable
@@ -32,7 +38,9 @@ def doubt(sequence: Sequence, read: Callable[[int], FloatArray]) -> str:
     if remark := turned_remark(read, sequence):
         return remark
     held_out = [int(i) for i in sequence.test_index if sequence.masks[i].any()]
-    errors = {name: np.zeros(2) for name in (LINEAR, *STEPS)}  # squared, of all pictures: as they are, and changed
+    errors = {
+        name: np.zeros(2) for name in (LINEAR, *STEPS)
+    }  # squared, of all pictures: without the change, and with it
     equal, grey, coloured, thinned = [], bool(held_out), False, {}
     for i in held_out:
         picture = np.asarray(read(i), np.float32)

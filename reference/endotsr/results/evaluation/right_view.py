@@ -1,12 +1,15 @@
-"""Renders for the right camera of a rectified pair, compared with the real right pictures, which training never uses.
+"""Renders for the right camera of a rectified pair, compared with the real right pictures, which training never reads.
+
+A prior depth from stereo matching rests on these pictures, and the training uses it.
 
 The stereo baseline B is the median of d z / f over tissue pixels, with disparity d and prior depth z of the left
 pictures. If the quartiles of B differ too much, the pair is not calibrated and is not measured. The right camera is the
 left one translated by B along its x axis.
 
 Evaluated pixels: every left pixel is warped to the right picture by its prior depth; of several, the nearest in depth
-is kept. A right pixel is evaluated if it then shows tissue, with a margin. This choice does not depend on a model.
-Pixels without depth use the depth of the nearest pixel with one.
+is kept. A left pixel without depth is warped by the depth of the nearest pixel with one. A right pixel is evaluated if
+the left pixel that it then shows is tissue and has a depth of its own, except in a margin along the border of these
+pixels. This choice does not depend on a model.
 """
 
 from collections.abc import Callable

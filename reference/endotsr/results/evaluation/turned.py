@@ -37,7 +37,7 @@ def turned_remark(read: Callable[[int], FloatArray], sequence: Sequence) -> str:
     if not found[name] < CLEARLY * stored:
         return ""
     gain = 10 * np.log10(stored / max(found[name], FINEST))
-    return f"warning: {name}, the pictures agree with the frames by {gain:.1f} dB better than as they are stored"
+    return f"warning: {name}, the pictures agree with the frames better by {gain:.1f} dB than as they are stored"
 
 
 def _error(pictures: list[FloatArray], sequence: Sequence, frames: list[int]) -> float:
