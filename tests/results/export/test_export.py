@@ -13,6 +13,7 @@ from endotsr.method.kernels.constants import Y00
 from endotsr.method.splatting.render import check_scene
 from endotsr.results.export.files import Content, export
 from endotsr.results.export.model import load_slim_model
+from endotsr.results.export.npz import ARRAYS, read_arrays
 from endotsr.results.export.ply import read_gaussians
 from endotsr.results.export.scene import MovingScene, open_scene
 from endotsr.results.export.times import Times
@@ -245,3 +246,13 @@ def test_gaussians_of_another_writer_are_read(tmp_path):
     (tmp_path / "a.ply").write_bytes(out.getvalue())
     found = read_gaussians(tmp_path / "a.ply")
     assert found.count == 1 and found.position[0, 0] == 1 and found.harmonics.shape == (1, 3, 1)
+
+
+def test_a_trained_scene_whose_positions_are_one_number_is_refused(tmp_path):
+    shapes = {name: (2, *rest) for name, rest in ARRAYS.items()}
+    np.savez(tmp_path / "a.npz", **{name: np.zeros(shape) for name, shape in shapes.items()})
+    assert read_arrays(tmp_path / "a.npz")["xyz"].shape == (2, 3)
+    for name in shapes:
+        np.savez(tmp_path / "a.npz", **{n: np.zeros(() if n == name else shape) for n, shape in shapes.items()})
+        with pytest.raises(InputError, match=f"{name} has shape"):
+            read_arrays(tmp_path / "a.npz")

@@ -9,6 +9,7 @@ import pytest
 from made_up_model import moving_scene
 
 from endotsr.errors import InputError
+from endotsr.results.export import gltf
 from endotsr.results.export.files import Content, export
 from endotsr.results.export.placement import placed_points
 from endotsr.results.export.scene import MovingScene
@@ -107,3 +108,12 @@ def test_points_that_cannot_be_animated_are_refused(times, content, said, tmp_pa
     with pytest.raises(InputError, match=said):
         export(moving_scene(), tmp_path / "a.glb", Times(times), content)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_weights_of_many_times_count_towards_the_largest_file(tmp_path, monkeypatch):
+    """The weights grow with the square of the times; the length of such a file did not fit into its header."""
+    scene = moving_scene()
+    monkeypatch.setattr(gltf, "LARGEST", 12 * 80 * 202)
+    with pytest.raises(InputError, match="at 200 times need more than"):
+        export(scene, tmp_path / "a.glb", Times(count=200), Content(least_opacity=0.0))
+    assert export(scene, tmp_path / "a.glb", Times(count=20), Content(least_opacity=0.0))

@@ -12,7 +12,7 @@ from PIL import Image
 
 from endotsr.results.report import figures
 from endotsr.results.report.data import FramePictures, Preview, ReportData
-from endotsr.results.report.run_text import held_out_table, interpolation_sentence
+from endotsr.results.report.run_text import facts, held_out_table, interpolation_sentence
 from endotsr.results.report.sections import report_html
 
 VOID = {"meta", "img", "source", "br"}
@@ -334,6 +334,20 @@ def test_the_page_says_of_baselines_and_gap_what_holds_for_all_of_them(page):
     """The temporal mean and the two of tissue show tissue behind an instrument; a gap has more than one cause."""
     assert "behind the instrument" not in page and "not capacity" not in page
     assert "at or above 1 of 2 baselines" in page
+
+
+def test_the_time_of_a_training_that_has_not_ended_is_not_said_to_be_nothing():
+    """run.json has no seconds yet; the page said 0:00."""
+    data = made_up_data()
+    for seconds in (None, 0.0):
+        data = replace(data, evaluation=data.evaluation | {"run": RUN | {"seconds": seconds}})
+        assert "0:00" not in report_html(data) and facts(data.evaluation["run"])["Training time"] is None
+    assert facts(RUN)["Training time"] == "1:01" and "1:01" in report_html(made_up_data())
+
+
+def test_the_footer_defines_both_metrics_of_the_tissue(page):
+    """SSIM of the tissue is the map of the full image averaged over the tissue: its windows reach excluded pixels."""
+    assert "the SSIM map of the full image averaged over them" in page
 
 
 def test_the_picture_marks_exactly_the_seldom_seen_tissue():

@@ -18,6 +18,11 @@ def iterations(run: RunPart) -> str:
     return f"{done}" if done >= planned else f"{done} of {planned}, the run is not finished"
 
 
+def training_time(run: RunPart) -> str | None:
+    """The time of the training; None if run.json has no seconds yet."""
+    return duration(run["seconds"]) if run["seconds"] else None
+
+
 def facts(run: RunPart) -> dict[str, str | int | float | None]:
     """Label -> value for the facts listed in the report."""
     about, machine = run["input"], run["machine"]
@@ -32,7 +37,7 @@ def facts(run: RunPart) -> dict[str, str | int | float | None]:
         "Laplacian weight": run["lambda_lap"],
         "Seed": run["seed"],
         "Threads": run["threads"],
-        "Training time": duration(run["seconds"] or 0.0),
+        "Training time": training_time(run),
         "Peak memory": f"{peak / 1e9:.2f} GB" if peak else "unknown",
         "Machine": f"{machine.get('processor')}, {machine.get('cores')} cores, "
         + (f"{memory / 1e9:.0f} GB" if memory else "memory unknown"),

@@ -12,8 +12,15 @@ from endotsr.results.report import curves, figures, parts
 from endotsr.results.report.data import DECIDING, FramePictures, ReportData
 from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
 from endotsr.results.report.misfits import misfits_html
-from endotsr.results.report.run_text import SHOWN, facts, interpolation_sentence, pose_sentence, trajectory_sentence
-from endotsr.results.report.tables import duration, html_table
+from endotsr.results.report.run_text import (
+    SHOWN,
+    facts,
+    interpolation_sentence,
+    pose_sentence,
+    training_time,
+    trajectory_sentence,
+)
+from endotsr.results.report.tables import html_table
 from endotsr.untrusted.names import counted
 
 OPENED_FRAMES = 3  # the worst frames are unfolded
@@ -36,7 +43,7 @@ def headline(data: ReportData) -> str:
     if gaussians.size:
         boxes.append(parts.card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
     if run := data.evaluation.get("run"):
-        boxes.append(parts.card(duration(run["seconds"] or 0.0), "", "training time"))
+        boxes.append(parts.card(parts.cell(training_time(run)), "", "training time"))
     elif seconds.size:
         boxes.append(parts.card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
     frames = counted(count, "held-out frame") if count else "report"
@@ -246,9 +253,9 @@ def footer(data: ReportData) -> str:
     """Definitions of the metrics."""
     return (
         "<footer><p>PSNR and SSIM are computed per frame and averaged over frames. <em>Full</em>: all pixels, excluded "
-        "ones set to zero in render and truth. <em>Tissue</em>: tissue pixels only. <em>8-bit</em>: render rounded to "
-        "256 levels first. LPIPS: AlexNet, version 0.1, excluded pixels zero, values scaled to the given "
-        "interval.</p></footer>"
+        "ones set to zero in render and truth. <em>Tissue</em>: PSNR of the tissue pixels only, and the SSIM map of the "
+        "full image averaged over them. <em>8-bit</em>: render rounded to 256 levels first. LPIPS: AlexNet, version "
+        "0.1, excluded pixels zero, values scaled to the given interval.</p></footer>"
     )
 
 
