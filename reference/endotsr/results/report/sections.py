@@ -124,10 +124,10 @@ def _motion(data: ReportData) -> str:
     faded = mean_of(data, "cross_fade").get("psnr_tissue")
     ours = mean_of(data, "held_out").get("psnr_tissue")
     if faded is not None and ours is not None and not all_extrapolated(data.evaluation):
-        word, what = ("above", "gains") if ours > faded else ("below", "gains no")
+        word, what = ("above", "gain") if ours > faded else ("below", "gain no")
         sentences.append(
             f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "
-            f"two neighbouring training times: its motion {what} PSNR between the training frames."
+            f"two neighbouring training times: its motion and colour between them {what} PSNR."
         )
     if motion := data.evaluation.get("trajectories"):
         sentences.append(trajectory_sentence(motion))
@@ -253,8 +253,8 @@ def footer(data: ReportData) -> str:
     """Definitions of the metrics."""
     return (
         "<footer><p>PSNR and SSIM are computed per frame and averaged over frames. <em>Full</em>: all pixels, excluded "
-        "ones set to zero in render and truth. <em>Tissue</em>: PSNR of the tissue pixels only, and the SSIM map of the "
-        "full image averaged over them. <em>8-bit</em>: render rounded to 256 levels first. LPIPS: AlexNet, version "
+        "ones set to zero in render and truth. <em>Tissue</em>: PSNR of the tissue pixels only, and the SSIM map of "
+        "the full image averaged over them. <em>8-bit</em>: render rounded to 256 levels first. LPIPS: AlexNet, version "
         "0.1, excluded pixels zero, values scaled to the given interval.</p></footer>"
     )
 
