@@ -194,3 +194,12 @@ def test_a_place_that_cannot_be_written_is_an_error_of_the_file_system(tmp_path)
     with pytest.raises(OSError):
         film_file.write_video(tmp_path / "none" / "a.mp4", pictures(2), 10.0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_out_of_order_have_no_speed(tmp_path):
+    """Only the first and the last time were looked at, and the film was said to have the speed of the recording."""
+    file, times = tmp_path / "a.gif", [0.0, 0.9, 0.5]
+    assert film_rate(file, times, 2.0) == 15 and speed_in_words(times, 2.0, 15) == ""
+    with pytest.raises(InputError, match="not in order of time"):
+        film_rate(file, times, 2.0, slow=2.0)
+    assert film_rate(file, [0.0, 0.5, 0.5, 1.0], 0.3) == 10 and "1 times" in speed_in_words([0.0, 0.5, 1.0], 0.2, 10)

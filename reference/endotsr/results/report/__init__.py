@@ -1,1 +1,1 @@
-"""Reports as HTML and text: the report of a run, the progress page, `check`, `inspect` and comparisons."""
+"""Reports as HTML and text: the report of a run, the progress page, `check`, `inspect`, `poses` and comparisons."""

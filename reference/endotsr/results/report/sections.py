@@ -254,8 +254,8 @@ def footer(data: ReportData) -> str:
     return (
         "<footer><p>PSNR and SSIM are computed per frame and averaged over frames. <em>Full</em>: all pixels, excluded "
         "ones set to zero in render and truth. <em>Tissue</em>: PSNR of the tissue pixels only, and the SSIM map of "
-        "the full image averaged over them. <em>8-bit</em>: render rounded to 256 levels first. LPIPS: AlexNet, version "
-        "0.1, excluded pixels zero, values scaled to the given interval.</p></footer>"
+        "the full image averaged over them. <em>8-bit</em>: render rounded to 256 levels first. LPIPS: AlexNet, "
+        "version 0.1, excluded pixels zero, values scaled to the given interval.</p></footer>"
     )
 
 

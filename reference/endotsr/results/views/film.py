@@ -5,6 +5,7 @@ has no encoder of H.264; webm uses VP9; gif has 256 colours and needs no FFmpeg.
 """
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
 
     Raises: InputError if `slow` is given but the speed is undefined, or out of the film's range.
     """
-    seconds = (times[-1] - times[0]) * duration
+    seconds = _seconds(times, duration)
     if seconds <= 0:
         if slow is not None:
             order = "one picture has no speed" if len(times) < 2 else "the pictures are not in order of time"
@@ -76,8 +77,14 @@ def played_rate(file: Path, rate: float) -> float:
 
 def speed_in_words(times: list[float], duration: float, rate: float) -> str:
     """The speed of a film relative to the recording, as the end of a sentence; "" if unknown."""
-    seconds = (times[-1] - times[0]) * duration
+    seconds = _seconds(times, duration)
     return f", {rate * seconds / (len(times) - 1):.3g} times the speed of the recording" if seconds > 0 else ""
+
+
+def _seconds(times: list[float], duration: float) -> float:
+    """Seconds of the recording from the first picture to the last; 0 if unknown, or out of order of time."""
+    ordered = all(b >= a for a, b in pairwise(times))
+    return (times[-1] - times[0]) * duration if ordered else 0.0
 
 
 def _highest(file: Path) -> int:
