@@ -1,6 +1,7 @@
 """Signs that pictures were not written as the renders of the held-out frames: their metrics would be of a mistake.
 
-In: the held-out pictures, and the sequence. Out: one sentence, or none. The signs are tested in this order, on tissue:
+In: the held-out pictures, and the sequence. Out: one sentence, or none. Errors are those on tissue. The order of the
+tests is:
 
 - an exchange of channels or a turn (`turned`);
 - pictures that equal their recorded frames;
@@ -8,7 +9,7 @@ In: the held-out pictures, and the sequence. Out: one sentence, or none. The sig
   come nearer to the recorded frames by more than LEAST_GAIN. For a number that is off by one, the gain is counted
   against the own frame or the frame on the other side, whichever is nearer: a render between training frames resembles
   the frames before and after about equally;
-- grey pictures of frames with colours;
+- pictures that are grey at all pixels, of frames with colours on tissue;
 - another order of the held-out frames, with the same LEAST_GAIN.
 """
 
