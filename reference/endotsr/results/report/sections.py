@@ -5,12 +5,11 @@ needs no script and no other file. It follows the reader's light or dark colour 
 links to the viewer page, if there is one.
 """
 
-import numpy as np
-
 from endotsr.results.evaluation.evaluate import all_extrapolated
-from endotsr.results.report import curves, figures, parts
-from endotsr.results.report.data import DECIDING, FramePictures, ReportData
+from endotsr.results.report import curves, parts
+from endotsr.results.report.data import DECIDING, ReportData
 from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
+from endotsr.results.report.held_out_pictures import pictures
 from endotsr.results.report.misfits import misfits_html
 from endotsr.results.report.run_text import (
     SHOWN,
@@ -22,8 +21,6 @@ from endotsr.results.report.run_text import (
 )
 from endotsr.results.report.tables import html_table
 from endotsr.untrusted.names import counted
-
-OPENED_FRAMES = 3  # the worst frames are unfolded
 
 
 def headline(data: ReportData) -> str:
@@ -124,10 +121,10 @@ def _motion(data: ReportData) -> str:
     faded = mean_of(data, "cross_fade").get("psnr_tissue")
     ours = mean_of(data, "held_out").get("psnr_tissue")
     if faded is not None and ours is not None and not all_extrapolated(data.evaluation):
-        word, what = ("above", "gain") if ours > faded else ("below", "gain no")
+        word, what = ("above", "raise") if ours > faded else ("below", "do not raise")
         sentences.append(
             f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "
-            f"two neighbouring training times: its motion and colour between them {what} PSNR."
+            f"two neighbouring training times: its changes of position and colour between them {what} the PSNR."
         )
     if motion := data.evaluation.get("trajectories"):
         sentences.append(trajectory_sentence(motion))
@@ -141,75 +138,6 @@ def training(data: ReportData) -> str:
     found = curves.charts(data.log, data.evaluation)
     charts = f'<div class="charts">{"".join(map(curves.chart_figure, found))}</div>' if found else ""
     return parts.section("Training", charts, misfits_html(data.log))
-
-
-def pictures(data: ReportData) -> str:
-    """Render, truth, error and depth of the given held-out frames, worst first."""
-    if not data.frames:
-        return ""
-    errors = [figures.tissue_error(f.render, f.truth, f.mask) for f in data.frames]
-    scale = figures.error_scale(errors)
-    order = sorted(range(len(errors)), key=lambda i: (-_squared(data.frames[i]), data.frames[i].index))
-    depths = [f for f in data.frames if f.depth is not None]
-    span = _depth_span(depths)
-    legend = [f"Error {parts.colour_bar(figures.ERROR_MAP, '0', f'{scale:g} or more')}"]
-    if depths:
-        bar = parts.colour_bar(figures.DEPTH_MAP, f"{span[0]:.4g}", f"{span[1]:.4g} {data.depth_unit}")
-        legend.append(f"Rendered depth {bar}")
-    legend += [
-        f"{words} {parts.colour_box(colour)}"
-        for (times, colour), words in zip(figures.SELDOM_SEEN.items(), ("Never seen in training", "Seen once"))
-        if any(f.seen is not None and (f.mask & (f.seen == times)).any() for f in data.frames)
-    ]
-    note = (
-        "Worst first. Error: absolute difference, averaged over the colour channels, in display units from 0 to 1, "
-        "with the same scale for all frames. Grey: excluded or without depth. The white border marks the window with "
-        "the largest tissue error, enlarged 4×."
-    )
-    frames = len(data.evaluation.get("held_out", {}).get("per_frame", ()))
-    if frames > len(data.frames):
-        note = f"The {len(data.frames)} worst of {frames} frames; see renders/ for all of them. {note}"
-    blocks = [_frame(data.frames[i], scale, span, position < OPENED_FRAMES) for position, i in enumerate(order)]
-    return parts.section(
-        "Pictures of the held-out frames", f'<div class="legend">{"".join(legend)}</div>', *blocks, note=note
-    )
-
-
-def _squared(frame: FramePictures) -> float:
-    """Mean squared tissue error, for the order of the frames; infinite for a render that is not finite."""
-    error = np.where(frame.mask, np.clip(frame.render, 0, 1) - frame.truth, 0.0)
-    value = float(np.square(error, dtype=np.float64).sum() / max(3 * frame.mask.sum(), 1))
-    return value if np.isfinite(value) else np.inf
-
-
-def _depth_span(frames: list[FramePictures]) -> tuple[float, float]:
-    spans = [figures.depth_range(f.depth, f.mask) for f in frames if f.depth is not None]
-    return (min(s[0] for s in spans), max(s[1] for s in spans)) if spans else (0.0, 1.0)
-
-
-def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened: bool) -> str:
-    panels = figures.triptych(frame.render, frame.truth, frame.mask, scale)
-    views = [("Render", panels.render), ("Truth", panels.truth), ("Error", panels.error)]
-    if frame.depth is not None:
-        views.append(("Depth", figures.depth_picture(frame.depth, *span, mask=frame.mask)))
-    seldom = 0 if frame.seen is None else int(np.count_nonzero(frame.mask & (frame.seen <= 1)))
-    if seldom:
-        views.append(("Seen", figures.seen_picture(frame.truth, frame.mask, frame.seen)))
-    cells = []
-    for label, picture in views:
-        name = f"{label}, frame {frame.index}"
-        whole = parts.image(figures.framed(picture, panels), name)
-        inset = parts.image(panels.window(picture), f"{name}, enlarged", "inset")
-        cells.append(f"<div>{whole}<span>{label}</span></div><div>{inset}<span>4×</span></div>")
-    shown = [f"t = {frame.time:.3f}"]
-    for key, before, digits, after in (("psnr_tissue", "tissue", 2, " dB"), ("ssim_tissue", "SSIM", 4, "")):
-        if (value := (frame.metrics or {}).get(key)) is not None:
-            shown.append(f"{before} {parts.number(value, digits)}{after}")
-    if seldom:
-        shown.append(f"{seldom} px never seen in training or once")
-    facts = " · ".join([*shown, parts.text(frame.name)])
-    summary = f"Frame {frame.index}<small>{facts}</small>"
-    return parts.details(summary, f'<div class="views">{"".join(cells)}</div>', opened)
 
 
 def components(data: ReportData) -> str:
