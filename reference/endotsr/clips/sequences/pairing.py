@@ -43,7 +43,7 @@ def paired(
     """
     count = frames if isinstance(frames, int) else len(frames)
     if len(files) == 1:
-        return Paired([files[0]] * count, f"{files[0].name}: taken for all {count} frames" if count > 1 else "")
+        return Paired([files[0]] * count, "; ".join(of_no_or_all_frames(files, [files[0]] * count)))
     in_one_file = files[0].parent.is_file()  # planes of one array, which have an order and no names
     if pairing == "order" or (pairing == "auto" and in_one_file and len(files) == count):
         return _in_order(frames, files)
@@ -60,9 +60,18 @@ def paired(
     if chosen is None:
         _refuse_names(frames, files, _order_hint(count, files))
     notes = [f"{files[0].parent.name}: paired by {WAYS[way]}"] if way == "source" else []
-    if unused := [file.name for file in files if file not in set(chosen)]:
-        notes.append(f"{files[0].parent.name}: belonging to no frame, not used: {shortened(unused)}")
-    return Paired(chosen, "; ".join(notes))
+    return Paired(chosen, "; ".join([*notes, *of_no_or_all_frames(files, chosen)]))
+
+
+def of_no_or_all_frames(files: list[Path], chosen: list[Path | None]) -> list[str]:
+    """A note on a single file that all frames share, or on files that belong to no frame.
+
+    chosen   the file of each frame, of `paired` or `matching_files`
+    """
+    if len(files) == 1:
+        return [f"{files[0].name}: taken for all {len(chosen)} frames"] if len(chosen) > 1 else []
+    unused = [file.name for file in files if file not in set(chosen)]
+    return [f"{files[0].parent.name}: belonging to no frame, not used: {shortened(unused)}"] if unused else []
 
 
 def every_frame(clip: Clip, files: list[Path], pairing: Pairing = "auto") -> tuple[list[Path], str]:
@@ -80,7 +89,7 @@ def matching_files(frames: list[Path] | int, files: list[Path]) -> list[Path | N
     """The file with the number of each frame, or None: `paired` by number, for the folders of a layout.
 
     Edges:   a single file matches all frames; without numbers, files are paired with frame files by name.
-    Raises:  InputError if nothing matches. Files and frames may be left over.
+    Raises:  InputError if nothing matches. Files and frames may be left over; `of_no_or_all_frames` notes the files.
     """
     if len(files) == 1:
         return [files[0]] * (frames if isinstance(frames, int) else len(frames))

@@ -19,7 +19,7 @@ from endotsr.clips.opencv.stereo import Maps, remapped
 from endotsr.clips.sequences.clip import Clip, Depth, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.pairing import matching_files
+from endotsr.clips.sequences.pairing import matching_files, of_no_or_all_frames
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
@@ -129,7 +129,8 @@ def describe_c3vd(path: Path, options: SourceOptions) -> Clip:
         rate=options.rate,
         notes=[
             "the camera of C3VD is omnidirectional: undistorted to a pinhole camera of the same central focal length,"
-            " with a horizontal field of view of 83 degrees"
+            " with a horizontal field of view of 83 degrees",
+            *of_no_or_all_frames(planes, paired),
         ],
     )
 

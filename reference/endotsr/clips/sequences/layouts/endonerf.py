@@ -2,7 +2,8 @@
 
     images/*.png     RGB, or jpg, tiff, webp, bmp     poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
     depth/*.png      z in millimetres, 0 = none; .npy and .tiff too
-    masks/*.png      or gt_masks/*.png (or as above), white = excluded unless the configuration says otherwise
+    masks/*.png      or as above, white = excluded unless the configuration says otherwise
+    gt_masks/*.png   the same; read in place of masks/ only where the setting `sequence.masks` names it
 
 File names are free, with one pattern per folder. The number in the name orders and pairs the frames.
 """

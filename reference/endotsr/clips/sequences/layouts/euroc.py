@@ -97,7 +97,10 @@ def listed_pictures(camera: Path, notes: list[str]) -> list[TimedFile]:
 
 
 def pairs(left: list[TimedFile], right: list[TimedFile], notes: list[str]) -> tuple[list[TimedFile], list[Path]]:
-    """The left pictures with a right one of the same time, and these; the others are noted. Raises InputError."""
+    """The left pictures with a right one at most `PAIRED` away in time, and these; the others are noted.
+
+    Raises:  InputError if no pair is left.
+    """
     stamps = np.array([row.stamp for row in right], np.int64)
     nearest = [int(np.abs(stamps - row.stamp).argmin()) for row in left]
     kept = [(row, k) for row, k in zip(left, nearest) if abs(int(stamps[k]) - row.stamp) <= PAIRED]

@@ -16,7 +16,7 @@ from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.pairing import matching_files
+from endotsr.clips.sequences.pairing import matching_files, of_no_or_all_frames
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, pictures_from_files, size_of, with_stated
 from endotsr.clips.sequences.unread import folders_of, together
@@ -55,18 +55,23 @@ def describe_hamlyn(path: Path, options: SourceOptions) -> Clip:
         check_pairing(left, right)
     width, height = size_of(left)
     depth = list_pictures(depth_folder, DEPTH_ENDINGS) if depth_folder else []
+    planes = matching_files(left, depth) if depth else []
     clip = Clip(
         layout="hamlyn",
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
-        depth=depth_of(matching_files(left, depth), 1.0) if depth else None,
+        depth=depth_of(planes, 1.0) if depth else None,
         intrinsics=intrinsics_of_matrix(read_matrix(path / CAMERA), width, height, where=path / CAMERA),
         baseline=options.baseline,
         read_here=tuple(folder.name for folder in (left_folder, right_folder, depth_folder) if folder is not None),
         inside=together(folders_of([*left, *right]), folders_of(depth, DEPTH_ENDINGS)),
         rate=options.rate,
-        notes=[f"{CAMERA}: {HALF_A_PIXEL}", "the layout has no poses: the camera counts as static"],
+        notes=[
+            f"{CAMERA}: {HALF_A_PIXEL}",
+            "the layout has no poses: the camera counts as static",
+            *of_no_or_all_frames(depth, planes),
+        ],
     )
     return with_stated(clip, options)
 

@@ -27,6 +27,7 @@ from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.files import open_regular, read_text
 from endotsr.untrusted.json import parsed
+from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.yaml import matrix
 
 CALIBRATIONS = ("endoscope_calibration.yaml", "camera_calibration.yaml")
@@ -118,7 +119,8 @@ def _poses(path: Path, count: int, notes: list[str]) -> list[CameraPose | None] 
 def frame_texts(path: Path) -> list[tuple[str, str | bytes]]:
     """Names and contents of the JSON files, in the order of the numbers in their names."""
     if (path / FOLDER).is_dir():
-        files = sorted(visible_files(path / FOLDER, "*.json"), key=lambda file: _in_order(file.name))[:MOST_FILES]
+        files = sorted(visible_files(path / FOLDER, "*.json"), key=lambda file: _in_order(file.name))
+        _refuse_many(path / FOLDER, len(files))
         return [(file.name, read_text(file, LARGEST_FILE)) for file in files]
     if not (path / ARCHIVE).is_file():
         return []
@@ -127,14 +129,29 @@ def frame_texts(path: Path) -> list[tuple[str, str | bytes]]:
         with tarfile.open(fileobj=io.BytesIO(_unpacked(path / ARCHIVE)), mode="r:") as archive:
             for member in archive:
                 name = Path(member.name).name
-                if member.isfile() and name.endswith(".json") and name[0] != "." and member.size <= LARGEST_FILE:
+                if member.isfile() and name.endswith(".json") and name[0] != ".":
+                    _refuse_member(path / ARCHIVE, member, name in found)
                     stream = archive.extractfile(member)
                     found[name] = stream.read(LARGEST_FILE) if stream else b""
-                if len(found) > MOST_FILES:
-                    raise InputError(f"{path / ARCHIVE}: more than {MOST_FILES} files")
+                    _refuse_many(path / ARCHIVE, len(found))
     except (tarfile.TarError, OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path / ARCHIVE}: cannot be read: {error}") from None
     return sorted(found.items(), key=lambda entry: _in_order(entry[0]))
+
+
+def _refuse_member(archive: Path, member: tarfile.TarInfo, twice: bool) -> None:
+    """Raises InputError for a file that is too large for one frame, or whose name another folder there has too."""
+    if member.size > LARGEST_FILE:
+        raise InputError(f"{archive}: {plain_line(member.name)} is larger than {LARGEST_FILE >> 20} MiB; allowed: JSON"
+                         " of one frame")  # fmt: skip
+    if twice:
+        raise InputError(f"{archive}: {plain_line(member.name)}: two files have this name; allowed: one per frame")
+
+
+def _refuse_many(where: Path, count: int) -> None:
+    """Raises InputError for more files than a recording can have frames."""
+    if count > MOST_FILES:
+        raise InputError(f"{where}: more than {MOST_FILES} files; allowed: one JSON per frame")
 
 
 def _unpacked(file: Path) -> bytes:

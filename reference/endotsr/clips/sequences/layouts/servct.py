@@ -17,7 +17,7 @@ from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.layouts import Layout
-from endotsr.clips.sequences.pairing import matching_files
+from endotsr.clips.sequences.pairing import matching_files, of_no_or_all_frames
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, pictures_from_files, size_of, with_stated
 from endotsr.clips.sequences.unread import folders_of, together
@@ -83,12 +83,13 @@ def describe_servct(path: Path, options: SourceOptions) -> Clip:
     if apart.size:
         raise InputError(f"{files[apart[0]]}: another camera than {files[0].name}; allowed: one for all frames")
     depth = list_pictures(path / DEPTH, DEPTH_ENDINGS) if (path / DEPTH).is_dir() else []
+    planes = matching_files(left, depth) if depth else []
     clip = Clip(
         layout="servct",
         where=path,
         names=[file.stem for file in left],
         pictures=pictures_from_files(left, right),
-        depth=depth_of(matching_files(left, depth), STEP) if depth else None,
+        depth=depth_of(planes, STEP) if depth else None,
         intrinsics=cameras[0][0],
         baseline=cameras[0][1],
         inside=together(folders_of([*left, *right]), folders_of(depth, DEPTH_ENDINGS), {path / CAMERAS: ("*.json",)}),
@@ -96,6 +97,7 @@ def describe_servct(path: Path, options: SourceOptions) -> Clip:
             *sorted({note.split(": ", 1)[1] for note in notes}),
             *FILES.telling(sorted(file.name for file in path.iterdir()), path.name),
             f"{CAMERAS}: {HALF_A_PIXEL}",
+            *of_no_or_all_frames(depth, planes),
             "the pairs of SERV-CT are separate views without poses: use them for `endotsr depth` and its comparison"
             " with the reference, not for training one scene",
         ],

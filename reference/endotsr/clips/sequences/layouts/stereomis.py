@@ -1,6 +1,6 @@
 """StereoMIS as distributed: one stacked video (left on top), calibration, trajectory and tissue masks.
 
-*.mp4                      left over right; pictures are numbered from 0
+*.mp4 or another video     left over right; pictures are numbered from 0
 StereoCalibration.ini      see `calibration_formats`; for one picture of the pair, millimetres
 groundtruth.txt            frame tx ty tz qx qy qz qw, camera-to-world, metres (optional)
 masks/000123l.png          of the left picture, any value above 0 = tissue, perhaps at half size (optional)
@@ -15,7 +15,7 @@ from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
-from endotsr.clips.sequences.pairing import matching_files
+from endotsr.clips.sequences.pairing import matching_files, of_no_or_all_frames
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import masks_of
 from endotsr.clips.sequences.unread import folders_of
@@ -49,19 +49,34 @@ def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
         trajectory_unit=options.trajectory_unit or "m",
     )
     clip = describe_video(videos[0], stated)
-    notes = list(clip.notes)
+    notes = [*clip.notes, *_overridden(path, options)]
     if stated.trajectory is None:
         notes.append(f"{TRAJECTORY} is missing: the camera counts as static")
     masks, inside = clip.masks, {}
     if options.masks is None and (path / MASKS).is_dir():
         camera = clip.calibration.left if clip.calibration else clip.intrinsics
         assert camera is not None  # a calibration file states one
-        files = matching_files(clip.count, list_pictures(path / MASKS, PICTURE_ENDINGS))
+        stored = list_pictures(path / MASKS, PICTURE_ENDINGS)
+        files = matching_files(clip.count, stored)
+        notes += of_no_or_all_frames(stored, files)
         inside = folders_of(files)
         masks = masks_of(files, "black", camera.width, camera.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
-    return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes, inside=inside)
+    return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes,
+                   inside=inside, read_here=(videos[0].name.lower(),))  # fmt: skip
+
+
+def _overridden(path: Path, options: SourceOptions) -> list[str]:
+    """Notes on the parts of the folder in whose place an option states another file."""
+    parts = {"calibration": CALIBRATION, "trajectory": TRAJECTORY, "masks": MASKS}
+    return [
+        f"{name}: not read, because --{option} is stated"
+        for option, name in parts.items()
+        if (stated := getattr(options, option)) is not None
+        and (path / name).exists()
+        and stated.resolve() != (path / name).resolve()
+    ]
 
 
 LAYOUT = Layout(
@@ -73,7 +88,6 @@ LAYOUT = Layout(
     takes=("stereo", "calibration", "trajectory", "masks", "depth", "orientation"),
     reads=(
         "stereocalibration.ini",
-        "*.mp4",
         "groundtruth.txt",
         "masks",
         "video_frames",

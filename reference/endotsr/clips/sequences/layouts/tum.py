@@ -131,6 +131,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
         poses = poses_at(found, times, LONGEST)
         notes.append(f"poses of {where.name}" + "".join(f"; not read: {file.name}" for file in given if file != where))
+        notes += found.notes
     planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
     steps_of_depth = _depth_steps(settings, notes) if planes and options.depth is None else STEPS
     steps = np.diff(times)
