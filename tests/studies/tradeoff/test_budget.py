@@ -103,3 +103,18 @@ def test_the_options_of_an_answer_ask_for_its_setting(result):
         assert config.training.precision == setting["precision"]
         for field in ("alpha_cutoff", "transmittance_stop", "alpha_max"):
             assert getattr(raster, field) == pytest.approx(setting["raster"][field], rel=1e-3), (name, field)
+
+
+def test_a_time_is_kept_by_the_upper_quartile_also_off_the_front(result):
+    """The front is of medians: a setting on it whose times scatter leaves the budget to one beside it."""
+    points = [dict(point) for point in result["points"]]
+    for point in points:
+        point["forward"] = {"low": 1.0, "median": 1.1, "high": 1.2}
+    by_name = {point["name"]: point for point in points}
+    scattered, steady = "float32, cutoff 1e-4, stop 1e-6", "float32, cutoff 1/255, stop 1e-3"
+    by_name[scattered]["forward"] = {"low": 0.001, "median": 0.01, "high": 0.05}
+    by_name[steady]["forward"] = {"low": 0.010, "median": 0.011, "high": 0.012}
+    assert by_name[scattered]["error"]["max"] < by_name[steady]["error"]["max"]
+    measured = result | {"points": points, "fronts": {"forward": [scattered, "exact"]}}
+    assert frame_advice(measured, parse_budget("15 ms")).point["name"] == steady
+    assert frame_advice(measured, parse_budget("60 ms")).point["name"] == scattered

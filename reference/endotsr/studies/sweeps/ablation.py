@@ -6,7 +6,8 @@ weights, regardless of their number of seeds. The intervals cover other seeds on
 sequences. Two runs are a pair only if the SHA-256 of their pictures, masks and depth are equal. Runs of which a hash is
 not recorded are refused, or paired with a label that says so.
 
-Student's interval has its nominal coverage for any number of seeds, if the differences are normal. The bootstrap needs
+Student's interval has its nominal coverage for any number of seeds from two on, if the differences are normal and of
+one sequence; of several, Welch's degrees of freedom make the coverage approximate. The bootstrap needs
 many seeds: with three, its interval is at most the range of the differences and misses the true median in a quarter of
 all cases.
 """

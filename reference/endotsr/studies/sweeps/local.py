@@ -1,7 +1,8 @@
 """The runs of a sweep on a pool of processes of this machine.
 
-In: jobs. Out: outcomes as runs end, and None about once per second for the caller's progress display. A killed worker
-loses no run: a new pool retries it from the last checkpoint. A stopped sweep creates a file for which its workers poll,
+In: jobs. Out: outcomes as runs end, and None about once per second for the caller's progress display. A killed
+worker ends its pool, and with it the runs beside it; a new pool continues all of them from their last checkpoints. A
+run that was lost twice continues alone, so that only its own process counts against it the third time. A stopped sweep creates a file for which its workers poll,
 because no signal stops another process gracefully on every system. Each worker finishes its iteration and writes a
 checkpoint. Workers also stop in this way when their parent ends or is killed.
 """
@@ -25,10 +26,10 @@ from endotsr.studies.sweeps.jobs import STOP, Job
 from endotsr.untrusted.names import plain_line
 
 TICK = 1.0  # seconds between two updates of the progress
-MOST_LOSSES = 3  # killed processes after which a run counts as failed
+MOST_LOSSES = 3  # of a run, by its own process or one beside it, after which it counts as failed
 LOOK = 0.25  # seconds between two polls of a worker for the stop file
 LAST_SECONDS = 20.0  # for workers to write their checkpoints
-LOST = "its process was killed three times, perhaps for lack of memory (fewer --workers need less)"
+LOST = "its process was killed three times, the last time with no run beside it, perhaps for lack of memory"
 
 _working = threading.Event()  # set in a worker while it executes a run
 
@@ -79,7 +80,7 @@ def _until_broken(
     running: dict[Future[Outcome], Job] = {}
     while waiting or running:
         try:
-            while waiting and len(running) < workers:
+            while waiting and len(running) < _room([waiting[0], *running.values()], losses, workers):
                 running[pool.submit(_work, waiting[0], threads)] = waiting[0]
                 waiting.popleft()
         except BrokenProcessPool:
@@ -100,6 +101,11 @@ def _until_broken(
                     yield Outcome(job.name, FAILED, LOST)
             return
         yield None
+
+
+def _room(jobs: list[Job], losses: Counter[str], workers: int) -> int:
+    """How many of these runs may be executed at once: one, if the next loss of any of them is its last."""
+    return 1 if any(losses[job.name] == MOST_LOSSES - 1 for job in jobs) else workers
 
 
 def _outcome(job: Job, future: Future[Outcome]) -> Outcome:

@@ -12,7 +12,7 @@ COSTS: dict[Cost, tuple[str, float]] = {  # label, factor
     "forward": ("milliseconds a frame", 1e3),
     "visits": ("visited pixel-Gaussian pairs", 1.0),
 }
-FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn
+FLOOR = 1e-10  # error, in 1/255, at which the exact path with error 0 is drawn; the axis begins a tenth lower
 
 
 def main_figure(result: Measurement) -> Any:
@@ -57,7 +57,7 @@ def _sweep(axes: Any, result: Measurement, cost: Cost) -> list[Label]:
 
 
 def _short(point: Point, cost: Cost) -> str:
-    """Label of a setting: precision (which changes no visit), cutoff, and any other coarse choice."""
+    """Label of a setting: precision (which hardly changes the visits), cutoff, and any other coarse choice."""
     raster, scale = point["setting"]["raster"], point["setting"]["scale"]
     cut, stop = raster["alpha_cutoff"], raster["transmittance_stop"]
     words = [] if cost == "visits" else [point["setting"]["precision"]]

@@ -64,8 +64,8 @@ Shared = dict[tuple[Any, ...], Any]  # arrays that several settings have in comm
 def prepare(scene: StudyScene, setting: Setting, shared: Shared | None = None) -> Prepared:
     """Cast the scene, remove the terms that the setting omits, and draw the weights of the functional.
 
-    shared   arrays of other settings of the same scene, to which those of this one are added: a trained scene in two
-             precisions takes hundreds of megabytes, and a study has a hundred settings
+    shared   arrays of other settings of the same scene, to which those of this one are added: without it, each of
+             the many settings of a study would have a copy of the scene
     """
     shared = {} if shared is None else shared
     cast = (setting.precision, setting.bases, setting.frequencies)

@@ -25,7 +25,9 @@ class Setting(NamedTuple):
     kernels: Callable[[], AbstractContextManager[object]] = nullcontext  # context of every frame
 
 
-CLOSE = EXACT._replace(support="ellipse", alpha_cutoff=1e-9, alpha_max=1 - 2**-20)  # exact except for the cutoff
+CLOSE = EXACT._replace(
+    support="ellipse", alpha_cutoff=1e-9, alpha_max=1 - 2**-20
+)  # exact except for the cutoff and the clamp of alpha
 ACCURATE = Setting(raster=CLOSE)
 CUTOFFS = {"1e-12": 1e-12, "1e-9": 1e-9, "1e-7": 1e-7, "1e-5": 1e-5, "1e-4": 1e-4, "1/1024": 1 / 1024, "1/255": 1 / 255,
            "1/64": 1 / 64}  # fmt: skip
@@ -33,7 +35,7 @@ STOPS = {"0": 0.0, "1e-8": 1e-8, "1e-6": 1e-6, "1e-4": 1e-4, "1e-3": 1e-3, "1e-2
 
 
 def joint(degree: int, near: float) -> dict[str, Setting]:
-    """Precision x cutoff x stop; the coarsest settings also at half resolution."""
+    """Precision x cutoff x stop; those in float32 with a cutoff from 1/255 on and the stop 1e-3 also at half size."""
     found = {}
     stops = {name: STOPS[name] for name in ("1e-6", "1e-4", "1e-3", "1e-2")}
     for precision, cutoff, stop in itertools.product(("float64", "float32"), CUTOFFS, stops):

@@ -135,7 +135,7 @@ def setting_dict(setting: Setting) -> Keys:
 def _timed(prepared: list[Prepared], repeats: int, step: Progress) -> NDArray[np.float64]:
     """(settings, repeats, 2) seconds: forward, forward + reverse.
 
-    The outer loop is over repeats, so background load affects all settings equally.
+    The outer loop is over repeats: a slow change of the load of the machine reaches all settings.
     """
     times = np.empty((len(prepared), repeats, 2))
     for repeat in range(repeats):
