@@ -35,12 +35,11 @@ class Pool:
 
 
 def outcomes(names: list[str], workers: int, monkeypatch) -> dict[str, Outcome]:
-    waiting, losses, found = deque(map(Run, names)), Counter(), {}
+    waiting, losses, found, real = deque(map(Run, names)), Counter(), {}, local.wait
     for _ in range(20):
         if not waiting:
             return found
         pool = Pool()
-        real = local.wait
         monkeypatch.setattr(local, "wait", lambda *words, pool=pool: (pool.work(), real(*words))[1])
         for outcome in local._until_broken(pool, waiting, losses, workers, 1):
             if outcome is not None:

@@ -3,8 +3,9 @@
 The sharpness of a frame is the mean squared Laplacian over tissue at full size, less the contribution of noise, divided
 by the squared brightness. It is invariant to gain. Blur lowers the sharpness and hardly changes the darkest tissue.
 Smoke adds light everywhere, which also raises the dark channel (the smallest channel, tenth percentile over tissue).
-Both are found only if they vary: a clip that is blurred throughout has no sharp frame for comparison. A frame without
-tissue shows neither, and no other frame is compared with it.
+Blur is a fall below the median of the neighbours in time, smoke a fall below the upper quartile of the sharpness with a
+rise above the lower quartile of the dark channel. Both are found only if they vary: a clip that is blurred throughout
+has no sharp frame for comparison. A frame without tissue shows neither, and no other frame is compared with it.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 BLUR = np.log(2.0)  # fall of the log sharpness below the local median
 SMOKE_FALL = np.log(1.5)
 SMOKE_RISE = 0.05  # of the dark channel, display units
-SCATTER = 4.0  # a frame must also exceed this many deviations (MAD) of the frames
+SCATTER = 4.0  # for blur, a fall must also exceed this many deviations (MAD) of the frames
 NEIGHBOURS = 4  # frames on either side: slow changes, such as of the view, are not blur
 
 

@@ -1,7 +1,8 @@
-"""The training frames of a sequence at the working size of all tests.
+"""The training frames of a sequence at the working size of the tests.
 
 In: a `Sequence`. Out: arrays of its m training frames; pictures wider than `WIDEST` are averaged over squares of
-pixels. Held-out frames are never read. Tests of fine structure (highlights, blur) use the full size instead.
+pixels. Held-out frames are never read. Noise, blur, smoke and highlights are measured at full size, and the test of the
+camera reduces the pictures itself (`clips.poses.views`).
 """
 
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 """All tests of a clip, in order: noise, blur and smoke, motion, then the others.
 
-The tests of blur, smoke, motion, light and topology use the noise. Frames with blur or smoke, and those
-without tissue, are excluded as reference and from motion. The test of light depends on the results of the tests of
+The tests of blur, smoke, motion, light and topology use the noise. Frames with blur or smoke, and those without tissue,
+are excluded as reference, from motion and from topology. The test of light depends on the results of the tests of
 motion and of the camera, that of topology on that of the camera.
 """
 

@@ -1,9 +1,9 @@
 """Rates of periodic motion: spectral lines of the leading modes of the flow.
 
 A mode is a time course shared by many tiles (singular value decomposition). A line is a rate f of at least three cycles
-per clip whose sine and cosine at f, 2 f and 3 f explain the residual of slow motion: F test at `ALARM` over all rates,
-at least `EXPLAINED` of the variance, and equal amplitude and phase in the three thirds of the clip. A single event,
-such as a pull, fails the last condition.
+per clip whose sine and cosine at f, or at f and 2 f, or at f, 2 f and 3 f explain the residual of slow motion: F test
+at `ALARM` over all rates, at least `EXPLAINED` of the variance, and similar amplitude and phase of the wave at f in the
+three thirds of the clip (`COHERENT`). The last condition rejects a single event, such as a pull.
 """
 
 from typing import NamedTuple

@@ -2,9 +2,9 @@
 
 The frames are first warped onto the reference frame along their flow. g is the log ratio of the mean colours of a tile
 in two frames, without saturated and dark pixels. The gain of a frame is the median over the tiles. An F test compares
-its variance between frames with the scatter of the tiles. The residual of a tile is local change if smooth courses over
-time explain it (F test with Bonferroni correction over the tiles). With fewer than four tiles that most frames show,
-nothing can be compared: the verdict is then "unknown", and a change is assumed.
+its variance between frames with that of the median under pixel noise. The residual of a tile is local change if smooth
+courses over time explain it (F test with Bonferroni correction over the tiles) and its size is visible. With fewer than
+four tiles that most frames show, nothing can be compared: the verdict is then "unknown", and a change is assumed.
 """
 
 from typing import NamedTuple

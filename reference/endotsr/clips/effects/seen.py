@@ -14,7 +14,7 @@ LEAST_HIGHLIGHT = 1e-3  # fraction of the tissue
 LEAST_PIXELS = 10  # with depth, in a usable frame
 HOLES = 0.01  # fraction of the tissue
 RELATIVE = 1e-3  # of the median depth: threshold for steps and flicker
-MOST_LEVELS = 4096  # a frame with more distinct values is not quantised
+MOST_LEVELS = 4096  # a frame with more distinct values, or more than a quarter of its pixels, is not quantised
 
 
 def occluder_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
@@ -84,14 +84,15 @@ def depth_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
         "flicker": f"depth flickers by {flicker:.3g} {sequence.unit} (standard deviation)",
     }
     reason = sentence(words, found, "Depth is dense, fine and steady.")
+    score = max(scores.values()) if any(usable) else 1.0 / HOLES  # as without depth
     if not any(usable):
         found, reason = ["unusable"], "No training frame has ten pixels of depth that differ."
     details = {"usable": any(usable), "holes": holes, "step": step, "flicker": flicker, "median_depth": median}
     missing = np.where(clip.masks, depth <= 0, False).mean(axis=0)
-    test = "holes over 1 % of tissue, step and flicker over 0.1 % of the median depth"
+    test = "holes over 1 % of tissue, step over 0.1 % of the median depth, flicker over that and half a step"
     curve = Curve("tissue without depth, percent", "time", clip.times, {"holes": 100 * by_frame}, 100 * HOLES)
     picture = Map("no depth on tissue, percent of the frames", 100 * missing)
-    return EffectVerdict("depth quality", bool(found), " + ".join(found) or "good", max(scores.values()), 1.0,
+    return EffectVerdict("depth quality", bool(found), " + ".join(found) or "good", score, 1.0,
                          "times the threshold", test, 0.01, reason, details, curve, picture)  # fmt: skip
 
 
@@ -109,6 +110,7 @@ def temporal_flicker(clip: ReducedFrames) -> float:
     """The flicker of depth as a standard deviation, scene units: the median over frames.
 
     Of a frame it is the smaller of two estimates, by the median absolute second difference over time and along rows.
+    Only frames in the middle of two equal time steps count.
     """
     found = []
     for k in range(1, clip.count - 1):

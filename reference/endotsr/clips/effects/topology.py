@@ -3,7 +3,7 @@
 The first and the last frame are references. Frames of both ends are warped onto each reference along their flow, and
 the local structure around every pixel is correlated with the reference. A pixel counts as lost if the frames of its own
 end agree with the reference and no frame of the other end does. A slit, its wound or blood leaves a connected region of
-lost pixels. Isolated lost pixels are flow failures and are dropped.
+lost pixels. Regions thinner than three pixels count as flow failures and are dropped.
 
 A cut that closes before the end of the clip is not found. Permanently covered tissue (blood, a clip, a swab) is also
 found: in both cases, no motion maps the tissue at one end to the tissue at the other. A moving camera also brings new

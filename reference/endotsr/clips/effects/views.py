@@ -2,7 +2,7 @@
 
 For points of the reference depth, the harmonics of a degree are evaluated along the view directions of the training
 cameras, and the part explained by lower degrees is removed. The root mean square of the residual is the change of
-colour between frames per unit coefficient. A coefficient of `TYPICAL` must change the colour visibly, by more than half
+colour between frames per unit coefficient. A coefficient of `TYPICAL` must change the colour visibly, by at least half
 a grey level. A fixed camera sees every static point along one direction and determines only degree 0.
 """
 
@@ -39,7 +39,7 @@ def view_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
     changes = [float(np.median([degree_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
     degree = next((k - 1 for k in range(1, HIGHEST + 1) if changes[k - 1] < LEAST_CHANGE), HIGHEST)
     angle = float(np.degrees(np.median([_spread(d) for d in directions])))
-    reason = f"The views of a point differ by up to {angle:.2g} degrees, which determines harmonics to degree {degree}."
+    reason = f"The view of a point turns by {angle:.2g} degrees from the first frame, which determines degree {degree}."
     return EffectVerdict("view change", degree > 0, f"degree {degree}", changes[0], LEAST_CHANGE, "display units", test,
                          0.01, reason, {"degree": degree, "changes": changes, "angle_degrees": angle})  # fmt: skip
 

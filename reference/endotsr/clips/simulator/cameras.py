@@ -42,7 +42,7 @@ def camera_centres(settings: SimulatorSettings, times: FloatArray) -> FloatArray
 
 
 def _rotations(settings: SimulatorSettings, times: FloatArray, centres: FloatArray) -> FloatArray:
-    """World-to-camera rotations, (n, 3, 3). An orbit keeps the middle of the tissue in the centre, a hand does not."""
+    """World-to-camera rotations, (n, 3, 3). An orbit keeps (0, 0, distance) in the centre, a hand does not."""
     middle = np.array([0.0, 0.0, settings.distance])
     if settings.camera_motion.path == "hand":
         return hand_rotations(settings, times) @ np.array([_looking_at(middle - FOLLOWED * c) for c in centres])

@@ -1,7 +1,8 @@
 """Checks that the effects of a scene stay in the picture, before anything is rendered or written.
 
-In: settings. Out: nothing, or an `InputError` that names the excessive setting and its largest allowed value. Every
-frame is checked, on a grid of rays and at the central points of each effect.
+In: settings. Out: nothing, or an `InputError` that names the excessive setting and its largest allowed value, or what
+helps if no setting alone is excessive. Every frame is checked, on a grid of rays and at the central points of each
+effect; of bleeding, on the circle of its mean radius, which its lobes exceed.
 """
 
 from collections.abc import Callable

@@ -2,7 +2,8 @@
 
     images/ images_right/     left and right picture          poses_bounds.npy   LLFF rows
     depth/                    prior depth, whole millimetres, 16 bits
-    masks/ gt_masks/          white = excluded: instruments and pixels without depth; instruments alone
+    masks/ gt_masks/          white = excluded: instruments and, with a right picture, pixels without prior depth;
+                              instruments alone
     truth/                    see truth.py
 
 In: settings. Out: files, one frame at a time. Reading the folder gives the sequence of `simulate` with the same

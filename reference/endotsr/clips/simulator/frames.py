@@ -2,7 +2,8 @@
 
 In: `SimulatorSettings`. Out: a `SimulatedScene`, which yields one `SimulatedFrame` at a time: a long sequence needs the
 memory of one frame. The effects follow the light path: tissue, motion blur, instruments, smoke, lens, gain, display
-curve, sensor noise. An effect that is off is skipped, not multiplied by one.
+curve, sensor noise. An effect that is off is skipped, or is a
+factor of exactly one.
 """
 
 from collections.abc import Iterator
@@ -154,7 +155,10 @@ def _picture(settings: SimulatorSettings, light: FloatArray, stream: int, i: int
 
 
 def _depth_prior(settings: SimulatorSettings, depth: FloatArray, tissue: BoolArray, i: int) -> NDArray[np.float32]:
-    """The prior depth: 0 on the instrument and where only one camera sees the tissue; with errors if they are on."""
+    """The prior depth: 0 on the instrument, and at the left where the picture of the right camera ends.
+
+    With depth errors: noise, at least 1 mm, and 0 in a strip at the left. Rounding makes at least one step of a depth.
+    """
     prior = np.where(tissue, depth, 0.0)
     if settings.depth_errors.on:
         rng = np.random.default_rng([settings.seed, DEPTH_NOISE, i])

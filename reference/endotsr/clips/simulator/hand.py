@@ -1,7 +1,8 @@
 """The path of a camera that a hand holds: slow waves of all six degrees of freedom, and a tremor.
 
 In: settings and times. Out: positions and turns. Each degree of freedom is a sum of sine waves with amplitudes and
-phases drawn from the seed. Frame 0 is at the origin, and the largest sideways shift is the amplitude.
+phases drawn from the seed. Frame 0 is at the origin, and the largest shift in the plane of the picture
+is the amplitude.
 """
 
 from typing import NamedTuple

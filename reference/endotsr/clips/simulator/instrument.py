@@ -20,9 +20,9 @@ SLEEVE = np.array([0.045, 0.045, 0.05])
 class Grasper(NamedTuple):
     """The path of one instrument, in image widths of a picture with height / width = 0.8."""
 
-    entry: FloatArray  # where the shaft leaves the picture
+    entry: FloatArray  # the end of the shaft, outside the picture
     home: FloatArray  # the wrist, at t = 0
-    phase: float  # of its circular path, radians
+    phase: float  # of its elliptic path, radians
 
 
 FIRST = Grasper(np.array([1.12, 0.78]), np.array([0.70, 0.52]), 0.0)

@@ -1,7 +1,8 @@
 """One section of settings for each effect of the simulator, with a switch `on`.
 
-Lengths are in millimetres, rates in cycles per sequence (the unit of the model's frequencies; t = i / n), times in
-normalised time in [0, 1]. The effects act in this order: motion, light, instruments, camera, depth.
+Lengths are in millimetres or in image widths, as each key says, rates in cycles per sequence (the unit of the model's
+frequencies; t = i / n), times in normalised time in [0, 1]. The effects act in this order: motion, light, instruments,
+camera, depth.
 """
 
 from typing import Annotated, Literal
@@ -62,7 +63,7 @@ class GainDrift(ActiveEffect, frozen=True, kw_only=True):
     """The gain of the camera drifts, red and blue slightly apart (white balance)."""
 
     amplitude: Fraction = 0.15
-    """relative change of the gain, linear light"""
+    """largest difference of the red gain from 1 (green: 0.85 times that; blue: up to 1.07 times), linear light"""
     cycles: Positive = 1.0
     """cycles per sequence"""
 
@@ -91,7 +92,7 @@ class Instrument(ActiveEffect, frozen=True, kw_only=True):
     """A grasper in front of the tissue. The mask and the prior depth exclude its pixels."""
 
     travel: NonNegative = 0.06
-    """radius of the path of its tip, image widths"""
+    """half the width of the path of its wrist, an ellipse of 0.6 times that height, image widths"""
     cycles: Positive = 1.0
     """cycles per sequence"""
     margin: NonNegative = 0.006
@@ -104,7 +105,7 @@ class CameraMotion(Effect, frozen=True, kw_only=True):
     path: Literal["orbit", "hand"] = "orbit"
     """orbit: around the middle of the tissue; hand: drifts, pushes in, rolls and trembles, drawn from the seed"""
     amplitude: NonNegative = 3.0
-    """largest sideways shift of the camera, mm"""
+    """largest shift of the camera to the right, and down; of a hand: in the plane of the picture, mm"""
     cycles: Positive = 1.0
     """cycles per sequence; of a hand: the rate of its waves, as a factor"""
 
@@ -183,7 +184,7 @@ class AutoExposure(Effect, frozen=True, kw_only=True):
     """The automatic exposure of the camera jumps; the gain is constant between jumps."""
 
     amplitude: Fraction = 0.25
-    """largest relative change of the gain, linear light"""
+    """largest difference of the gain from its first level 1, linear light"""
     steps: PositiveCount = 3
     """number of jumps, evenly spaced"""
 
@@ -212,7 +213,7 @@ class MoreInstruments(Effect, frozen=True, kw_only=True):
 
 
 class Shadows(Effect, frozen=True, kw_only=True):
-    """The instruments cast shadows, because the lamp is next to the camera."""
+    """The instruments cast shadows of every lamp. That of the endoscope is next to the camera."""
 
     strength: Fraction = 0.6
     """fraction of the light of a lamp that the shadow removes"""

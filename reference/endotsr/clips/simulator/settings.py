@@ -1,7 +1,7 @@
 """Settings of the simulator: the scene, and one section with a switch for each effect (sections.py).
 
-Lengths are in millimetres, rates in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
-that is off is not computed and draws no random numbers.
+Lengths are in millimetres or in image widths, as each key says, rates in cycles per sequence (the unit of the model's
+frequencies; t = i / n). An effect that is off is not computed and draws no random numbers.
 """
 
 from typing import Annotated
@@ -32,7 +32,7 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     distance: Distance = 50.0
     """from the camera to the middle of the tissue, mm"""
     relief: NonNegative = 1.0
-    """factor on the folds of the tissue (1: about +-4 mm)"""
+    """factor on the folds of the tissue (1: 5 mm at most to either side)"""
     focal: Positive = 0.89
     """focal length, image widths"""
     block_length: Count = 0

@@ -16,7 +16,7 @@ from endotsr.clips.simulator.views import SurfaceView
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera
 
-BLOCK_ROWS = 32  # rows shaded together, which fit in the processor's cache
+BLOCK_ROWS = 32  # rows shaded together, so that the arrays between the steps are small
 WOUND = np.array([0.30, 0.020, 0.018])  # linear reflectance of inner tissue
 
 
@@ -44,9 +44,11 @@ def lit_by_all(
 def shade(settings: SimulatorSettings, texture: Texture, view: SurfaceView, lamps: list[Lit], t: float) -> TissueLight:
     """Linear light from the tissue, before exposure.
 
-    reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.half)^exponent with the same
-    fall-off, summed over the lamps. l points to a lamp at distance r, half is half-way between lamp and camera, and n'
-    is the normal of the fine relief. Rows that fit in the processor's cache are shaded together.
+    A lamp gives reflectance * received * max(n.l + WRAP, 0) / (1 + WRAP), times the brightening of the tissue, plus a
+    highlight strength * received * max(n'.half, 0)^exponent, summed over the lamps. received is GAIN (distance / r)^2,
+    for the lamp at the camera times (depth / r)^BEAM, for the second one times its strength, and less the shadows. l
+    points to a lamp at distance r, half is half-way between lamp and camera, and n' is the normal of the fine relief.
+    `BLOCK_ROWS` rows are shaded together.
     """
     parts = []
     for top in range(0, view.material.shape[1], BLOCK_ROWS):

@@ -21,7 +21,7 @@ from endotsr.method.kernels.arrays import FloatArray
 CENTRE = (-0.08, -0.05)  # middle of the slit, distances of the camera
 ANGLE = 0.6  # of its direction to the a axis, radians
 STEEPEST = float(np.exp(-0.5))  # largest slope of exp(-y^2 / 2), at y = 1
-LARGEST_STRETCH = 0.9  # of the tissue at the edge; from 1 on it would fold over itself
+LARGEST_STRETCH = 0.9  # compression of the tissue at y = reach; from 1 on it would fold over itself
 
 
 class Slit(NamedTuple):

@@ -1,7 +1,7 @@
 """Smoke between camera and tissue: drifting clouds that replace a fraction of the light with grey.
 
 In: settings and a time. Out: the fraction of smoke in every pixel. The clouds are a smooth random field in units of the
-image width: every image size shows the same smoke.
+image width: every image size of one aspect ratio shows the same smoke.
 """
 
 import numpy as np

@@ -48,7 +48,7 @@ def write_recording(
 ) -> None:
     """Write a recording and its truth into an existing, empty folder. `on_frame` is called after every frame.
 
-    lossless  a lossless video, about ten times as large
+    lossless  a lossless video, more than ten times as large
 
     Raises:  InputError as `check_recording` does, or where the settings fold the tissue over itself.
     """

@@ -1,7 +1,8 @@
 """The appearance of the tissue: colour and fine relief over material coordinates, in one tabulated map.
 
 The map combines smooth random fields (cubic B-splines over a lattice in millimetres) and random vessel trees. Random
-numbers are drawn per millimetre, not per pixel: a larger image samples the same tissue more finely.
+numbers are drawn per millimetre, not per pixel: a larger image of the same aspect ratio samples the same tissue more
+finely.
 """
 
 from typing import NamedTuple, cast
@@ -18,7 +19,7 @@ PALE = np.array([0.80, 0.42, 0.28])
 FAT = np.array([0.85, 0.62, 0.28])
 ARTERY = np.array([0.42, 0.03, 0.03])
 VEIN = np.array([0.26, 0.05, 0.10])
-FINEST_STEP = 0.08  # mm; half the radius of the thinnest vessel
+FINEST_STEP = 0.08  # mm; half the radius with which the thinnest vessel trees begin
 SPLINE_DEVIATION = 0.479  # standard deviation of a two-dimensional cubic B-spline field with unit normal weights
 
 
@@ -35,7 +36,7 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     pixel = settings.distance / (settings.focal * settings.width)
     step = max(0.5 * pixel, FINEST_STEP)
     half_a, half_b = half_extent(settings)
-    # linspace: the ends, hence all random numbers, are the same for every image size
+    # linspace: the ends, hence all random numbers, are the same for every size of one aspect ratio
     a = np.linspace(-half_a, half_a, round(2 * half_a / step) + 1)
     b = np.linspace(-half_b, half_b, round(2 * half_b / step) + 1)
     rng = np.random.default_rng([settings.seed, 1])
@@ -61,7 +62,7 @@ def sample(texture: Texture, material: FloatArray) -> FloatArray:
 def _sample_kernel(
     values: FloatArray, origin: tuple[float, float], step: tuple[float, float], material: FloatArray, out: FloatArray
 ) -> None:
-    """Fill `out` pixel by pixel. Compiled, because motion blur samples the maps a dozen times per picture."""
+    """Fill `out` pixel by pixel. Compiled, because motion blur samples the maps at every time of the exposure."""
     rows, columns, maps = values.shape
     for i in range(material.shape[1]):
         for j in range(material.shape[2]):

@@ -4,8 +4,9 @@
     light.npz           times (n,); gain (n, 3) of the camera in linear light; its Fourier content over cycles (K,):
                         gain_cosine and gain_sine (K, 3); noise_sigma (), display units
     tracks.npz          material (2, P), position (n, 3, P), pixel (n, 2, P), depth (n, P), visible (n, P) as in
-                        `MaterialTracks`; light (n, 3, P), linear light of the tissue there without highlights and gain
-    frames/000000.npz   depth (H, W) and material (2, H, W) mm, float32, NaN in the wound of a slit; highlight (H, W)
+                        `MaterialTracks`; light (n, 3, P), linear light of the tissue there as `folder.tissue_light`:
+                        without highlights, shadows, smoke, vignetting, motion blur and gain
+    frames/000000.npz   float32: depth (H, W) mm; material (2, H, W) mm, NaN in the wound of a slit; highlight (H, W)
     instrument/*.png    255 = an instrument covers the pixel, margin not included
 
 Lengths are in mm, image positions in px with the first pixel centre at (0.5, 0.5). The files are user input:

@@ -1,7 +1,7 @@
 """The view of the sheet from a camera: for every ray the material point it meets, with position, normal and depth.
 
-In: a surface, a camera, a time. Out: a `SurfaceView`, solved by Newton's method to 1e-10 mm from the ray. With an open
-slit, a ray meets one of its sides or the wound between them.
+In: a surface, a camera, a time. Out: a `SurfaceView`, solved by Newton's method to 1e-10 mm from the ray in x and
+y. With an open slit, a ray meets one of its sides or the wound between them.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from endotsr.method.splatting.camera import Camera
 Formula = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 # (p, q) -> position, its derivatives with respect to p and q, each (3, ...)
 
-RESIDUAL_TOLERANCE = 1e-10  # distance from the ray, mm
+RESIDUAL_TOLERANCE = 1e-10  # of X_c - p_x Z_c and Y_c - p_y Z_c, mm
 MOST_STEPS = 30
 BLOCK_PIXELS = 16384
 
@@ -26,7 +26,7 @@ BLOCK_PIXELS = 16384
 class SurfaceView(NamedTuple):
     """The part of the sheet that a camera sees, per pixel."""
 
-    material: FloatArray  # (2, H, W) material coordinates a, b, mm; in the wound, of the nearest edge point
+    material: FloatArray  # (2, H, W) material coordinates a, b, mm; in a wound, of the cut at the same x
     point: FloatArray  # (3, H, W) world position, mm
     normal: FloatArray  # (3, H, W) unit normal, towards the camera
     depth: FloatArray  # (H, W) view-space z, mm
@@ -44,7 +44,7 @@ def see(surface: Surface, camera: Camera, t: float) -> SurfaceView:
     """
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
-    rows = max(1, BLOCK_PIXELS // camera.width)  # blocks of rows that stay in the processor's cache
+    rows = max(1, BLOCK_PIXELS // camera.width)  # blocks of rows, so that the arrays between the steps are small
     blocks = [
         see_rays(surface, camera, t, *np.meshgrid(ray_x, ray_y[top : top + rows]))
         for top in range(0, camera.height, rows)

@@ -184,7 +184,7 @@ def refuse_other_clip(finished: list[Job]) -> None:
 
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:
-    """Raises InputError if the folder contains a run with other settings than the job; preset and threads may differ."""
+    """Raises InputError if the folder contains a run with other settings than the job, beside preset and threads."""
     theirs, ours = by_key(msgspec.to_builtins(folder.config())), by_key(msgspec.to_builtins(job.config))
     with contextlib.suppress(InputError):  # a record that cannot be read ends this run alone, when it continues
         recorded, wanted = _beside_settings(job, folder)

@@ -1,10 +1,10 @@
 """The runs of a sweep on a pool of processes of this machine.
 
-In: jobs. Out: outcomes as runs end, and None about once per second for the caller's progress display. A killed
-worker ends its pool, and with it the runs beside it; a new pool continues all of them from their last checkpoints. A
-run that was lost twice continues alone, so that only its own process counts against it the third time. A stopped sweep creates a file for which its workers poll,
-because no signal stops another process gracefully on every system. Each worker finishes its iteration and writes a
-checkpoint. Workers also stop in this way when their parent ends or is killed.
+In: jobs. Out: outcomes as runs end, and None about once per second for the caller's progress display. A killed worker
+ends its pool, and with it the runs beside it; a new pool continues all of them from their last checkpoints. A run that
+was lost twice continues alone, so that only its own process counts against it the third time. A stopped sweep creates a
+file for which its workers poll, because no signal stops another process gracefully on every system. Each worker
+finishes its iteration and writes a checkpoint. Workers also stop in this way when their parent ends or is killed.
 """
 
 import _thread
