@@ -1,9 +1,9 @@
 """A run that kills its process does not take the runs beside it along: the third loss is counted of a run alone."""
 
 from collections import Counter, deque
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 from endotsr.studies.sweeps import local
 from endotsr.studies.sweeps.execute import FAILED, FINISHED, Outcome
@@ -35,17 +35,16 @@ class Pool:
 
 
 def outcomes(names: list[str], workers: int, monkeypatch) -> dict[str, Outcome]:
-    waiting, losses, found, real = deque(map(Run, names)), Counter(), {}, local.wait
+    waiting, losses, found = deque(map(Run, names)), Counter(), {}
     for _ in range(20):
         if not waiting:
             return found
         pool = Pool()
-        monkeypatch.setattr(local, "wait", lambda *words, pool=pool: (pool.work(), real(*words))[1])
-        for outcome in local._until_broken(pool, waiting, losses, workers, 1):
+        monkeypatch.setattr(local, "wait", lambda *words, pool=pool: (pool.work(), wait(*words))[1])
+        for outcome in local.until_broken(cast(Any, pool), cast(Any, waiting), losses, workers, 1):
             if outcome is not None:
                 assert outcome.name not in found
                 found[outcome.name] = outcome
-        monkeypatch.setattr(local, "wait", real)
     raise AssertionError(f"still waiting: {waiting}")
 
 

@@ -53,7 +53,7 @@ def photometric_verdict(clip: ReducedFrames, tracks: FlowTracks, noise: Noise, m
         return _unknown("Fewer than four tiles of tissue are visible in most frames; a change of light is assumed.")
     gain = np.median(ratios.values, axis=2)
     level = float(np.median(ratios.level))
-    error = _error_of_median(ratios)
+    error = error_of_median(ratios)
     common = gain @ LUMINANCE
     balance = gain - common[:, None]
     ranges = {"gain": _range(common) * level, "white balance": max(_range(b) for b in balance.T) * level}
@@ -131,7 +131,7 @@ def _comparable(image: FloatArray) -> BoolArray:
     return (image.max(axis=0) < BRIGHT) & (image.max(axis=0) > DARK) & (image.min(axis=0) > 0.0)
 
 
-def _error_of_median(ratios: Ratios) -> FloatArray:
+def error_of_median(ratios: Ratios) -> FloatArray:
     """Standard error (3,) of the median over tiles under noise alone."""
     return 1.2533 * np.sqrt((ratios.noise**2).mean(axis=1) / ratios.values.shape[2])
 

@@ -38,7 +38,7 @@ def view_verdict(sequence: Sequence, clip: ReducedFrames) -> EffectVerdict:
                              reason, details)  # fmt: skip
     changes = [float(np.median([degree_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
     degree = next((k - 1 for k in range(1, HIGHEST + 1) if changes[k - 1] < LEAST_CHANGE), HIGHEST)
-    angle = float(np.degrees(np.median([_spread(d) for d in directions])))
+    angle = float(np.degrees(np.median([largest_angle(d) for d in directions])))
     reason = f"The view of a point turns by {angle:.2g} degrees from the first frame, which determines degree {degree}."
     return EffectVerdict("view change", degree > 0, f"degree {degree}", changes[0], LEAST_CHANGE, "display units", test,
                          0.01, reason, {"degree": degree, "changes": changes, "angle_degrees": angle})  # fmt: skip
@@ -85,6 +85,6 @@ def harmonic_sizes(clip: ReducedFrames) -> FloatArray:
     return np.abs(harmonic_design(directions, HIGHEST)).mean(axis=0)
 
 
-def _spread(directions: FloatArray) -> float:
+def largest_angle(directions: FloatArray) -> float:
     """Largest angle to the first direction, radians."""
     return float(np.arccos(np.clip(directions @ directions[0], -1, 1)).max())

@@ -2,9 +2,9 @@
 
 In: jobs. Out: outcomes as runs end, and None about once per second for the caller's progress display. A killed worker
 ends its pool, and with it the runs beside it; a new pool continues all of them from their last checkpoints. A run that
-was lost twice continues alone, so that only its own process counts against it the third time. A stopped sweep creates a
-file for which its workers poll, because no signal stops another process gracefully on every system. Each worker
-finishes its iteration and writes a checkpoint. Workers also stop in this way when their parent ends or is killed.
+was lost twice continues alone: its third loss is of its own process. A stopped sweep creates a file for which its
+workers poll, because no signal stops another process gracefully on every system. Each worker finishes its iteration and
+writes a checkpoint. Workers also stop in this way when their parent ends or is killed.
 """
 
 import _thread
@@ -46,7 +46,7 @@ def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Generator[Out
     stop.unlink(missing_ok=True)
     while waiting:
         with _pool(workers, stop) as pool:
-            yield from _until_broken(pool, waiting, losses, workers, threads)
+            yield from until_broken(pool, waiting, losses, workers, threads)
 
 
 def no_processes() -> str:
@@ -73,7 +73,7 @@ def _here(jobs: list[Job], threads: int) -> Generator[Outcome | None, None, None
             raise KeyboardInterrupt
 
 
-def _until_broken(
+def until_broken(
     pool: ProcessPoolExecutor, waiting: deque[Job], losses: Counter[str], workers: int, threads: int
 ) -> Generator[Outcome | None, None, None]:
     """Outcomes until all jobs are done or the pool loses a process; `waiting` then contains the jobs left."""

@@ -2,8 +2,8 @@
 
 A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
 or with `000_left.png` and `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo clip. A list of times beside
-the pictures states their times, and so do names that are seconds with decimals. All other properties are stated on the
-command line.
+the pictures states their times; names that are seconds with decimals state them too. All other properties are stated
+on the command line.
 """
 
 import re

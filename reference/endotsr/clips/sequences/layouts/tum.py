@@ -115,8 +115,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     if pairs := [file.name for file in visible_files(path, "associat*.txt")]:
         notes.append(f"{shortened(pairs)}: not read; pictures, depth and poses are paired by their times")
     width, height = size_of(files)
-    camera = stated_camera(options, width, height, path)
-    notes += picture_notes(files)
+    camera, notes = stated_camera(options, width, height, path), notes + picture_notes(files)
     given = [path / name for name in TRAJECTORIES if (path / name).is_file()]
     settings = next((file for file in visible_files(path, "*.yaml") if SETTINGS in read_text(file)), None)
     if camera.intrinsics is None and settings is not None:
@@ -130,8 +129,8 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     if where is not None:
         found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
         poses = poses_at(found, times, LONGEST)
-        notes.append(f"poses of {where.name}" + "".join(f"; not read: {file.name}" for file in given if file != where))
-        notes += found.notes
+        others = "".join(f"; not read: {file.name}" for file in given if file != where)
+        notes += [f"poses of {where.name}{others}", *found.notes]
     planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
     steps_of_depth = _depth_steps(settings, notes) if planes and options.depth is None else STEPS
     steps = np.diff(times)
