@@ -56,7 +56,7 @@ def test_the_first_wrong_array_is_named_with_what_is_right_before_it(golden, tmp
 def test_arrays_that_are_right_put_the_mistake_behind_them(golden, tmp_path):
     after = [["a = (m[0] ** 2).sum(0) + eps", "a = (m[0] ** 2).sum(0) + eps * m[1, 0] ** 2"]]
     found = report(golden, written(golden, tmp_path, after, ("point", "jacobian", "t")))
-    assert re.match(r"inside projection/\w+ point, jacobian, t are right: look after them", found.inside[0])
+    assert re.match(r"inside projection/\w+ point, jacobian, t are right: look at what follows", found.inside[0])
 
 
 def test_what_cannot_be_read_or_has_another_shape_is_said(golden, tmp_path):

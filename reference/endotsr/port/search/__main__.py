@@ -1,6 +1,6 @@
 """The process of a search: `python -m endotsr.port.search GOLDEN OUTPUTS PRECISION LEVEL OPERATION SECONDS`.
 
-Prints the results as JSON; exits with code 1 if there is nothing to explain.
+Prints the results as JSON; exits with code 1 if there is nothing to explain, or after an error.
 """
 
 import contextlib

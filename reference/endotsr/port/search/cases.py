@@ -20,15 +20,15 @@ from endotsr.port.search.places import executed
 from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.stage import Inputs, Outputs, Settings, Stage, tidy
 
-AFTER = 2  # iterations of a trajectory that are compared, from its first wrong one on
+AFTER = 2  # compared iterations of a trajectory from its first wrong one on; those before it are compared too
 PIECE = 1e-6  # step length of a derivative, in units of the input
-DERIVATIVE = 1e-4  # its allowed relative error
+DERIVATIVE = 1e-4  # its allowed error, relative to the sum of the magnitudes of its terms
 
 
 class Answered:
-    """One case: the outputs of the port, and the tolerances of rounding.
+    """One case: the outputs of the port that can be compared, and the tolerances of rounding.
 
-    A trajectory is cut soon after its first wrong iteration: later errors follow from it.
+    A trajectory is cut soon after its first wrong iteration: later errors may follow from it.
     """
 
     def __init__(self, golden: Golden, case: Case, report: CaseReport, outputs: Path, precision: str) -> None:
@@ -105,7 +105,7 @@ class Answered:
         return tidy(stage.reverse(given, own)) if stage.reverse is not None and given.keys() == set(names) else {}
 
     def same(self, found: Mapping[str, NDArray], names: Sequence[str] | set[str]) -> bool:
-        """Whether all of these outputs equal the port's."""
+        """Whether all of these outputs equal the port's, within rounding and the allowed flips."""
         return all(name in found and self._same(name, np.asarray(found[name])) for name in names)
 
     def _same(self, name: str, value: NDArray) -> bool:
@@ -133,7 +133,10 @@ class Answered:
         return sum(self.off(name, self.right[name]) for name in self.refused.intersection(names))
 
     def distance(self, found: Mapping[str, NDArray], names: Sequence[str]) -> NDArray | None:
-        """Differences of real outputs from the port's, in units of their scale; None if they are not numbers."""
+        """Differences of real outputs from the port's, relative to the largest magnitude of each.
+
+        Where the port's is not finite, the difference counts as 0. None: another shape, or a number that is not finite.
+        """
         parts = []
         for name in names:
             value, got = np.asarray(found.get(name, np.nan), np.float64), self.got[name]
@@ -177,7 +180,7 @@ def _lock(value: Any) -> None:
 
 
 def of_the_parts(operation: str, golden: Golden) -> set[str]:
-    """Functions of the definition executed by the parts of an operation, which are right."""
+    """Functions of the definition that the parts of an operation execute, each part in its last case."""
     stages = definition_stages()
     parts = made_of(operation) & stages.keys()
     cases = {case.operation: case for case in golden.cases if case.operation in parts}

@@ -1,8 +1,9 @@
 """The changes of the definition that are tried for one operation, likely ones first.
 
-First come the conventions of other programs. Then come numbers, other texts and other names of one expression, in the
-code of the operation before the code of its parts, settings and inputs read differently, and decisions at another
-number. At the end come changes of two expressions, of a part of an array, and of the order.
+First come the conventions of other programs. For an operation with parts, numbers, other texts and other names of one
+expression in its own code follow. Then come settings and inputs read differently, decisions at another number, and one
+expression in the remaining functions and in the constants. At the end come the order of statements, a part of an array,
+two numbers of a line, and an expression beside another. A trajectory has no conventions and no thresholds.
 """
 
 import ast
@@ -24,7 +25,7 @@ from endotsr.port.search.second import SecondChange, at, beside, expressions, or
 from endotsr.port.search.trial import LATEST, TELLING, Live, Trial
 from endotsr.port.stages.stage import Outputs, Stage
 
-SECONDS = 16.0  # computing time of a search
+SECONDS = 16.0  # computing time of a search; `find` gives a trajectory more
 UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
 MOST_VALUES = 64  # examined values of an expression
 
@@ -53,7 +54,10 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
 
 
 def _all_places(trial: Trial, places: Sequence[Statement], glue: Sequence[Statement]) -> None:
-    """Changes of single expressions, then of more; those of the operation itself, `glue`, before its parts."""
+    """Changes of single expressions, those of the operation itself, `glue`, before its parts; then of more.
+
+    The last ones are tried in the operation itself alone, if it has code beside its parts.
+    """
     functions = [place for place in places if not place.is_constant]
     _places(trial, glue)
     _requests(trial)
@@ -64,13 +68,16 @@ def _all_places(trial: Trial, places: Sequence[Statement], glue: Sequence[Statem
 
 
 def _places(trial: Trial, places: Sequence[Statement]) -> None:
-    """Changes of some places: numbers, then other texts, then other names; for a trajectory, numbers last."""
+    """Changes of some places: numbers, then other texts, then other names; for a trajectory, numbers last.
+
+    After a likely change that explains both passes, other texts and names are tried in its line alone.
+    """
     long = any(one.length for one in trial.cases)
     live = _reached(trial, places, long)
     trial.live += live
     for texts, rank in ((_texts, 1), (_names, 2)):
         lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
-        for one in live:  # after a hit, the rest of its line is tried
+        for one in live:
             if not lines or one.spot.place.where(one.spot.node) in lines:
                 _try(trial, one, texts(one, trial.lower), rank)
     for one in live if long and not trial.explains else ():
@@ -79,7 +86,7 @@ def _places(trial: Trial, places: Sequence[Statement]) -> None:
 
 
 def _requests(trial: Trial) -> None:
-    """Settings and inputs read differently; for a numeric setting, also the number that fits best."""
+    """Settings and inputs read differently; for a real setting, also the number that fits best."""
     for request in other_requests([one.case for one in trial.cases], trial.golden.cases):
         if trial.over:
             return
@@ -89,7 +96,7 @@ def _requests(trial: Trial) -> None:
 
 
 def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) -> list[OtherReading]:
-    """A setting fixed at the number that fits best, if nothing else was found."""
+    """A setting fixed at the number that fits best and at plain numbers near it, if nothing else was found."""
     if trial.hits:
         return []
     numbers, _ = trial.number(lambda value: trial.outputs(None, "both", at(value)), rest)
@@ -97,10 +104,9 @@ def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) 
 
 
 def _reached(trial: Trial, places: Sequence[Statement], long: bool) -> list[Live]:
-    """Reached spots, the most promising first.
+    """Reached spots, the most promising first: a small change there spoils the fewest of the right outputs.
 
-    Each is ranked by the factor, term or constant with which it explains most; for a trajectory, which is slow, by one
-    computation.
+    On the way, the factor, term or constant that fits best is tried at each; not for a trajectory, which is slow.
     """
     live: list[Live] = []
     for place in places:
@@ -116,7 +122,7 @@ def _reached(trial: Trial, places: Sequence[Statement], long: bool) -> list[Live
 
 
 def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) -> list[Any]:
-    """Values of an expression in the first case, None for a value that is not an array; True for a statement.
+    """Values of an expression in the first case, None for one that is no number and no array; True for a statement.
 
     late   if given, real values are perturbed while they are read, and the number of spoiled outputs is stored here
     """
@@ -145,7 +151,10 @@ def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) 
 
 
 def _solved(trial: Trial, spot: Spot, mode: str, values: list[Any]) -> int:
-    """Search for the number at a spot that explains everything; returns the rank of other texts there."""
+    """Search for the number at a spot that explains everything; returns the rank of other texts there.
+
+    The rank is the number of right outputs of the first case that a small change spoils.
+    """
     late = LATEST
     for text, rest in with_number(spot.node, values):
         late = min(late, _number_at(trial, spot, mode, text, rest, 2 if isinstance(spot.node, ast.Constant) else 3))
@@ -172,7 +181,7 @@ def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank
             names["_knob"] = value
             whole, phases = trial.best(install, mode)
             if whole:
-                when = words or (f"at {counter.words()}" if rank > 3 else "")
+                when = words or (counter.words() if rank > 3 else "")
                 said = _replaced(spot, phases, said_number(spot.node, rest, value), when)
                 by_name = rest == 0 and isinstance(spot.node, ast.Name | ast.Attribute)  # rather another name
                 trial.note(whole, said, spot, 1 + (trial.discrete or by_name) if plain else 3, rank)
@@ -215,7 +224,10 @@ def _side(spot: Spot, mode: str) -> str:
 
 
 def _second(trial: Trial, places: Sequence[Statement]) -> None:
-    """Changes of more than one expression, of a part of an array and of the order, if nothing else fits."""
+    """Changes of more than one expression, of a part of an array and of the order.
+
+    They are tried if nothing else explains both passes, and enough entries are wrong to tell them apart.
+    """
     if trial.explains or trial.wrong < TELLING:
         return
     for module in definition_modules():

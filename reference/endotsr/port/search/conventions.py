@@ -1,8 +1,7 @@
 """Decisions of other programs, each as a change of the definition that may touch several expressions.
 
 In: texts of the definition and what another program has in their place (`screen.py`, `images.py`). Out: the changed
-functions, compiled, for `changes.py`, which reports a change if the outputs of the port are those of the changed
-definition.
+functions, compiled, for `decisions.py`, which tries them against the outputs of the port.
 """
 
 import ast
@@ -20,11 +19,12 @@ class Convention(NamedTuple):
 
     said: str
     changes: tuple[tuple[str, str, str], ...]
-    """function or constant as `module.name`, its text, and the other text; the text stands there once"""
+    """function or constant as `module.name`, its text, and the other text; the text stands there once, after the changes
+    before it"""
 
 
 class ChangedDefinition(NamedTuple):
-    """A convention as code, the line it changes first, and the functions it changes."""
+    """A convention as code, the line it changes first, and the functions and constants it changes."""
 
     said: str
     spot: Spot

@@ -1,7 +1,7 @@
 """Decisions that a port takes otherwise: by the convention of another program, or at another threshold.
 
-In: the search for one operation. Out: its hits. A convention is one prepared change; a threshold is a number that is
-searched for by how many entries of the outputs still differ, since outputs do not change continuously with it.
+In: the search for one operation. Out: its hits. A convention is a prepared change. A threshold is searched for by the
+number of entries of the outputs that still differ: decisions do not change continuously with it.
 """
 
 import ast
@@ -20,7 +20,7 @@ from endotsr.port.search.trial import Trial
 from endotsr.port.stages.stage import Outputs
 
 SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
-FIRST = (0.0, 0.5, 2.0, 1e6)  # factors of a threshold; a number with which these four change nothing is passed over
+FIRST = (0.0, 0.5, 2.0, 1e6)  # factors tried first; if none changes the number of wrong entries, no other is tried
 FACTORS = (1e-6, 1e-3, 1e-2, 0.1, 0.25, 0.7, 0.85, 0.95, 0.99, 1.01, 1.05, 1.15, 1.4, 4, 10, 100, 1e3)
 ROUNDS = 5  # refinements of the best factor
 FEWER = 0.8  # largest fraction of the wrong entries that is left at a factor that is refined
@@ -30,7 +30,10 @@ KNOWN = (1 / 256, 1 / 255, 1 / 128, 1 / 512, 1e-3, 1e-4, 1e-6, 0.2, 0.01)
 
 
 def try_conventions(trial: Trial, places: Sequence[Statement]) -> None:
-    """The prepared changes of executed functions."""
+    """The prepared changes whose first function was executed, or whose constant is in a module with such a function.
+
+    If a forward output is refused, those of a reverse pass alone are passed over; if none is, all others are.
+    """
     names = {place.name for place in places}
     constants = {place.module.__name__.rpartition(".")[2] for place in places}
     for convention in (*OF_THE_SCREEN, *OF_IMAGES):
@@ -48,13 +51,13 @@ def try_conventions(trial: Trial, places: Sequence[Statement]) -> None:
 
 
 class Interval(NamedTuple):
-    """Numbers that give the same decisions, from the lowest to the highest that were tried."""
+    """Numbers that give the same decisions, as far as they were tried: the lowest and the highest."""
 
     low: float
     high: float
 
     def numbers(self) -> list[float]:
-        """Numbers of the interval, those of few digits and those of other programs first."""
+        """Numbers of the interval: those of other programs, those of one and two digits, the middle, five others."""
         middle = (self.low + self.high) / 2
         plain = [float(f"{middle:.{digits}g}") for digits in (1, 2)]
         inside = [k for k in dict.fromkeys((*KNOWN, *plain)) if self.low <= k <= self.high]
@@ -65,6 +68,8 @@ def threshold(wrong: Callable[[float], int], rest: float) -> Interval | None:
     """Numbers at which nothing is wrong, near a number `rest` at which something is; None if none is found.
 
     wrong   number -> entries of the outputs that differ
+
+    Of several intervals with a wrong number between them, the one nearest to `rest` is taken.
     """
     unit, before = rest or 1.0, wrong(rest)
     tried = {k * unit: wrong(k * unit) for k in FIRST}
@@ -80,16 +85,20 @@ def threshold(wrong: Callable[[float], int], rest: float) -> Interval | None:
         ends = ordered[max(at - 1, 0)], ordered[min(at + 1, len(ordered) - 1)]
         tried |= {k: wrong(k) for k in np.linspace(*ends, 8)[1:-1] if k not in tried}
     ordered = sorted(tried)
-    good = [k for k, count in tried.items() if not count]
+    good = [at for at, k in enumerate(ordered) if not tried[k]]
     if not good or not before:
         return None
-    low, high = min(good), max(good)
-    below = max((k for k in ordered if k < low), default=low)
-    above = min((k for k in ordered if k > high), default=high)
-    return Interval(_end(wrong, low, below), _end(wrong, high, above))
+    low = high = min(good, key=lambda at: abs(ordered[at] - rest))
+    while low - 1 in good:
+        low -= 1
+    while high + 1 in good:
+        high += 1
+    below, above = ordered[max(low - 1, 0)], ordered[min(high + 1, len(ordered) - 1)]
+    return Interval(_end(wrong, ordered[low], below), _end(wrong, ordered[high], above))
 
 
 def _end(wrong: Callable[[float], int], good: float, bad: float) -> float:
+    """The last good number found between a good number and the next one tried."""
     for _ in range(HALVINGS):
         middle = (good + bad) / 2
         good, bad = (middle, bad) if not wrong(middle) else (good, middle)
@@ -99,7 +108,8 @@ def _end(wrong: Callable[[float], int], good: float, bad: float) -> float:
 def try_thresholds(trial: Trial, places: Sequence[Statement]) -> None:
     """Decisions at another number, if nothing else explains both passes; in a trajectory, each costs too much.
 
-    Tried are numeric settings fixed at another number, and every comparison of the definition with a number.
+    Tried are real settings fixed at another number, and single comparisons by <, <=, > and >= of these functions whose
+    right side is the same number at each evaluation.
     """
     if trial.explains or trial.length:
         return
@@ -145,13 +155,19 @@ def _compared(trial: Trial, spot: Spot) -> None:
         whole, phases = trial.best(install, mode)
         if whole and found:
             alone = f", in the {phases} pass alone" if phases != "both" and len(spot.place.phases) > 1 else ""
-            trial.note(whole, f"`{left} {sign} {said(number, found, float(seen[0]))}`{alone}", spot, 1, 3)
+            text = said(number, found, float(seen[0]), trial.cases[0].case.name)
+            trial.note(whole, f"`{left} {sign} {text}`{alone}", spot, 1, 3)
             return
 
 
-def said(number: float, found: Interval, right: float) -> str:
-    """A threshold with its interval, and the right one."""
-    return f"{number:.6g}` (any number from {found.low:.4g} to {found.high:.4g} explains it) where `{right:.6g}"
+def said(number: float, found: Interval, right: float, case: str) -> str:
+    """A threshold with its interval in a case, and the right one."""
+    return f"{number:.6g}`{extent(found, case)} where `{right:.6g}"
+
+
+def extent(found: Interval, case: str) -> str:
+    """An interval in words; it is that of one case, and another case may narrow it."""
+    return f" (any number from {found.low:.4g} to {found.high:.4g} gives the decisions of {case})"
 
 
 def differing(trial: Trial, found: Outputs) -> int:
@@ -166,6 +182,6 @@ def _fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) -> No
     for number in found.numbers() if found else ():
         whole = trial.fits(None, "both", at(number))
         if whole and found:
-            text = f"{at(number).text} (any number from {found.low:.4g} to {found.high:.4g} explains it)"
+            text = f"{at(number).text}{extent(found, trial.cases[0].case.name)}"
             trial.note(whole, text, None, 1, 2)
             return

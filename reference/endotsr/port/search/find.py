@@ -21,14 +21,15 @@ from endotsr.untrusted.names import counted
 START_UP = 60.0  # seconds of a process outside its search
 SLOWEST = 10.0  # elapsed seconds per second of computing on a busy machine
 LONG = 3.0  # factor on the time of a search among trajectories
-MOST_LINES = 3  # source lines listed if all explain the outputs equally
+MOST_LINES = 3  # listed source lines, and functions with such lines beyond which nothing is said
 MOST_APART = 6  # outputs that are explained one at a time
 
 
 def explained(golden: Golden, outputs: Path, precision: Precision, level: int, operation: str, seconds: float) -> Trial:
     """The search for the mistake of an operation with a refused output.
 
-    Raises: InputError if the definition does not compute the operation, or none of its readable outputs is refused.
+    Raises: InputError if the definition does not compute the operation, or none of its refused outputs can be compared:
+    one may be unreadable, of another shape, or asked only to equal another output.
     """
     stage = definition_stages().get(operation)
     cases = [case for case in golden.cases if case.operation == operation and case.level <= level]
@@ -42,13 +43,13 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
 
 
 def apart(trial: Trial, whole: Sequence[str], seconds: float) -> list[str]:
-    """Explanations of single outputs: independent mistakes often spoil different ones.
+    """Explanations of single outputs: independent mistakes may spoil different ones.
 
     whole   what `sentences` says of all outputs together
 
-    Tried are all refused outputs if no change explains them together, and the gradients if one explains the forward
-    outputs alone. An output is compared together with all outputs that are right, and without the other wrong ones.
-    Forward outputs come first; each has an equal part of the time that is left.
+    Tried are refused outputs if no change explains them together, and the gradients if one explains the forward
+    outputs alone; at most MOST_APART of them, and none of a trajectory. An output is compared together with the outputs
+    that are right in all cases. Forward outputs come first; each has an equal part of the time that is left.
     """
     names = dict.fromkeys(name for one in trial.cases for name in _forward_first(one))
     left = list(names)
@@ -99,7 +100,7 @@ def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECO
 
 
 def sentences(trial: Trial) -> list[str]:
-    """The changes that explain most, one per source line; nothing if changes in many functions do."""
+    """The changes that explain most and are likeliest, one per source line; nothing if they are in many functions."""
     said = _equally(trial)
     if not said:
         return []
@@ -108,7 +109,10 @@ def sentences(trial: Trial) -> list[str]:
 
 
 def _equally(trial: Trial) -> list[str]:
-    """A change that explains most, and lines with those that do so equally."""
+    """A likeliest change that explains most, and lines with those that are equally likely.
+
+    One that explains another part of the outputs, such as those of the forward pass, is listed with that part.
+    """
     best: dict[str, Hit] = {}
     for hit in trial.hits:
         if hit.rank[:3] == trial.hits[0].rank[:3]:
@@ -117,7 +121,11 @@ def _equally(trial: Trial) -> list[str]:
     if not best or len(functions) > MOST_LINES:
         return []
     said = [f"{hit.text}{f': {hit.where}' if hit.where else ''}" for hit in best.values()]
-    rest = [f"  or equally with {one}" for one in said[1:]]
+    first, *others = best.values()
+    rest = [
+        f"  or equally with {line}" if hit.whole == first.whole else f"  or with {line}, which gives {hit.extent.rstrip(',')}"
+        for line, hit in zip(said[1:], others)
+    ]
     if len(best) > MOST_LINES:
         said[0] = f"for example {said[0]}"
         rest = [f"  or equally with another change in {', '.join(functions)}: {len(best)} lines"]

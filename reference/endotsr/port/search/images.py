@@ -1,4 +1,4 @@
-"""Decisions of other programs for SSIM and the pyramid, each as a change of the definition.
+"""Decisions that another program may take for SSIM and the pyramid, each as a change of the definition.
 
 Windows, borders and masks of other libraries. `conventions.py` makes the changes.
 """

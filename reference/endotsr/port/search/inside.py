@@ -1,8 +1,8 @@
 """The first wrong array inside an operation, from intermediate arrays that a port may write after a refusal.
 
 In: `<family>/<case>/inside/<name>.npy`, next to the outputs of a refused case. Out: the first wrong array, in the order
-of computation of the definition. The expected values are variables of the definition while it computes the case; no
-vector stores them.
+of computation of the definition. The expected values are computed from variables of the definition at the end of one
+of its functions; no vector stores them.
 """
 
 import contextlib
@@ -104,7 +104,7 @@ INSIDE: dict[str, dict[str, Inner]] = {
 
 
 def values(stage: Stage, one: Answered) -> dict[str, NDArray]:
-    """The arrays of a case; unreached arrays are omitted."""
+    """The arrays of a case, from the first call of each function; arrays that the case does not reach are omitted."""
     wanted = INSIDE.get(stage.name, {})
     functions = {_code(inner.function): inner.function for inner in wanted.values()}
     names: dict[str, Mapping[str, Any]] = {}
@@ -133,7 +133,7 @@ def _code(function: str) -> Any:
 
 
 def bisected(stage: Stage, one: Answered) -> list[str]:
-    """Sentences on the arrays that a port wrote for a case; empty if it wrote none."""
+    """A sentence on the arrays that a port wrote for a case; empty if it wrote none."""
     expected, right, wrong = values(stage, one), [], []
     for name, array in expected.items():
         try:
@@ -143,12 +143,15 @@ def bisected(stage: Stage, one: Answered) -> list[str]:
                 wrong.append(f"{name}: {refusal}")
             continue
         said = compared(got, array, one.tolerance, {**one.inputs, **expected}, name)
-        (wrong if said else right).append(f"{name}: {said}" if said else name)
+        if said:
+            wrong.append(f"{name}: {said}")
+        elif not wrong:  # one after a wrong array does not narrow the search
+            right.append(name)
     if not right and not wrong:
         return []
     after = f"; right before it: {', '.join(right)}" if right else ""
     if not wrong:
-        return [f"inside {one.case.name} {', '.join(right)} {'are' if len(right) > 1 else 'is'} right: look after them"]
+        return [f"inside {one.case.name} {', '.join(right)} {'are' if len(right) > 1 else 'is'} right: look at what follows"]
     return [f"inside {one.case.name} the first wrong array is {wrong[0]}{after}"]
 
 
@@ -171,7 +174,10 @@ def asked(stage: Stage, one: Answered) -> str:
 
 
 def looked(stage: Stage, cases: Sequence[Answered]) -> tuple[list[str], str]:
-    """Sentences on the arrays of refused cases, the first wrong one first; else the arrays that a port may write."""
+    """A sentence on the arrays of one refused case, one with a wrong array if there is any.
+
+    Without arrays of the port it is empty; then the second text names those that the port may write.
+    """
     refused = [one for one in cases if one.refused]
     said = [found for one in refused if (found := bisected(stage, one))]
     said.sort(key=lambda found: " wrong " not in found[0])

@@ -17,7 +17,7 @@ STEP = re.compile(r"#.*?(\(\d+\.\d+\)(?:, \(\d+\.\d+\))*)")  # at the end of a l
 
 
 class Statement:
-    """A function of the definition, or a constant with the constants that depend on it."""
+    """A function of the definition, or a constant with the later constants of its module that depend on it."""
 
     def __init__(self, module: ModuleType, statement: ast.FunctionDef | ast.Assign, phases: frozenset[str]) -> None:
         self.module, self.statement, self.phases = module, statement, phases
@@ -88,7 +88,7 @@ class Spot(NamedTuple):
 
     @property
     def truth(self) -> bool:
-        """Whether it is a condition."""
+        """Whether it is a condition: a test, a logical operand, or the first argument of `np.where`."""
         holder, field, index = self.holders[0]
         match holder:
             case ast.Call():
@@ -102,30 +102,40 @@ class Spot(NamedTuple):
 
 @contextmanager
 def written(spot: Spot, text: str) -> Iterator[None]:
-    """The syntax tree of the place with another text at the spot. Raises SyntaxError if that is no expression."""
-    for holder, field, index in spot.holders:
-        made = ast.Pass() if isinstance(spot.node, ast.stmt) else ast.parse(text, mode="eval").body
-        for node in ast.walk(made):
-            ast.copy_location(node, spot.node)
-        _put(holder, field, index, made)
+    """The syntax tree of the place with another text at the spot, or without its statement.
+
+    Afterwards each holder has its own node again: nodes of one text differ in their lines and in the spots inside them.
+    Raises: SyntaxError if the text is no expression.
+    """
+    made = [ast.Pass() if isinstance(spot.node, ast.stmt) else ast.parse(text, mode="eval").body for _ in spot.holders]
+    before = [_put(*holder, new) for holder, new in zip(spot.holders, made)]
+    for new, old in zip(made, before):
+        for node in ast.walk(new):
+            ast.copy_location(node, old)
     try:
         yield
     finally:
-        for holder, field, index in spot.holders:
-            _put(holder, field, index, spot.node)
+        for holder, old in zip(spot.holders, before):
+            _put(*holder, old)
 
 
-def _put(holder: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
+def _put(holder: ast.AST, field: str, index: int | None, node: ast.AST) -> ast.AST:
+    """Put a node into a field, and return the one that was there."""
     if index is None:
+        before = getattr(holder, field)
         setattr(holder, field, node)
     else:
-        getattr(holder, field)[index] = node
+        nodes = getattr(holder, field)
+        before, nodes[index] = nodes[index], node
+    return before
 
 
 def spots(place: Statement) -> list[Spot]:
-    """Every expression that is read in a place, and its statements.
+    """The expressions that are read in a place, and the statements inside its loops and conditions.
 
-    Repeated expressions are also changed together: in the whole place, and in each of its statements.
+    Left out are called functions, objects whose entries are assigned, tuples, lists, slices, and texts without indices
+    of a sum. Repeated expressions are also changed together, in the whole place and in each statement of its body;
+    constants that are an index, an entry of a tuple or a keyword argument are not.
     """
     found: dict[tuple[str, int], list[Spot]] = {}
     body = place.statement.body if isinstance(place.statement, ast.FunctionDef) else [place.statement]
@@ -167,7 +177,7 @@ def _is_read(node: Any) -> bool:
 
 
 def names_in(place: Statement) -> list[str]:
-    """Local names read by a function, and attributes with their objects."""
+    """Parameters and local names of a function, and attributes of names other than `np`, as `settings.near`."""
     if not isinstance(place.statement, ast.FunctionDef):
         return []
     own = {a.arg for a in ast.walk(place.statement.args) if isinstance(a, ast.arg)}
@@ -184,7 +194,11 @@ def names_in(place: Statement) -> list[str]:
 
 
 def executed(phases: dict[str, Callable[[], Any]]) -> list[Statement]:
-    """The places of the definition executed by some calls, by phase, and the constants of their modules."""
+    """The functions of the definition that some calls execute, with the names of these calls, and their constants.
+
+    phases   calls by name, such as `forward` and `reverse`
+    The constants of a module have the phases of all of its executed functions.
+    """
     codes: dict[CodeType, set[str]] = {}
     for phase, call in phases.items():
 

@@ -11,7 +11,7 @@ from endotsr.port.judge.format import Case
 from endotsr.port.stages.stage import Inputs, Outputs, Settings
 
 MOST_ORDERED = 4  # longest axis with every order tried
-MOST_SWAPPED = 16  # longest axis with every pair exchanged
+MOST_SWAPPED = 16  # longest axis with the exchange of every pair tried
 
 
 class OtherReading(NamedTuple):
@@ -26,7 +26,7 @@ class OtherReading(NamedTuple):
 
 
 def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
-    """Misreadings of the requests of one operation, settings first."""
+    """Misreadings of the requests of one operation, settings first; inputs are those of the first case."""
     for path in dict.fromkeys(path for case in cases for path in leaves(case.settings)):
         yield from _settings(path, cases, all_cases)
     for name, array in cases[0].inputs.items():
@@ -57,7 +57,7 @@ def with_value(settings: Settings, path: Sequence[str], value: Any) -> Settings:
 
 
 def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
-    """A setting fixed at a value, or changed by a rule."""
+    """A setting fixed at a value that it has in some case, at 0 or 1, or changed by a rule; no list is fixed."""
     name = ".".join(path)
     seen = [value_at(case.settings, path) for case in cases]
     seen += [value_at(case.settings, p) for case in all_cases for p in leaves(case.settings) if p[-1] == path[-1]]

@@ -1,7 +1,7 @@
 """Other texts for an expression of the definition, as a mistake would write it.
 
-The rewrites are independent of the method: another value of a constant, an omitted or confused operation, a comparison
-with its end included, an added factor or term with a size found from the outputs.
+Most rewrites are independent of the method: another value of a constant, an omitted or confused operation, a comparison
+with or without its end, a factor or term whose size is found from the outputs. Some are for vectors and quaternions.
 """
 
 import ast
@@ -17,7 +17,7 @@ TWINS = (
     "round floor", "round ceil", "rint floor", "rint trunc", "trunc floor", "trunc rint", "tanh arctan", "cosh sinh",
     "tile repeat", "any all", "all any", "zeros ones", "ones zeros", "sign abs", "unique sort", "minimum maximum",
 )  # fmt: skip
-"""Functions confused with another."""
+"""A function, and one that may be taken for it."""
 OPERATORS: dict[type, str] = {
     ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l}); 2 * ({l}); 2 * ({r})",
     ast.Sub: "{l}; -({r}); ({l}) + ({r}); ({r}) - ({l})",
@@ -38,7 +38,7 @@ SWAPS = ("[1, 0, 2]", "[2, 1, 0]", "[0, 2, 1]", "[1, 2, 0]", "[2, 0, 1]")
 def rewrites(node: ast.expr | ast.stmt, values: Sequence[Any], truth: bool) -> Iterator[tuple[str, int]]:
     """Other texts for an expression, or the omission of a statement, each with its rank, 0 = the most likely.
 
-    values   observed values of the expression; texts that change none of them are omitted
+    values   observed values of the expression; factors, terms and bounds that do not suit them are omitted
     truth    the expression is a condition
     """
     if isinstance(node, ast.stmt):
@@ -111,7 +111,7 @@ def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tu
 
 
 def _wrapped(values: Sequence[Any]) -> Iterator[str]:
-    """Patterns that change one of the values."""
+    """Patterns for values of this kind and shape, without some that would change none of them."""
     arrays = [np.asarray(value) for value in values]
     if any(a.dtype.kind == "f" for a in arrays):
         yield from ("0 * ({})", "-({})", "2 * ({})", "({}) / 2", "({}) ** 2", "1 / ({})")
@@ -155,7 +155,7 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
 
 
 def _fewer(node: ast.Call, function: str, arguments: Sequence[str]) -> Iterator[str]:
-    """A sum or mean without its first or last element; a mean over one element less than there are."""
+    """A sum or mean without its first or last element; a mean with its number of elements less 1 as divisor."""
     whole, own = ast.unparse(node), function in ("np.sum", "np.mean")
     summed = arguments[0] if own else function.rpartition(".")[0]
     axis = next((ast.unparse(word.value) for word in node.keywords if word.arg == "axis"), "")

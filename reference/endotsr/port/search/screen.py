@@ -1,6 +1,6 @@
-"""Decisions of other rasterisers of Gaussians, each as a change of the definition.
+"""Decisions that another rasteriser of Gaussians may take, each as a change of the definition.
 
-Other programs have another support, other activations and other signs, or leave out a part of the reverse pass of
+Another program may have another support, other activations or other signs, or leave out a part of the reverse pass of
 compositing. `conventions.py` makes the changes.
 """
 
@@ -20,7 +20,7 @@ _PASSES = "taken & ~(value > settings.alpha_max)"
 
 
 def _wanted(said: str, condition: str) -> Convention:
-    """Another condition for drawing a Gaussian at a pixel, with every pixel in the support."""
+    """Another condition for drawing a visible Gaussian at a pixel, in place of cutoff and support."""
     return Convention(said, ((_LAYERS, _WANTED, f"live & projected.visible[i] & {condition}"), _ALL))
 
 
@@ -47,7 +47,7 @@ def _radius(said: str, radius: str) -> Convention:
 
 OF_THE_SCREEN: tuple[Convention, ...] = (
     # which Gaussians are drawn, and where
-    _wanted("no cutoff of alpha", "(alpha.real > 0)"),
+    _wanted("no cutoff of alpha: Gaussians drawn beyond their support", "(alpha.real > 0)"),
     _culled("nothing drawn beyond three standard deviations (the ellipse of 3 sigma)", "q.real <= 9"),
     _culled("nothing drawn outside of the circle of radius ceil(3 sqrt(lambda))", f"dx**2 + dy**2 <= {_RADIUS} ** 2"),
     _culled(

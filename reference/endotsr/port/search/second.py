@@ -1,4 +1,4 @@
-"""Changes that are tried if no single rewrite fits.
+"""Changes that are tried if no other explains both passes.
 
 Two numbers of one line; another order of statements; an expression of the function that replaces another or is combined
 with it; a factor at one index of an array, or at one evaluation of an expression.
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from endotsr.port.search.places import Spot, Statement, written
 
-MOST_INDICES = 16  # indices tried along the first axis of an array
-MOST_INNER = 4  # along its second axis
+MOST_INDICES = 16  # longest first axis of an array of which every index is tried
+MOST_INNER = 4  # longest second axis
 LONGEST = 24  # characters of a moved expression
 BESIDE = ("({t}) * ({e})", "({t}) / ({e})", "({t}) * (1 - ({e}))", "({t}) + ({e})", "({t}) - ({e})")
 BESIDE_TRUE = ("({t}) & ({e})", "({t}) | ({e})", "({t}) & ~({e})")
@@ -61,7 +61,7 @@ def _both(one: Spot, first: str, other: Spot, second: str) -> Iterator[None]:
 
 
 def orders(place: Statement) -> Iterator[SecondChange]:
-    """A statement moved earlier or later in its block."""
+    """An assignment moved to another place in the body of its function or loop."""
     for holder in ast.walk(place.statement):
         block = getattr(holder, "body", None)
         if not isinstance(block, list) or not isinstance(holder, ast.FunctionDef | ast.For):
@@ -110,7 +110,7 @@ def _is_real(value: Any) -> bool:
 
 
 def parts(spot: Spot, values: Sequence[Any]) -> Iterator[tuple[str, str]]:
-    """Texts with a factor `_knob` at one index or one evaluation, and their description."""
+    """Texts with a factor `_knob` at one index or one evaluation of a real expression, and their description."""
     if isinstance(spot.node, ast.stmt) or len(spot.holders) > 1 or not all(map(_is_real, values)):
         return
     text, shape = ast.unparse(spot.node), np.shape(values[0])
@@ -124,7 +124,7 @@ def parts(spot: Spot, values: Sequence[Any]) -> Iterator[tuple[str, str]]:
 
 
 class Counter:
-    """Counts the evaluations of an expression, and records the integers of its function at one of them."""
+    """Counts the evaluations of an expression, and records the local integers of its function at one of them."""
 
     def __init__(self) -> None:
         self.count, self.numbers = 0, dict[str, int]()
@@ -141,8 +141,9 @@ class Counter:
         return factor * value
 
     def words(self) -> str:
-        """Description of this evaluation."""
-        return " and ".join(f"{name} = {value}" for name, value in self.numbers.items()) or "only once"
+        """Description of this evaluation: by these integers, if there are any."""
+        where = " and ".join(f"{name} = {value}" for name, value in self.numbers.items())
+        return f"at {where or 'one evaluation alone'}"
 
 
 def at(value: NDArray, index: tuple[int, ...], factor: float) -> NDArray:

@@ -22,7 +22,7 @@ from endotsr.port.stages.stage import Outputs, Stage
 LATEST = 1000  # rank of a spot with unknown reach
 ENOUGH = 40  # equal explanations that end the search
 MOST = 3  # smallest number of explained cases with refused outputs beside which one may stay unexplained
-TELLING = 8  # smallest number of wrong entries for which any number is accepted, and of outputs for wrong gradients
+TELLING = 8  # smallest number of wrong entries for which any number, or an explanation of a part, is accepted
 WHOLE = {
     "all": "every output",
     "derivative": "every forward output, of which the gradients of the port are the derivatives,",
@@ -60,7 +60,7 @@ class Live(NamedTuple):
 
 
 class Trial:
-    """The search for one operation: its cases, the one with the most refused outputs first, and the hits."""
+    """The search for one operation: its cases, in the order of `find.explained`, and the hits."""
 
     def __init__(self, stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
         self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
@@ -101,7 +101,7 @@ class Trial:
         """The extent to which a change explains all cases: a key of WHOLE, or "" for nothing.
 
         A port may do more than one thing otherwise where an optional part is on: after MOST explained cases, one may
-        stay unexplained.
+        stay unexplained, if no gradients differ.
         """
         self.tried += 1
         self.matched = False
@@ -164,7 +164,10 @@ class Trial:
             return {**found, **one.reverse(self.stage, inputs, saved)}
 
     def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
-        """Numbers to try, the simplest first, and the number of passed outputs that another number spoils."""
+        """Numbers to try, as `plain_first` orders them, and the number of right outputs that a small step spoils.
+
+        That number is LATEST - 1 if the step changes nothing.
+        """
         one = self.cases[0]
 
         def off(value: float) -> Any:
@@ -184,7 +187,7 @@ class Trial:
         return not all(np.array_equal(found[name], one.right[name]) for name in one.got)
 
     def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
-        """Record a change that fits."""
+        """Record a change that fits; one that explains a part alone, if at least TELLING entries are wrong there."""
         several = sum(map(bool, self.refusals)) > 1
         enough = {"forward": self.wrong_forward, "refused": self.wrong if several else 0, "most": self.wrong_forward}
         if whole and enough.get(whole, TELLING) >= TELLING:
@@ -201,7 +204,7 @@ class Trial:
         return ["both" if self.forward_refused else "reverse"]
 
 
-LOWER = {"float32": (1e-11, 1e-6), "float16": (1e-6, 1e-2)}
+LOWER = {"float32": (1e-11, 1e-6), "float16": (1e-6, 1e-2)}  # sizes of the largest error, relative to the output
 
 
 def lower_precision(one: Answered) -> str:

@@ -1,0 +1,122 @@
+"""The pieces of the search: changes of the syntax tree, numbers, intervals of thresholds and their words."""
+
+import ast
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from endotsr.port.search import inside
+from endotsr.port.search.decisions import Interval, said, threshold
+from endotsr.port.search.find import sentences
+from endotsr.port.search.inside import bisected
+from endotsr.port.search.numbers import plain_first, said_number
+from endotsr.port.search.places import Statement, spots, syntax, written
+from endotsr.port.search.rewrites import rewrites
+from endotsr.port.search.second import Counter
+from endotsr.port.search.trial import Hit
+from endotsr.port.stages.definition import definition_stages
+
+STAGES = definition_stages()
+
+
+def place(module, function):
+    module = sys.modules[f"endotsr.definition.{module}"]
+    (statement,) = (one for one in syntax(module).body if getattr(one, "name", "") == function)
+    return Statement(module, statement, frozenset({"forward"}))
+
+
+@pytest.mark.parametrize("name", ["masked_ssim.masked_ssim_forward", "projection.jacobian", "compositing.layers_of"])
+def test_a_change_leaves_every_node_where_it_was(name):
+    one = place(*name.split("."))
+    nodes = [id(node) for node in ast.walk(one.statement)]
+    text = ast.dump(one.statement, include_attributes=True)
+    for spot in spots(one):
+        with written(spot, "0.5"):
+            pass
+    assert ast.dump(one.statement, include_attributes=True) == text
+    assert [id(node) for node in ast.walk(one.statement)] == nodes
+
+
+def test_a_text_that_is_no_expression_leaves_the_tree_as_it_was():
+    one = place("projection", "jacobian")
+    text = ast.dump(one.statement)
+    for spot in (spot for spot in spots(one) if len(spot.holders) > 1):
+        with pytest.raises(SyntaxError), written(spot, "a +"):
+            pass
+    assert ast.dump(one.statement) == text
+
+
+@pytest.mark.parametrize(("number", "expected"), [(2.0, (2.0, True)), (0.5, (0.5, True)), (-1.0, (-1.0, True))])
+def test_a_number_that_is_exactly_plain_counts_as_plain(number, expected):
+    assert plain_first(number)[0] == expected
+    assert [value for value, _ in plain_first(number)].count(number) == 1
+
+
+def test_a_number_near_a_plain_one_comes_after_it():
+    assert plain_first(2.0000001) == [(2.0, True), (2.0000001, False)]
+    assert plain_first(0.7312345)[-1] == (0.7312345, False)
+
+
+@pytest.mark.parametrize("text", ["a if t else b", "a < b", "a and b", "not a", "a & b", "a * b", "-a", "a + b"])
+def test_an_expression_with_a_number_reads_as_it_was_computed(text):
+    node = ast.parse(text, mode="eval").body
+    for a in (-1, 0, 3):
+        names = {"a": a, "b": 2, "t": True}
+        assert eval(said_number(node, 1.0, 7.0), names) == 7 * eval(text, names)
+        assert eval(said_number(node, 0.0, 0.5), names) == eval(text, names) + 0.5
+
+
+def test_the_interval_of_a_threshold_has_no_number_that_is_known_to_be_wrong():
+    def wrong(number):
+        return 0 if 0.4 <= number <= 0.6 or 1.8 <= number <= 2.2 else 5
+
+    found = threshold(wrong, 1.0)
+    assert found is not None and not any(map(wrong, np.linspace(found.low, found.high, 101))), found
+
+
+def test_the_interval_of_a_threshold_is_said_of_the_case_it_was_found_on():
+    text = said(0.005, Interval(0.0049, 0.0051), 0.004, "composite/plain")
+    assert text == "0.005` (any number from 0.0049 to 0.0051 gives the decisions of composite/plain) where `0.004"
+
+
+def test_one_evaluation_is_said_with_its_numbers_or_as_one():
+    counter = Counter()
+    assert counter.words() == "at one evaluation alone"
+
+    def evaluated(given):
+        k = 3 * given
+        return counter.nth(1.0, 1, 2.0) + 0 * k
+
+    assert [evaluated(1), evaluated(2), evaluated(3)] == [1.0, 2.0, 1.0]
+    assert counter.words() == "at k = 6"
+
+
+def hit(text, whole, function="f"):
+    return Hit(text, f"definition/{text}.py:1", function, whole, (1, 1, 0, 0))
+
+
+def test_changes_that_explain_another_part_are_not_called_equal():
+    hits = [hit("a", "forward"), hit("b", "forward"), hit("c", "refused")]
+    lines = sentences(SimpleNamespace(hits=hits, cases=[0, 0]))
+    assert lines[1] == "  or equally with b: definition/b.py:1"
+    assert lines[2].startswith("  or with c: definition/c.py:1, which gives every output of those that are refused")
+
+
+def test_only_arrays_before_the_first_wrong_one_are_said_to_be_right_before_it(monkeypatch):
+    arrays = {name: np.arange(6.0) + k for k, name in enumerate(("first", "second", "third"))}
+    got = {**arrays, "second": arrays["second"] * 2 + np.sin(np.arange(6.0))}
+    monkeypatch.setattr(inside, "values", lambda stage, one: arrays)
+    monkeypatch.setattr(inside, "read_plain", lambda path, root, most: got[path.stem])
+    one = SimpleNamespace(folder=Path("a"), case=SimpleNamespace(name="a/b"), tolerance=1e-9, inputs={})
+    (line,) = bisected(None, one)
+    assert line.startswith("inside a/b the first wrong array is second: ") and line.endswith("; right before it: first")
+
+
+def test_a_statement_is_omitted_where_it_stands_in_a_block():
+    one = place("compositing", "layers_of")
+    omitted = [spot for spot in spots(one) if isinstance(spot.node, ast.stmt)]
+    assert omitted and all(spot.holders[0][0] is not one.statement for spot in omitted)
+    assert list(rewrites(omitted[0].node, [True], False)) == [("pass", 0)]
