@@ -107,3 +107,13 @@ def test_a_number_near_the_largest_neither_warns_nor_is_an_infinite_factor(got):
 @pytest.mark.filterwarnings("error")
 def test_a_fingerprint_that_overflows_does_not_warn():
     assert not np.isfinite(fingerprint("name", np.full(64, 1e308)))
+
+
+@pytest.mark.parametrize("odd", [0, 1])
+def test_both_colours_of_a_chessboard_are_found(odd):
+    right = np.arange(1.0, 49.0).reshape(6, 8) ** 1.5
+    row, column = np.indices(right.shape) % 2
+    got = np.where(row ^ column == odd, 1.7 * right + np.sin(right), right)
+    text = ("are both even or both odd", "are one even and one odd")[odd]
+    found = [one.text for one in relations(got, right, "max", 1e-12, {})]
+    assert f"only at pixels whose row and column {text}, counted from 0" in found

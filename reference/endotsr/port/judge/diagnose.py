@@ -17,14 +17,14 @@ PARTS = {
     "training": ("objective", "calibration", "adam", "schedule", "density"),
     "determinism": ("objective",),
 }  # fmt: skip
-"""Operations that an operation is composed of."""
+"""Operations that an operation is directly composed of."""
 ORDER = (
     "reading", "generator", "frequencies", "dictionary", "atoms", "appearance", "motion", "deformation", "covariance",
     "projection", "harmonics", "composite", "exposure", "pose", "registration", "masked_l1", "masked_ssim",
     "normalised_depth", "smoothness", "laplacian", "matern", "calibration", "adam", "schedule", "density",
     "initialisation", "scene", "render", "objective", "training", "determinism",
 )  # fmt: skip
-"""Operations in the order of an iteration, then those composed of others."""
+"""Files, then the operations without parts in the order of the diagnosis, then those composed of others."""
 MOST_CASES = 4  # listed by name
 
 
@@ -76,7 +76,7 @@ def _along(paths: Sequence[Any]) -> list[str]:
 
 
 def _follows(case: Case, output: str) -> bool:
-    """Whether an output belongs to a trajectory, whose first wrong iteration matters more than its relations."""
+    """Whether an output belongs to a trajectory, of which the first wrong iteration is said, not the relations."""
     return case.outputs[output].order == "iteration" or output.startswith("final_")
 
 
@@ -93,11 +93,15 @@ def first_wrong(cases: Sequence[Case], reports: Sequence[Any]) -> tuple[int, Cas
 
 
 def _direction(mine: Sequence[Any], refused: Sequence[tuple[Any, Any]]) -> str:
-    """Forward, reverse alone, or one output alone."""
+    """Forward, reverse or both, or one output alone; others are right if each was compared."""
     names = {o.name for _, o in refused}
-    everything = {o.name for r in mine for o in r.outputs}
-    if len(names) == 1 and len(everything) > 1:
-        return f"{next(iter(names))} alone; its other outputs are right"
+    others = [o for r in mine for o in r.outputs if o.name not in names]
+    if len(names) == 1 and others:
+        right = all(o.status == "passed" for o in others)
+        return f"{next(iter(names))} alone; " + ("its other outputs are right" if right else "no other output is refused")
     if all(name.startswith("d_") for name in names):
-        return "reverse alone; its forward outputs are right"
+        forward = [o.status for o in others if not o.name.startswith("d_")]
+        right = all(status == "passed" for status in forward)
+        more = "its forward outputs are right" if right else "no forward output is refused"
+        return f"reverse alone; {more}" if forward else "reverse alone"
     return "forward" if not any(name.startswith("d_") for name in names) else "forward and reverse"

@@ -1,6 +1,8 @@
-"""A frequent result of its own: everything is right but needles, which the textbook conic loses to cancellation.
+"""A result with advice of its own: every output that is not right belongs to needles.
 
-In: the cases with their verdicts. Out: how far off the needles are, and the formulas that keep their digits.
+The textbook conic loses digits of slanted needles to cancellation. That a port computes it so is not examined.
+
+In: the outputs that are not right. Out: how far off the needles are, and formulas that keep their digits.
 """
 
 from collections.abc import Iterable
@@ -8,9 +10,10 @@ from typing import NamedTuple
 
 NEEDLE = "needle"  # in the name of a case with long thin Gaussians
 REWRITE = (
-    "The conic as (c dx^2 - 2 b dx dy + a dy^2) / (a c - b^2), usual in CUDA kernels, subtracts nearly equal numbers "
-    "for a needle. Take the determinant as a sum of squares, page (B3): det = e^2 + e sum(M^2) + the sum over k < n of "
-    "(S_k S_n (T_0k T_1n - T_0n T_1k))^2; and the distance as one, page (B5): dy^2 / c + (c / det) (dx - (b / c) dy)^2"
+    "Look at the conic: (c dx^2 - 2 b dx dy + a dy^2) / (a c - b^2) subtracts nearly equal numbers for a slanted "
+    "needle. Take the determinant as a sum of squares, page (B3): det = e^2 + e sum(M^2) + the sum over k < n of "
+    "(S_k S_n (T_0k T_1n - T_0n T_1k))^2, with M = T diag(S), T = J W R and the low-pass e; and the distance as one, "
+    "page (B5): dy^2 / c + (c / det) (dx - (b / c) dy)^2"
 )
 
 
@@ -24,7 +27,7 @@ class Off(NamedTuple):
 
 
 def only_needles(off: Iterable[Off]) -> list[str]:
-    """Two lines if every wrong output belongs to needles, else nothing."""
+    """Two lines if every output that is not right belongs to needles and has a distance, else nothing."""
     off = list(off)
     if not off or any(NEEDLE not in one.case for one in off) or any(one.ratio is None for one in off):
         return []

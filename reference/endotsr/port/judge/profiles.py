@@ -1,7 +1,7 @@
 """Profiles: parts of the method that a port can claim alone, and what is right in each of them, in words.
 
-In: the cases of the vectors, or the verdicts on them. Out: the cases of a profile; one claim for each profile with a
-complete level.
+In: the cases of the vectors, or the verdicts on them. Out: the cases of a profile; one claim for each profile that is
+complete up to a level of its own.
 """
 
 from collections.abc import Iterable, Mapping
@@ -146,7 +146,10 @@ def claim_text(version: str, profile: str, level: int, precision: str, missing: 
 
 
 def profile_claims(graded: Iterable[Graded]) -> list[ProfileClaim]:
-    """What is right, profile by profile; an operation without any verdict belongs to no claim of its levels."""
+    """What is right, profile by profile.
+
+    An operation without any verdict lowers no claim, so for one that a port leaves out, `graded` has a failed verdict.
+    """
     graded, found = list(graded), []
     for name, profile in PROFILES.items():
         counts = {level: (0, 0) for level in LEVELS}

@@ -53,7 +53,10 @@ class Evidence(msgspec.Struct, kw_only=True):
 
     @property
     def score(self) -> float:
-        """From 0 to 1: the fraction of refusals that it explains, reduced if outputs pass that it would change."""
+        """From 0 to 1: the fraction of refusals that it explains.
+
+        It is reduced if outputs pass that the mistake would change, and if no fingerprint agrees.
+        """
         explained = len(self.agrees) + len(self.fits)
         if not explained:
             return 0.0
@@ -212,7 +215,9 @@ class TwoMistakes(NamedTuple):
 def pair_of(evidence: Mapping[str, Evidence]) -> TwoMistakes | None:
     """The pair of mistakes that explains every refused output, if there is one and no other does.
 
-    Each has to be recognised by outputs of its own. Two mistakes in one output have the fingerprint of neither.
+    Each has to be recognised by outputs of its own, and both together may change no more outputs that pass than there
+    are refused ones. Two mistakes in one output have in general the fingerprint of neither. Tried are the MOST_PAIRED
+    mistakes with the most agreeing outputs.
     """
     refused = {n for one in evidence.values() for n in (*one.agrees, *one.fits, *one.differs, *one.unexplained)}
     likely = sorted((f for f, one in evidence.items() if one.agrees), key=lambda f: -len(evidence[f].agrees))

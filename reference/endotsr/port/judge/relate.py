@@ -1,9 +1,9 @@
 """Relations between a wrong array and the expected one, found without a list of mistakes.
 
-In: an output of a port, the expected array, the tolerance, and the other arrays of the case. Out: all relations that
-are satisfied to the tolerance, the most specific first: a factor, a permutation, a sign, a clamp, one index of an axis,
-a constant, a matrix, a factor or a difference that is an array of the case, a region. Each is a fact about the two
-arrays, not necessarily the cause.
+In: an output of a port, the expected array, the tolerance, and the other arrays of the case. Out: the relations that
+are satisfied to some tolerances, the most specific kinds first: a factor, a permutation, a sign, a clamp, indices of an
+axis, a constant, a matrix, a factor or a difference that is an array of the case, a region. Each is a fact about the
+two arrays, not necessarily the cause. Of an output that is not finite, this alone is said.
 """
 
 import math
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from endotsr.port.judge.compare import scale_of
 
-FITS = 4.0  # residual of a relation, in tolerances
+FITS = 4.0  # largest residual of a relation, in tolerances, times the magnitude of its factor above 1
 DIFFERS = 3.0  # smallest difference, in multiples of FITS; below it, relations are indistinguishable from rounding
 SMALLEST_BOARD = 4  # smallest number of rows and columns for a significant alternation
 CLOSE_TO_ONE = 1e-3  # smaller differences of a factor from 1 are printed as such
@@ -75,7 +75,7 @@ class OutputPair:
 def relations(
     got: NDArray, expected: NDArray, kind: str, tolerance: float, others: Mapping[str, NDArray]
 ) -> list[Relation]:
-    """All relations between two arrays of the same shape, the most specific first.
+    """The relations between two arrays of the same shape, the most specific kinds first.
 
     kind, tolerance   as of the rule of the output
     others            the other arrays of the case: inputs, and the expected other outputs
@@ -317,7 +317,7 @@ def _fits_shape(factor: NDArray, pair: OutputPair) -> bool:
 
 
 def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Wrong only under the mask, only on tissue, or only near the border."""
+    """Wrong only at excluded pixels, only at some pixels of the tissue, or only near the border."""
     if pair.got.ndim < 2:
         return
     wrong = np.asarray(pair.wrong.reshape(-1, *pair.wrong.shape[-2:]).any(axis=0))
@@ -335,13 +335,14 @@ def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relati
 
 
 def _parities(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Wrong only on every second row or column, or on a chessboard, as after sampling an image by twos."""
+    """Wrong only on every second row or column, or on one colour of a chessboard, and on more than half of its pixels."""
     if pair.got.ndim < 2 or min(pair.wrong.shape[-2:]) < SMALLEST_BOARD:
         return
     wrong = np.asarray(pair.wrong.reshape(-1, *pair.wrong.shape[-2:]).any(axis=0))
     row, column = np.indices(wrong.shape) % 2
     boards = {"odd rows": row, "even rows": 1 - row, "odd columns": column, "even columns": 1 - column,
-              "pixels whose row and column are one even and one odd": row ^ column}  # fmt: skip
+              "pixels whose row and column are one even and one odd": row ^ column,
+              "pixels whose row and column are both even or both odd": 1 - (row ^ column)}  # fmt: skip
     for text, board in boards.items():
         if not wrong[board == 0].any() and 2 * wrong.sum() > board.sum():
             yield Relation(kind="where", text=f"only at {text}, counted from 0", value=2.0)

@@ -25,7 +25,7 @@ WAYS = (
 
 
 class Golden(NamedTuple):
-    """Cases with files verified against the checksums of the manifest, unless `read_golden` was told not to."""
+    """Manifest and cases; their files were compared with its checksums, unless `read_golden` was told not to."""
 
     folder: Path
     manifest: Manifest
@@ -47,7 +47,7 @@ class Golden(NamedTuple):
 
 @functools.cache
 def _loaded(path: Path) -> NDArray:
-    """The array of a file, read once and read-only."""
+    """The array of a file, read once for the process: a later change of the file is not seen."""
     return read_plain(path)
 
 
@@ -73,7 +73,10 @@ def golden_folder(given: Path | None = None) -> Path:
 
 
 def read_golden(folder: Path, *, verify: bool = True) -> Golden:
-    """Manifest and cases. Raises InputError with the name of a missing, damaged or foreign file."""
+    """Manifest and cases. Raises InputError with the name of a missing or damaged file, or of two versions.
+
+    A file that the manifest does not list is not read, and so not refused.
+    """
     try:
         manifest = read_struct(folder / "manifest.json", Manifest)
         version = read_text(folder / "VERSION").strip()

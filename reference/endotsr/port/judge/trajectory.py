@@ -1,10 +1,10 @@
 """The first wrong iteration of a trajectory, described without a list of mistakes.
 
-In: the first wrong iteration of every output with one entry per iteration, and the settings of the case. Out: this
-iteration, its wrong part, the right parts before it, and the events there or just before.
+In: the first wrong iteration of every wrong output with one entry per iteration, and the settings of the case. Out:
+the lowest of them, its first wrong part, the right parts before it, and the events there or one iteration before.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 PARTS = (
@@ -15,7 +15,7 @@ PARTS = (
     ("parameters", "square_", "the rates and the step"),
 )
 """Parts of an iteration in order of computation: a name, prefixes of its outputs, and the place to look at."""
-CONTROL, CONTROL_CHANGES = "density control", 2  # and the first part that it changes at the end of an iteration
+CONTROL, CONTROL_CHANGES = "density control", 2  # and the index of the first part that it changes
 NEAR = 2  # iterations, from an event on, that mention it
 MOST_NAMES = 3  # outputs listed by name
 
@@ -27,11 +27,14 @@ class FirstWrong(NamedTuple):
     events: list[str]  # events at this iteration or the one before
 
 
-def first_wrong_iteration(wrong: Mapping[str, int], names: Sequence[str], settings: Mapping[str, Any]) -> FirstWrong:
+def first_wrong_iteration(
+    wrong: Mapping[str, int], names: Sequence[str], settings: Mapping[str, Any], absent: Collection[str] = ()
+) -> FirstWrong:
     """The first wrong iteration; without text if there is none.
 
-    wrong   the first wrong iteration by output
-    names   all outputs with one entry per iteration, in the order of the case
+    wrong    the first wrong iteration by output, from 1
+    names    all outputs with one entry per iteration, in the order of the case
+    absent   those that could not be compared: a part with one of them is not called right
     """
     if not wrong:
         return FirstWrong("", [])
@@ -43,8 +46,9 @@ def first_wrong_iteration(wrong: Mapping[str, int], names: Sequence[str], settin
     for k, (_, beginnings, place) in enumerate(PARTS):
         if _some(bad, beginnings):
             place += f" and {CONTROL}" if k >= CONTROL_CHANGES and (f"{CONTROL} ends", first) in near else ""
-            right = ", ".join(part for part, of, _ in PARTS[:k] if _some(names, of))
-            said.append(f"look at {place}" + (f", since {right} are right" if right else ""))
+            right = ", ".join(part for part, of, _ in PARTS[:k] if _some(names, of) and not _some(absent, of))
+            are = "is" if right == "loss" else "are"
+            said.append(f"look at {place}" + (f", since {right} {are} right" if right else ""))
             break
     return FirstWrong("; ".join(said + [f"{event} iteration {k}" for event, k in near]), [event for event, _ in near])
 

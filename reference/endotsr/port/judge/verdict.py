@@ -383,7 +383,8 @@ def _first_wrong(case: Case, found: list[OutputReport]) -> FirstWrong:
     """The first wrong iteration of a trajectory."""
     along = [o for o in found if case.outputs[o.name].order == "iteration"]
     wrong = {o.name: o.index[0] + 1 for o in along if o.index}
-    return first_wrong_iteration(wrong, [o.name for o in along], case.settings)
+    absent = [o.name for o in along if o.status != "passed" and not o.index]
+    return first_wrong_iteration(wrong, [o.name for o in along], case.settings, absent)
 
 
 def _together(found: list[OutputReport]) -> Status:

@@ -1,6 +1,7 @@
-"""Verification of a certificate: the judgement again, and every difference from what the certificate says.
+"""Verification of a certificate: the judgement again, and every difference from the claim of the certificate.
 
-A certificate is a file of another person, so its command is shown and never run: the caller gives the command.
+A certificate is a file of another person, so its command is shown and never run: the caller gives the command. Another
+commit, command or version of the judge is said, and is no difference.
 """
 
 from functools import partial
@@ -61,7 +62,7 @@ def verified(
 
 
 def differences(golden: Golden, given: Certificate, report: Report, command: str) -> list[str]:
-    """What the certificate says and the judgement does not confirm."""
+    """What the certificate says of its claim and the judgement does not confirm; of a port that fails, the claim alone."""
     if not report.passed:
         return [f"claim: the certificate says {given.claim!r}, the judge {report.claim!r}"]
     now = certified(golden, report, port_of(command))
@@ -72,7 +73,7 @@ def differences(golden: Golden, given: Certificate, report: Report, command: str
 
 
 def summary(given: Certificate, command: str, found: list[str]) -> list[str]:
-    """The result for a terminal; another commit or command is named, but is no difference of the claim."""
+    """The result for a terminal; another commit, command or judge is named, but is no difference of the claim."""
     now, notes = port_of(command), []
     if given.port.commit != now.commit:
         notes.append(f"commit: {given.port.commit or 'none'} in the certificate, {now.commit or 'none'} here")
