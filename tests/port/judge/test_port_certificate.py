@@ -2,19 +2,21 @@
 
 import json
 import xml.etree.ElementTree as ET
+from typing import get_args
 
 import pytest
 from made_up_ports import THREE, command, racing, three_functions
-from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.font_manager import findfont
+from matplotlib.ft2font import FT2Font
 
 from endotsr.cli.golden import run
 from endotsr.cli.main import main
 from endotsr.errors import InputError
 from endotsr.port.judge.__main__ import main as judge_main
-from endotsr.port.judge.badge import badge, width, write_badge
+from endotsr.port.judge.badge import LEFT, badge, width, write_badge
 from endotsr.port.judge.certificate import read_certificate, write_certificate
-from endotsr.port.judge.format import schema_text, to_json
+from endotsr.port.judge.format import Precision, schema_text, to_json
+from endotsr.port.judge.profiles import PROFILES
 from endotsr.port.judge.report import write_report
 from endotsr.port.judge.schemas import SCHEMAS
 from endotsr.port.judge.verdict import conclude
@@ -92,10 +94,18 @@ def test_files_of_the_judge_are_written_in_one_step(written, golden, tmp_path, m
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-@pytest.mark.parametrize("text", ["endotsr golden", "4.5, level 2, float32, in part", "4.5, method, level 3, float64"])
-def test_the_letters_of_a_badge_are_not_spread(text):
-    drawn = TextPath((0, 0), text, size=11, prop=FontProperties(family="DejaVu Sans")).get_extents().width
-    assert width(text) == pytest.approx(drawn, rel=0.08)
+TITLES = ["", *(f"{profile.title}, " for profile in PROFILES.values())]
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_the_letters_of_a_badge_are_spread_by_8_percent_at_most_and_never_pressed(title):
+    font = FT2Font(findfont("DejaVu Sans"))
+    font.set_size(11, 72)
+    ends = [f"level {k}, {precision}{less}" for k in range(6) for precision in get_args(Precision)
+            for less in ("", ", in part")]  # fmt: skip
+    for text in (LEFT, *(f"4.5, {title}{end}" for end in ends)):
+        own = sum(font.load_char(ord(letter)).linearHoriAdvance for letter in text) / 65536
+        assert own <= width(text) <= 1.08 * own, text
 
 
 def test_verify_judges_again(written, tmp_path, capsys):

@@ -3,6 +3,9 @@
 The mistakes are those of `habits.toml`; `python tests/port/search/habits.py` judges all of them.
 """
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from habits import EVERY, GOLDEN, MISTAKES, sentences_on
@@ -13,6 +16,7 @@ from endotsr.port.search.images import OF_IMAGES
 from endotsr.port.search.screen import OF_THE_SCREEN
 from endotsr.port.stages.definition import definition_stages
 
+GUIDE = Path(__file__).parents[3] / "docs" / "guides" / "port.md"
 CONVENTIONS = (*OF_THE_SCREEN, *OF_IMAGES)
 FOUND = {
     "three_sigma_ellipse": "the ellipse of 3 sigma",
@@ -54,7 +58,8 @@ def test_a_convention_is_said_in_words_with_its_line(name):
 
 def test_another_threshold_is_said_with_its_interval():
     said = sentences_on(MISTAKES["cutoff_1_over_200"])
-    assert "raster.alpha_cutoff fixed at 0.005 (any number from 0.00" in said[0], said
+    (text,) = re.findall(r"raster\.alpha_cutoff fixed at 0\.005 \(any number from 0\.00.*?\)", said[0])
+    assert text in " ".join(GUIDE.read_text("utf-8").split()), "docs/guides/port.md, A decision at another threshold"
 
 
 @pytest.mark.parametrize("operation", OTHERS)

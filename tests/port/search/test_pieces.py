@@ -120,3 +120,16 @@ def test_a_statement_is_omitted_where_it_stands_in_a_block():
     omitted = [spot for spot in spots(one) if isinstance(spot.node, ast.stmt)]
     assert omitted and all(spot.holders[0][0] is not one.statement for spot in omitted)
     assert list(rewrites(omitted[0].node, [True], False)) == [("pass", 0)]
+
+
+def test_arrays_inside_are_in_the_order_in_which_the_definition_computes_them():
+    names = list(inside.INSIDE["render"])
+    screen = ["point", "jacobian", "t", "mean2d", "covariance2d", "determinant", "conic", "direction"]
+    assert [name for name in names if name in screen] == screen
+    assert list(inside.INSIDE["normalised_depth"]) == ["prior", "largest", "residual"]
+
+
+def test_rewrites_of_values_that_are_not_all_numbers_do_not_end_the_search():
+    node = ast.parse("a + b", mode="eval").body
+    texts = [text for text, _ in rewrites(node, [np.array([1.0, 2.0]), None], False)]
+    assert "np.sqrt(a + b)" in texts

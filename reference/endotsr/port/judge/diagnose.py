@@ -98,7 +98,8 @@ def _direction(mine: Sequence[Any], refused: Sequence[tuple[Any, Any]]) -> str:
     others = [o for r in mine for o in r.outputs if o.name not in names]
     if len(names) == 1 and others:
         right = all(o.status == "passed" for o in others)
-        return f"{next(iter(names))} alone; " + ("its other outputs are right" if right else "no other output is refused")
+        more = "its other outputs are right" if right else "no other output is refused"
+        return f"{next(iter(names))} alone; {more}"
     if all(name.startswith("d_") for name in names):
         forward = [o.status for o in others if not o.name.startswith("d_")]
         right = all(status == "passed" for status in forward)

@@ -335,7 +335,7 @@ def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relati
 
 
 def _parities(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    """Wrong only on every second row or column, or on one colour of a chessboard, and on more than half of its pixels."""
+    """Wrong only on every second row or column, or on one colour of a chessboard, and at more than half of them."""
     if pair.got.ndim < 2 or min(pair.wrong.shape[-2:]) < SMALLEST_BOARD:
         return
     wrong = np.asarray(pair.wrong.reshape(-1, *pair.wrong.shape[-2:]).any(axis=0))

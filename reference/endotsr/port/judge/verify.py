@@ -62,7 +62,7 @@ def verified(
 
 
 def differences(golden: Golden, given: Certificate, report: Report, command: str) -> list[str]:
-    """What the certificate says of its claim and the judgement does not confirm; of a port that fails, the claim alone."""
+    """What the certificate says and the judgement does not confirm; of a port that fails, the claim alone."""
     if not report.passed:
         return [f"claim: the certificate says {given.claim!r}, the judge {report.claim!r}"]
     now = certified(golden, report, port_of(command))

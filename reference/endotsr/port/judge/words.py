@@ -2,7 +2,8 @@
 
 The 64-bit FNV-1a hash of the UTF-8 text is the seed. Number k (from 0) of a seed is the splitmix64 output
 z = seed + (k + 1) 0x9E3779B97F4A7C15, z = (z ^ z >> 30) 0xBF58476D1CE4E5B9, z = (z ^ z >> 27) 0x94D049BB133111EB,
-z ^ z >> 31, all modulo 2^64. These numbers generate the random inputs of the golden cases and the signs of fingerprints.
+z ^ z >> 31, all modulo 2^64. These numbers generate the random inputs of the golden cases and the signs of
+fingerprints.
 """
 
 import numpy as np

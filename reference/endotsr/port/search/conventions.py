@@ -19,8 +19,8 @@ class Convention(NamedTuple):
 
     said: str
     changes: tuple[tuple[str, str, str], ...]
-    """function or constant as `module.name`, its text, and the other text; the text stands there once, after the changes
-    before it"""
+    """function or constant as `module.name`, its text, and the other text; the text stands there once when the changes
+    before it are made"""
 
 
 class ChangedDefinition(NamedTuple):

@@ -123,7 +123,9 @@ def _equally(trial: Trial) -> list[str]:
     said = [f"{hit.text}{f': {hit.where}' if hit.where else ''}" for hit in best.values()]
     first, *others = best.values()
     rest = [
-        f"  or equally with {line}" if hit.whole == first.whole else f"  or with {line}, which gives {hit.extent.rstrip(',')}"
+        f"  or equally with {line}"
+        if hit.whole == first.whole
+        else f"  or with {line}, which gives {hit.extent.rstrip(',')}"
         for line, hit in zip(said[1:], others)
     ]
     if len(best) > MOST_LINES:

@@ -1,6 +1,6 @@
 """Decisions that another program may take for SSIM and the pyramid, each as a change of the definition.
 
-Windows, borders and masks of other libraries. `conventions.py` makes the changes.
+Windows, borders and masks differ between libraries. `conventions.py` makes the changes.
 """
 
 from endotsr.port.search.conventions import Convention

@@ -43,6 +43,8 @@ _LENS = {
     "point": Inner("projection.projection_forward", "np.where(visible, point, 0)"),
     "jacobian": Inner("projection.projection_forward", "np.where(visible, jacobian(point, camera, settings)[0], 0)"),
     "t": Inner("projection.projection_forward", "np.where(visible, np.einsum('ikn,kln->iln', t, shape.rotation), 0)"),
+}
+_CONIC = {
     "determinant": Inner("projection.projection_forward", "values[5]"),
     "conic": Inner("projection.projection_forward", "np.where(visible, np.array([c, -b, a]) / (a * c - b * b), 0)"),
 }
@@ -89,13 +91,13 @@ INSIDE: dict[str, dict[str, Inner]] = {
     "appearance": _inner("appearance.appearance_forward", x="x"),
     "deformation": _inner("deformation.bell", delta="delta", sigma="sigma", basis="returned[2]"),
     "covariance": _UNIT,
-    "projection": _LENS,
+    "projection": _LENS | _CONIC,
     "harmonics": _COLOUR,
     "composite": _BLEND,
-    "render": _UNIT | _LENS | _SCREEN | _COLOUR | _BLEND,
+    "render": _UNIT | _LENS | _SCREEN | _CONIC | _COLOUR | _BLEND,
     "masked_ssim": _inner("masked_ssim.masked_ssim_forward", **_WINDOWED),
     "normalised_depth": _inner(
-        "depth.normalised_depth_forward", largest="largest", prior="target.normalised", residual="residual"
+        "depth.normalised_depth_forward", prior="target.normalised", largest="largest", residual="residual"
     ),
     "laplacian": _inner("laplacian.laplacian_loss_forward", **_LEVELS),
     "pose": _inner("pose.pose_forward", exponential="e"),
@@ -151,7 +153,9 @@ def bisected(stage: Stage, one: Answered) -> list[str]:
         return []
     after = f"; right before it: {', '.join(right)}" if right else ""
     if not wrong:
-        return [f"inside {one.case.name} {', '.join(right)} {'are' if len(right) > 1 else 'is'} right: look at what follows"]
+        return [
+            f"inside {one.case.name} {', '.join(right)} {'are' if len(right) > 1 else 'is'} right: look at what follows"
+        ]
     return [f"inside {one.case.name} the first wrong array is {wrong[0]}{after}"]
 
 

@@ -103,8 +103,8 @@ def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReadi
                 pairs = [(a, b) for b in range(size) for a in range(b)]
                 yield from (_ordered(name, axis, _swapped(size, *pair), f"with {pair} exchanged") for pair in pairs)
             halves = np.arange(size).reshape(2, -1) if size % 2 == 0 else np.arange(size)[None]
-            orders = {"backwards": np.arange(size)[::-1], "with its halves in turns": halves.T.reshape(-1)}
-            orders["with its entries in turns put into halves"] = np.argsort(orders["with its halves in turns"])
+            orders = {"backwards": np.arange(size)[::-1], "with its halves interleaved": halves.T.reshape(-1)}
+            orders["with its even entries before its odd ones"] = np.argsort(orders["with its halves interleaved"])
             for text, order in orders.items():
                 if list(order) != sorted(order):
                     yield _ordered(name, axis, order, text)

@@ -112,7 +112,7 @@ def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tu
 
 def _wrapped(values: Sequence[Any]) -> Iterator[str]:
     """Patterns for values of this kind and shape, without some that would change none of them."""
-    arrays = [np.asarray(value) for value in values]
+    arrays = [np.asarray(value) for value in values if value is not None]
     if any(a.dtype.kind == "f" for a in arrays):
         yield from ("0 * ({})", "-({})", "2 * ({})", "({}) / 2", "({}) ** 2", "1 / ({})")
         yield from ["np.abs({})", "np.maximum({}, 0)"] * any((a < 0).any() for a in arrays)
