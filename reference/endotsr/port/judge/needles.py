@@ -1,6 +1,7 @@
 """A result with advice of its own: every output that is not right belongs to needles.
 
-The textbook conic loses digits of slanted needles to cancellation. The report does not examine whether a port computes it in this way.
+The textbook conic loses digits of slanted needles to cancellation. The report does not examine whether a port computes
+it in this way.
 
 In: the outputs that are not right. Out: how far off the needles are, and formulas that keep their digits.
 """

@@ -149,7 +149,7 @@ def _orders(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relatio
     for axis, size in enumerate(shape):
         order = _order_of(pair, axis) if 1 < size <= LARGEST_PERMUTED else None
         if order is not None:
-            text = f"the entries of axis {axis} stand in another order: {list(order)}"
+            text = f"axis {axis} has the expected entries in the order {list(order)}"
             yield Relation(kind="order", text=text, index=order)
 
 
