@@ -1,6 +1,7 @@
 """What is said of the first wrong operation holds: outputs that are not there are not called right."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from endotsr.port.judge.profiles import Graded, profile_claims
 from endotsr.port.judge.trajectory import first_wrong_iteration
 from endotsr.port.judge.verdict import judge
 
-CASE = SimpleNamespace(name="pose/one", operation="pose", equation="B16", title="one")
+CASE: Any = SimpleNamespace(name="pose/one", operation="pose", equation="B16", title="one")
 TWO = {"rotation": "passed", "d_rotation": "refused", "d_translation": "refused"}
 
 

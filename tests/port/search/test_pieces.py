@@ -4,6 +4,7 @@ import ast
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ STAGES = definition_stages()
 
 def place(module, function):
     module = sys.modules[f"endotsr.definition.{module}"]
+    statement: Any
     (statement,) = (one for one in syntax(module).body if getattr(one, "name", "") == function)
     return Statement(module, statement, frozenset({"forward"}))
 
@@ -100,7 +102,8 @@ def hit(text, whole, function="f"):
 
 def test_changes_that_explain_another_part_are_not_called_equal():
     hits = [hit("a", "forward"), hit("b", "forward"), hit("c", "refused")]
-    lines = sentences(SimpleNamespace(hits=hits, cases=[0, 0]))
+    trial: Any = SimpleNamespace(hits=hits, cases=[0, 0])
+    lines = sentences(trial)
     assert lines[1] == "  or equally with b: definition/b.py:1"
     assert lines[2].startswith("  or with c: definition/c.py:1, which gives every output of those that are refused")
 
@@ -110,8 +113,9 @@ def test_only_arrays_before_the_first_wrong_one_are_said_to_be_right_before_it(m
     got = {**arrays, "second": arrays["second"] * 2 + np.sin(np.arange(6.0))}
     monkeypatch.setattr(inside, "values", lambda stage, one: arrays)
     monkeypatch.setattr(inside, "read_plain", lambda path, root, most: got[path.stem])
-    one = SimpleNamespace(folder=Path("a"), case=SimpleNamespace(name="a/b"), tolerance=1e-9, inputs={})
-    (line,) = bisected(None, one)
+    one: Any = SimpleNamespace(folder=Path("a"), case=SimpleNamespace(name="a/b"), tolerance=1e-9, inputs={})
+    stage: Any = None
+    (line,) = bisected(stage, one)
     assert line.startswith("inside a/b the first wrong array is second: ") and line.endswith("; right before it: first")
 
 
