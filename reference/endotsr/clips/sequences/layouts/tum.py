@@ -108,6 +108,19 @@ def _listed_depth(path: Path, times: np.ndarray, step: float) -> Depth | None:
     return depth_of(paired, step)
 
 
+def _poses(
+    options: SourceOptions, given: list[Path], times: np.ndarray, notes: list[str]
+) -> list[CameraPose | None] | None:
+    """The pose of each picture by the stated trajectory, or else by the first one of the folder; None without one."""
+    where = options.trajectory or next(iter(given), None)
+    if where is None:
+        return None
+    found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
+    others = "".join(f"; not read: {file.name}" for file in given if file != where)
+    notes += [f"poses of {where.name}{others}", *found.notes]
+    return poses_at(found, times, LONGEST)
+
+
 def describe_tum(path: Path, options: SourceOptions) -> Clip:
     """The folder as a clip. Raises InputError."""
     times, files = read_list(path / LIST)
@@ -115,7 +128,8 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     if pairs := [file.name for file in visible_files(path, "associat*.txt")]:
         notes.append(f"{shortened(pairs)}: not read; pictures, depth and poses are paired by their times")
     width, height = size_of(files)
-    camera, notes = stated_camera(options, width, height, path), notes + picture_notes(files)
+    camera = stated_camera(options, width, height, path)
+    notes += picture_notes(files)
     given = [path / name for name in TRAJECTORIES if (path / name).is_file()]
     settings = next((file for file in visible_files(path, "*.yaml") if SETTINGS in read_text(file)), None)
     if camera.intrinsics is None and settings is not None:
@@ -124,13 +138,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     if camera.intrinsics is None and (width, height) == (640, 480):
         camera = StatedCamera(Intrinsics(*DEFAULT, width, height))
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")
-    poses: list[CameraPose | None] | None = None
-    where = options.trajectory or next(iter(given), None)
-    if where is not None:
-        found = read_trajectory(where, options.trajectory_unit or "m", options.direction).in_seconds()
-        poses = poses_at(found, times, LONGEST)
-        others = "".join(f"; not read: {file.name}" for file in given if file != where)
-        notes += [f"poses of {where.name}{others}", *found.notes]
+    poses = _poses(options, given, times, notes)
     planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
     steps_of_depth = _depth_steps(settings, notes) if planes and options.depth is None else STEPS
     steps = np.diff(times)
