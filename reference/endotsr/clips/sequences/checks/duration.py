@@ -43,7 +43,8 @@ SERIAL = 1.7  # time of an iteration on one thread over that on several; the oth
 READ = 0.25  # units per frame: decoding, checks
 TRACKED, TRACKED_POINTS = 0.8, 7.5e-6  # units per training frame for the initial motion, and for each of its points
 FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
-MEASURED, PERCEIVED = 1.2, 2.7  # units per picture for its metrics, and for LPIPS
+MEASURED, PERCEIVED = 1.15, 2.2  # units per picture for its metrics, and for LPIPS
+TOGETHER = 0.8  # time of these with several threads, two pictures at a time, over that on one: 0.75 was measured
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
 PAGES = 0.0038  # units per Gaussian for the viewer, the report and the renders
 EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
@@ -283,6 +284,7 @@ def evaluation_units(plan: TimedCommand) -> float:
     if plan.perceived is None:
         return 0.0
     pictures = plan.frames.held_out * METHODS * (MEASURED + PERCEIVED * plan.perceived)
+    pictures *= TOGETHER if plan.threads > 1 else 1.0
     pictures += MEASURED * plan.frames.training / EVERY_TRAINING_FRAME + COMPARED * plan.frames.compared
     return PAGES * gaussians_at_end(plan.config) + plan.pixels / PIXELS * pictures
 
