@@ -130,14 +130,27 @@ def test_a_gains_by_colour_alone():
     assert abs(mean) < half
 
 
-def test_an_exposure_does_not_do_what_a_does():
-    """The sentences on `light`; its base is that of the other sweep, and A stands in the record of the claims."""
-    rows, others = sweeps.rows_of(FILES["light"]), sweeps.rows_of(FILES["frozen_geometry"])
-    base = [[row for row in found if row["configuration"] == "base"] for found in (rows, others)]
-    assert base[0] == base[1] and configurations("light")["base"] == configurations("frozen_geometry")["base"]
+@pytest.mark.parametrize(("clip", "gain", "without"), [("pulling", "A", "base"), ("cutting", "A+S", "S")])
+def test_an_exposure_does_not_do_what_a_does(clip, gain, without):
+    """The sentences on `light`: no gain on either clip, and A, or A beside S, gains more in every seed."""
+    rows = [row for row in sweeps.rows_of(FILES["light"]) if row["sequence"] == f"endonerf_{clip}"]
     exposure = sweeps.differences(rows, "exposure", "base", "psnr_full")
     mean, half = interval(exposure)
     assert len(exposure) == 3 and abs(mean) < half
-    stored = json.loads((RESULTS / "ablation_pulling.json").read_text(encoding="utf-8"))["rows"]
+    stored = json.loads((RESULTS / f"ablation_{clip}.json").read_text(encoding="utf-8"))["rows"]
     psnr = {(row["configuration"], row["seed"]): row["psnr_full"] for row in stored}
-    assert all(psnr["A", seed] - psnr["base", seed] > exposure[seed] for seed in range(3))
+    assert all(psnr[gain, seed] - psnr[without, seed] > exposure[seed] for seed in range(3))
+
+
+def test_the_bases_of_light_are_those_of_other_records():
+    """On pulling that of `frozen_geometry`, on cutting that of the claims: the settings are equal."""
+    bases = {
+        clip: [row for row in sweeps.rows_of(FILES["light"]) if (row["sequence"], row["configuration"]) == (clip, "base")]
+        for clip in ("endonerf_pulling", "endonerf_cutting")
+    }
+    frozen = [row for row in sweeps.rows_of(FILES["frozen_geometry"]) if row["configuration"] == "base"]
+    assert bases["endonerf_pulling"] == frozen
+    assert configurations("light")["base"] == configurations("frozen_geometry")["base"]
+    stored = json.loads((RESULTS / "ablation_cutting.json").read_text(encoding="utf-8"))["rows"]
+    psnr = {row["seed"]: row["psnr_full"] for row in stored if row["configuration"] == "base"}
+    assert {row["seed"]: row["psnr_full"] for row in bases["endonerf_cutting"]} == psnr
