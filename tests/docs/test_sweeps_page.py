@@ -145,7 +145,9 @@ def test_an_exposure_does_not_do_what_a_does(clip, gain, without):
 def test_the_bases_of_light_are_those_of_other_records():
     """On pulling that of `frozen_geometry`, on cutting that of the claims: the settings are equal."""
     bases = {
-        clip: [row for row in sweeps.rows_of(FILES["light"]) if (row["sequence"], row["configuration"]) == (clip, "base")]
+        clip: [
+            row for row in sweeps.rows_of(FILES["light"]) if (row["sequence"], row["configuration"]) == (clip, "base")
+        ]
         for clip in ("endonerf_pulling", "endonerf_cutting")
     }
     frozen = [row for row in sweeps.rows_of(FILES["frozen_geometry"]) if row["configuration"] == "base"]

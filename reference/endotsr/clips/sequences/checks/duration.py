@@ -44,9 +44,10 @@ READ = 0.25  # units per frame: decoding, checks
 TRACKED, TRACKED_POINTS = 0.8, 7.5e-6  # units per training frame for the initial motion, and for each of its points
 FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
 MEASURED, PERCEIVED = 1.15, 2.2  # units per picture for its metrics, and for LPIPS
-TOGETHER = 0.8  # time of these with several threads, two pictures at a time, over that on one: 0.75 was measured
+TOGETHER = 0.8  # factor of both with several threads, which measure two pictures at a time
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
-PAGES = 0.0038  # units per Gaussian for the viewer, the report and the renders
+# Units per Gaussian for the viewer, the report and the renders: 0.0011 were measured on two threads, 0.0026 on one.
+PAGES = 0.0015
 EVERY_TRAINING_FRAME = 6  # one training frame of these is evaluated, without LPIPS
 # Frames whose motion is compared with a known truth. The number of pairs would grow with the square of the clip: 300
 # frames would have 44 * 299.
