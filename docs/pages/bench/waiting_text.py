@@ -83,15 +83,8 @@ def about(rows: list[dict[str, Any]]) -> str:
     sizes, clocks = sorted({row["size"] for row in rows}), sorted({CLOCKS[row["clock"]] for row in rows})
     machines = sorted({row["processor"] for row in rows})
     after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
-    former = max((row["date"] for row in rows if row.get("passes", PASSES) > 1), default="")
-    note = (
-        ""
-        if not former
-        else (
-            f" It is of rows with the present evaluation; the others, of {former} or before, made three passes over the"
-            " held-out frames."
-        )
-    )
+    several = any(row.get("passes", PASSES) > 1 for row in rows)
+    note = " It is of rows whose evaluation made one pass over the held-out frames; the others made three." * several
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "

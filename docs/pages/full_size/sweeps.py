@@ -78,13 +78,15 @@ def rows_of(file: Path) -> list[Row]:
 
 
 def differences(rows: list[Row], configuration: str, to: str, metric: str) -> list[float]:
-    """The differences of a metric between two configurations, one for each seed that both have.
+    """The differences of a metric between two configurations, one for each clip, split and seed that both have.
 
     Raises: InputError if the two runs of a pair read different frames.
     """
-    found = {(row["configuration"], row["seed"]): row for row in rows}
+    found = {_run(row): row for row in rows}
     pairs = [
-        (row, found[to, seed]) for (name, seed), row in found.items() if name == configuration and (to, seed) in found
+        (row, other)
+        for (*place, name, seed), row in found.items()
+        if name == configuration and (other := found.get((*place, to, seed)))
     ]
     for row, other in pairs:
         if row["arrays_sha256"] != other["arrays_sha256"]:

@@ -226,7 +226,7 @@ def test_what_a_replaced_folder_loses_is_noted(tmp_path, capsys):
     assert main(["prepare", str(tmp_path / "raw"), "--out", str(tmp_path / "clip"), "--replace", *camera]) == 0
     said = capsys.readouterr().out
     for what in ("masks", "depth", "poses"):
-        assert f"the replaced folder had {what} (" in said and f"`endotsr {what}` makes them again" in said
+        assert f"the replaced folder had {what} (" in said and f"`endotsr {what}` makes new ones" in said
 
 
 def broken(clip, what):

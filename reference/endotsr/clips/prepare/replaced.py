@@ -26,7 +26,7 @@ def lost_notes(before: SequenceFile | None, found: SequenceFile) -> list[str]:
         "poses": before.poses and not found.poses and before.poses.origin,
     }
     return [
-        f"the replaced folder had {what} ({origin}), this one has none: `endotsr {what}` makes them again"
+        f"the replaced folder had {what} ({origin}), this one has none; `endotsr {what}` makes new ones"
         for what, origin in had.items()
         if origin
     ]

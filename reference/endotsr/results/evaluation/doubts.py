@@ -39,9 +39,8 @@ def doubt(sequence: Sequence, read: Callable[[int], FloatArray]) -> str:
     if remark := turned_remark(read, sequence):
         return remark
     held_out = [int(i) for i in sequence.test_index if sequence.masks[i].any()]
-    errors = {
-        name: np.zeros(2) for name in (LINEAR, *STEPS)
-    }  # squared, of all pictures: without the change, and with it
+    # squared, of all pictures: without the change, and with it
+    errors = {name: np.zeros(2) for name in (LINEAR, *STEPS)}
     equal, grey, coloured, thinned = [], bool(held_out), False, {}
     for i in held_out:
         picture = np.asarray(read(i), np.float32)

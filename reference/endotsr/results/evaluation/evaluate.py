@@ -9,7 +9,7 @@ A frame without tissue has no metrics.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import cast
 
@@ -77,14 +77,11 @@ def evaluate_methods(
     for index in (int(i) for i in indices):
         truth = _Truth(sequence, index, lpips_weights, seen)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
-        names = list(methods)
-        for pair in (names[k : k + AT_A_TIME] for k in range(0, len(names), AT_A_TIME)):
-            renders = [truth.checked(methods[name](index)) for name in pair]
-            for name, found in zip(pair, parallel_calls(*(partial(truth.metrics, render) for render in renders))):
-                values = {key: _finite(value) for key, value in found.items()}
-                if truth.mask.any():
-                    bad[name] += sum(values[key] is None and found[key] is not None for key in found)
-                rows[name].append(cast(FrameMetrics, about | values))
+        for name, found in truth.of_methods(methods):
+            values = {key: _finite(value) for key, value in found.items()}
+            if truth.mask.any():
+                bad[name] += sum(values[key] is None and found[key] is not None for key in found)
+            rows[name].append(cast(FrameMetrics, about | values))
     return {name: measured_rows(rows[name], bad[name]) for name in methods}
 
 
@@ -203,14 +200,22 @@ class _Truth:
         self._weights = weights if usable else None
         self._maps = {key: self._features(self._image, how) for key, how in LPIPS_KEYS.items()} if usable else {}
 
-    def checked(self, render: FloatArray) -> FloatArray:
+    def of_methods(self, methods: Mapping[str, RenderFrame]) -> Iterator[tuple[str, Means]]:
+        """Name and metrics of each method; AT_A_TIME renders are measured at once."""
+        names = list(methods)
+        for k in range(0, len(names), AT_A_TIME):
+            some = names[k : k + AT_A_TIME]
+            renders = [self._checked(methods[name](self.index)) for name in some]
+            yield from zip(some, parallel_calls(*(partial(self._metrics, render) for render in renders)), strict=True)
+
+    def _checked(self, render: FloatArray) -> FloatArray:
         """The render as an array. Raises ValueError unless it has the shape of the frame."""
         render = np.asarray(render)
         if render.shape != self._image.shape:
             raise ValueError(f"frame {self.index}: the render is {render.shape}, the frame {self._image.shape}")
         return render
 
-    def metrics(self, render: FloatArray) -> Means:
+    def _metrics(self, render: FloatArray) -> Means:
         """Every metric of a render; inf and nan as `image_metrics`."""
         found = image_metrics(render, self._image, self.mask) | self._distances(render)
         if self._seen is not None:

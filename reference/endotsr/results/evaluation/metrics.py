@@ -71,8 +71,7 @@ def image_metrics(render: FloatArray, truth: FloatArray, mask: BoolArray) -> dic
     pictures = {"": (np.clip(render, 0.0, 1.0), truth), "_8bit": (round_8bit(render), round_8bit(truth))}
     found = {}
     for ending, (seen, wanted) in pictures.items():
-        both = zip(("psnr_full", "psnr_tissue"), _both_psnr(seen, wanted, mask), strict=True)
-        found |= {name + ending: value for name, value in both}
+        found["psnr_full" + ending], found["psnr_tissue" + ending] = _both_psnr(seen, wanted, mask)
         found["ssim_full" + ending] = ssim_full(seen, wanted, mask)
         found["ssim_tissue" + ending] = ssim_tissue(seen, wanted, mask)
     return found

@@ -1,7 +1,7 @@
 """Films: a series of pictures as one mp4, webm or gif file, written atomically.
 
-In: pictures of one size. Out: a file. mp4 uses H.264, which browsers, PowerPoint and QuickTime play, or VP9 if FFmpeg
-has no encoder of H.264; webm uses VP9; gif has 256 colours and needs no FFmpeg.
+In: pictures of one size. Out: a file. mp4 uses H.264, or VP9 if FFmpeg has no encoder of H.264; webm uses VP9; gif has
+256 colours and needs no FFmpeg.
 """
 
 from collections.abc import Iterable, Iterator

@@ -25,9 +25,8 @@ class Setting(NamedTuple):
     kernels: Callable[[], AbstractContextManager[object]] = nullcontext  # context of every frame
 
 
-CLOSE = EXACT._replace(
-    support="ellipse", alpha_cutoff=1e-9, alpha_max=1 - 2**-20
-)  # exact except for the cutoff and the clamp of alpha
+# exact except for the cutoff and the clamp of alpha
+CLOSE = EXACT._replace(support="ellipse", alpha_cutoff=1e-9, alpha_max=1 - 2**-20)
 ACCURATE = Setting(raster=CLOSE)
 CUTOFFS = {"1e-12": 1e-12, "1e-9": 1e-9, "1e-7": 1e-7, "1e-5": 1e-5, "1e-4": 1e-4, "1/1024": 1 / 1024, "1/255": 1 / 255,
            "1/64": 1 / 64}  # fmt: skip

@@ -142,8 +142,8 @@ def frame_texts(path: Path) -> list[tuple[str, str | bytes]]:
 def _refuse_member(archive: Path, member: tarfile.TarInfo, twice: bool) -> None:
     """Raises InputError for a file that is too large for one frame, or whose name another folder there has too."""
     if member.size > LARGEST_FILE:
-        raise InputError(f"{archive}: {plain_line(member.name)} is larger than {LARGEST_FILE >> 20} MiB; allowed: JSON"
-                         " of one frame")  # fmt: skip
+        most = f"{LARGEST_FILE >> 20} MiB"
+        raise InputError(f"{archive}: {plain_line(member.name)} is larger than {most}; allowed: JSON of one frame")
     if twice:
         raise InputError(f"{archive}: {plain_line(member.name)}: two files have this name; allowed: one per frame")
 

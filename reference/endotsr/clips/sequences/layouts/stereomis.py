@@ -63,8 +63,16 @@ def describe_stereomis(path: Path, options: SourceOptions) -> Clip:
         masks = masks_of(files, "black", camera.width, camera.height)
     elif masks is None:
         notes.append(f"{MASKS}/ is missing: every pixel counts as tissue")
-    return replace(clip, layout="stereomis", where=path, masks=masks, unit="mm", notes=notes,
-                   inside=inside, read_here=(videos[0].name.lower(),))  # fmt: skip
+    return replace(
+        clip,
+        layout="stereomis",
+        where=path,
+        masks=masks,
+        unit="mm",
+        notes=notes,
+        inside=inside,
+        read_here=(videos[0].name.lower(),),
+    )
 
 
 def _overridden(path: Path, options: SourceOptions) -> list[str]:
