@@ -156,3 +156,14 @@ def test_the_bases_of_light_are_those_of_other_records():
     stored = json.loads((RESULTS / "ablation_cutting.json").read_text(encoding="utf-8"))["rows"]
     psnr = {row["seed"]: row["psnr_full"] for row in stored if row["configuration"] == "base"}
     assert {row["seed"]: row["psnr_full"] for row in bases["endonerf_cutting"]} == psnr
+
+
+def test_differences_of_two_clips_are_not_mixed():
+    """Equal configurations and seeds of two clips are six pairs, not three."""
+    rows = sweeps.rows_of(FILES["light"])
+    of_clips = [
+        sweeps.differences([row for row in rows if row["sequence"] == clip], "exposure", "base", "psnr_full")
+        for clip in ("endonerf_cutting", "endonerf_pulling")
+    ]
+    together = sweeps.differences(rows, "exposure", "base", "psnr_full")
+    assert sorted(together) == sorted([*of_clips[0], *of_clips[1]]) and len(together) == 6
