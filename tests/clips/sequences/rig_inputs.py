@@ -126,7 +126,7 @@ def in_microseconds(text: str) -> str:
 MISSING = slice(None, -1)
 RIG_ROWS = [
     Row("EuRoC, mav0/ with one camera and the ground truth", rig(), "told",
-        "with T_BS of cam0 those of the camera", true_rig),
+        "its poses and the T_BS of both sensors", true_rig),
     Row("EuRoC, a pair of cameras", rig(second=True), "told", "rectified: baseline 4 mm",
         lambda folder: true_rig(folder, baseline=4.0)),
     Row("EuRoC, mav0/ itself, further sensors", lambda folder: [word.replace("/raw", "/raw/mav0") for word in

@@ -58,6 +58,22 @@ def test_files_of_stereomis_that_an_option_replaces_are_noted(tmp_path):
     assert not any(note.startswith("masks: not read") for note in notes)  # the same folder, which is read
 
 
+OWN = {  # layouts with masks or depth of their own: the option, the files that it states, and the part that it replaces
+    "nerfstudio": (made.nerfstudio, "masks", "raw/masks", "mask_path"),
+    "tum": (raw.tum, "depth", "raw/depth", "depth.txt"),
+    "hamlyn": (lambda folder: made.hamlyn(folder, ("color", "depth")), "depth", "raw/depth", "depth of the source"),
+}
+
+
+@pytest.mark.parametrize("layout", OWN)
+def test_masks_or_depth_that_an_option_replaces_are_noted(layout, tmp_path):
+    make, option, folder, part = OWN[layout]
+    make(tmp_path / "raw")
+    note = f"{part}: not read, because --{option} is stated"
+    assert note not in describe(tmp_path / "raw").notes
+    assert note in describe(tmp_path / "raw", SourceOptions(**{option: tmp_path / folder})).notes
+
+
 def test_what_a_trajectory_of_tum_says_about_itself_is_noted(tmp_path):
     raw.tum(tmp_path / "raw")
     path = tmp_path / "raw/groundtruth.txt"

@@ -278,7 +278,9 @@ def test_stated_masks_of_points_have_the_stated_polarity(tmp_path, excluded):
         write_png(file, tool)
     assert describe(tmp_path / "raw").masks(0).mean() == 0.25
     stated = SourceOptions(masks=tmp_path / "other.png", excluded_value=excluded)
-    assert describe(tmp_path / "raw", stated).masks(0).mean() == (0.75 if excluded == "white" else 0.25)
+    clip = describe(tmp_path / "raw", stated)
+    assert clip.masks(0).mean() == (0.75 if excluded == "white" else 0.25)
+    assert "mask.png: not read, because --masks is stated" in clip.notes
 
 
 def test_the_times_of_transforms_give_a_rate(tmp_path):

@@ -186,7 +186,7 @@ def stated_depth(
 
 
 def with_stated(clip: Clip, options: SourceOptions) -> Clip:
-    """The clip with its masks and depth replaced by those of `--masks` and `--depth`, if stated.
+    """The clip with its masks and depth replaced by those of `--masks` and `--depth`, if stated, and a note on each.
 
     Raises:  InputError for files that do not match its frames, or if only one of depth and clip is in millimetres.
     """
@@ -197,7 +197,16 @@ def with_stated(clip: Clip, options: SourceOptions) -> Clip:
     depth = stated_depth(options, frames, clip.source_names)
     if depth is not None and (options.depth_unit == ARBITRARY) != clip.arbitrary:
         raise InputError(f"{clip.where}: --depth-unit {options.depth_unit} with the unit {clip.unit}")
-    return replace(clip, masks=masks or clip.masks, depth=depth or clip.depth)
+    notes = [
+        *(replaced("masks of the source", "masks") if masks and clip.masks else []),
+        *(replaced("depth of the source", "depth") if depth and clip.depth else []),
+    ]
+    return replace(clip, masks=masks or clip.masks, depth=depth or clip.depth, notes=[*clip.notes, *notes])
+
+
+def replaced(part: str, option: str) -> list[str]:
+    """The note on a part of a source in whose place an option states another file."""
+    return [f"{part}: not read, because --{option} is stated"]
 
 
 def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> StatedCamera:

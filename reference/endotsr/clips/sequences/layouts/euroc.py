@@ -159,7 +159,7 @@ def _poses(body: Path, options: SourceOptions, times: np.ndarray, notes: list[st
     # x_sensor = sensor^-1 camera x_camera, and world-to-camera is its inverse after world-to-sensor.
     turn = sensor.rotation.T @ camera.rotation
     back = inverse_pose(turn, 1000.0 * sensor.rotation.T @ (camera.shift - sensor.shift))
-    notes.append(f"{TRUTH}: poses of the body, and with T_BS of cam0 those of the camera; {'; '.join(found.notes)}")
+    notes.append(f"{TRUTH}: its poses and the T_BS of both sensors give the poses of cam0; {'; '.join(found.notes)}")
     timed = found._replace(stamps=found.stamps * 1e-9)
     return [
         pose and CameraPose(back.rotation @ pose.rotation, back.rotation @ pose.translation + back.translation)

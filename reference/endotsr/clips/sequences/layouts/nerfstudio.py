@@ -31,7 +31,7 @@ from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, size_of, stated_masks
+from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, replaced, size_of, stated_masks
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -143,6 +143,8 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
     if masks is None and any(masked):
         masks = masks_of(masked, "black", width, height)
+    elif any(masked):
+        notes += replaced("mask_path", "masks")
     unit = options.trajectory_unit or ARBITRARY
     factor, applied = scene_factor(unit), _applied_scale(data, file, notes)
     depth = depth_of(planes, DEPTH_STEP * factor * applied) if any(planes) else None

@@ -15,7 +15,7 @@ from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import masks_of, pictures_from_files, size_of, stated_masks
+from endotsr.clips.sequences.sources import masks_of, pictures_from_files, replaced, size_of, stated_masks
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.arrays import read_npz
@@ -63,19 +63,24 @@ def describe_points(path: Path, options: SourceOptions) -> Clip:
     ]
     mask = path / "mask.png"
     inside = masks_of([mask] * len(frames), "black", width, height) if mask.is_file() else None
+    masks = stated_masks(options, frames, width, height)
+    notes = replaced(mask.name, "masks") if masks and inside else []
     visible, points = found["visible"].astype(bool), found["points"].astype(np.float64)
     return Clip(
         layout="points",
         where=path,
         names=[file.stem for file in frames],
         pictures=pictures_from_files(frames, []),
-        masks=stated_masks(options, frames, width, height) or inside,
+        masks=masks or inside,
         points=lambda i: points[visible[:, i]],
         unit=ARBITRARY,
         intrinsics=intrinsics_of_matrix(found["K"], width, height, where=where),
         poses=poses,
         rate=options.rate,
-        notes=[f"{CAMERAS}: {counted(len(points), 'point')}, on average {visible.sum(axis=0).mean():.0f} in a frame"],
+        notes=[
+            f"{CAMERAS}: {counted(len(points), 'point')}, on average {visible.sum(axis=0).mean():.0f} in a frame",
+            *notes,
+        ],
     )
 
 

@@ -23,6 +23,7 @@ from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     depth_of,
     pictures_from_files,
+    replaced,
     size_of,
     stated_camera,
     stated_depth,
@@ -140,6 +141,8 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         notes.append("no --camera: the intrinsics recommended by the authors of the layout")
     poses = _poses(options, given, times, notes)
     planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
+    if planes and options.depth is not None:
+        notes += replaced(DEPTH_LIST, "depth")
     steps_of_depth = _depth_steps(settings, notes) if planes and options.depth is None else STEPS
     steps = np.diff(times)
     return Clip(
