@@ -138,13 +138,10 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     files, entries = [files[i] for i in order], [entries[i] for i in order]
     width, height = size_of(files)
     cameras = [read_intrinsics(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)]
-    masks = stated_masks(options, files, width, height)
     masked, planes = ([_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
-    if masks is None and any(masked):
-        masks = masks_of(masked, "black", width, height)
-    elif any(masked):
-        notes += replaced("mask_path", "masks")
+    masks = stated_masks(options, files, width, height)
+    notes += replaced("mask_path", "masks") if masks and any(masked) else []
     unit = options.trajectory_unit or ARBITRARY
     factor, applied = scene_factor(unit), _applied_scale(data, file, notes)
     depth = depth_of(planes, DEPTH_STEP * factor * applied) if any(planes) else None
@@ -156,7 +153,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         where=path,
         names=[name.stem for name in files],
         pictures=pictures_from_files(files, []),
-        masks=masks,
+        masks=masks or (masks_of(masked, "black", width, height) if any(masked) else None),
         depth=depth,
         points=None if cloud is None else lambda i: cloud * (factor * applied),
         unit=ARBITRARY if unit == ARBITRARY else "mm",
