@@ -2,7 +2,8 @@
 
 In: the dictionary of metrics.json, or the rows of `evaluation.compare.compare`. Out: a table of means and paired
 differences; or a CSV file (RFC 4180 but for lines that end with LF alone, `.` in numbers, an empty cell for no value)
-with one row per method and frame or per method and metric. Its numbers have all digits and are read back exactly.
+with one row per method and frame or per method and metric. Its numbers have all digits and are read back exactly. A text
+that a spreadsheet would compute, `=1+1` as the name of a method, has an apostrophe before it.
 """
 
 import csv
@@ -17,6 +18,7 @@ from endotsr.results.report.tables import fixed, plain
 
 METRICS = {key: (label, digits) for key, label, digits in TABLE}
 FRAME = ("frame", "name", "time")
+FORMULA = tuple("=+-@\t\n")  # a spreadsheet computes a text that begins so, also inside quotation marks
 COMPARED = ("method", "metric", "mean", "difference", "low", "high", "frames_better", "frames", "extrapolated")
 
 
@@ -76,9 +78,16 @@ def comparison_csv(rows: Iterable[Row]) -> str:
 
 
 def csv_text(columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """A header and rows; None is an empty cell, floats have all digits."""
+    """A header and rows; None is an empty cell, floats have all digits, no text is a formula."""
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+    writer.writerows(map(_cell, row) for row in rows)
     return out.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, str):
+        value = value.replace("\r", "\n")  # the writer puts no quotation marks around a lone CR, which ends a row
+        return f"'{value}" if value.startswith(FORMULA) else value
+    return "" if value is None else value
