@@ -122,6 +122,11 @@ class Remote:
             clickCount=count, pointerType=pointer,
         )  # fmt: skip
 
+    def touch(self, kind: str, *points: tuple[float, float]) -> None:
+        """One event of all fingers that touch the window: `touchStart`, `touchMove` or `touchEnd`."""
+        fingers = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        self._send("Input.dispatchTouchEvent", type=kind, touchPoints=fingers)
+
     def click(self, x: float, y: float) -> None:
         """Press and release."""
         self.mouse("Pressed", x, y)

@@ -11,6 +11,7 @@ const TINT = {instrument: "#00c98d", never: "#e8a317"};
 const CLOSE = 9, FREEHAND = 4, SPACING = 2, SNAP = 5;
 const AROUND = 310; // px of the window for the title above the picture, and for the text and the frames below it
 const MOST_ZOOM = 16, MOST_UNDO = 300, LEAST_NODES = 12;
+const MOST_POINTS = 5000;  // of a shape in the file that the package reads
 const ORIGINS = {colour: "Draft by colour", carried: "Draft carried from the drawn frames"};
 const canvas = element("picture"), context = canvas.getContext("2d");
 
@@ -37,7 +38,7 @@ function commit(next) {
   state = next;
   refresh();
 }
-function add(shape) { commit(changed([...shapesOf(state, kind), shape])); }
+function add(...shapes) { commit(changed([...shapesOf(state, kind), ...shapes])); }
 const rounded = (points) => points.map(([x, y]) => [Math.round(x * 100) / 100, Math.round(y * 100) / 100]);
 
 // ---------------------------------------------------------------- pictures and masks
@@ -183,7 +184,7 @@ const apart = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
 // ---------------------------------------------------------------- tools: press, move, release
 let pressed = null;  // where, and whether it has become a drag
 function press(point) {
-  pressed = {point, drag: false, begins: open === null};
+  pressed = {point, drag: false, begins: open === null, open: open && [...open]};
   if (tool === "adjust") take(point);
   else if (tool !== "polygon") {
     stroke = {tool: "brush", erase: tool === "eraser", radius, points: [point], origin: "drawn"};
@@ -207,9 +208,9 @@ function move(point) {
 }
 function release() {
   if (stroke) {
-    const finished = {...stroke, points: rounded(stroke.points)};
+    const finished = pieces({...stroke, points: rounded(stroke.points)});
     stroke = null;
-    add(finished);
+    if (!finished[0].erase || shapesOf(state, kind).length) add(...finished);  // on an empty frame nothing is erased
   } else if (held) {
     const {index, points} = held;
     held = null;
@@ -218,8 +219,21 @@ function release() {
   pressed = null;
   paint();
 }
+function pieces(drawn) {  // a stroke in parts of at most MOST_POINTS, each of which begins where the last one ends
+  const found = [];
+  for (let i = 0; i === 0 || i < drawn.points.length - 1; i += MOST_POINTS - 1)
+    found.push({...drawn, points: drawn.points.slice(i, i + MOST_POINTS)});
+  return found;
+}
+function thinned(points) {  // at most MOST_POINTS corners: every second one, until they are few enough
+  return points.length > MOST_POINTS ? thinned(points.filter((_, i) => i % 2 === 0)) : points;
+}
+function settle() {  // what is being drawn belongs to the frame, the kind and the tool with which it began
+  release();
+  if (open) close();
+}
 function close() {
-  const points = open && rounded(open);
+  const points = open && thinned(rounded(open));
   open = null;
   if (points && points.length > 2) add({tool: "polygon", erase: false, points, origin: "drawn"});
   paint();
@@ -269,7 +283,7 @@ function moved(points, field) {
   const kept = (value, size, shift) => (onBorder(value, size) ? value : value + shift);
   return rounded(points.map((p) => inside([kept(p[0], width, by(p)[0]), kept(p[1], height, by(p)[1])])));
 }
-function affine(nodes) {  // least squares of both displacements; null if it would change the size by more than a third
+function affine(nodes) {  // least squares of both displacements; null if one changes by more than 1/3 px per px
   const mean = (f) => nodes.reduce((sum, n) => sum + f(n), 0) / nodes.length;
   const mx = mean((n) => n[0]), my = mean((n) => n[1]);
   const xx = mean((n) => (n[0] - mx) ** 2), yy = mean((n) => (n[1] - my) ** 2);
@@ -298,7 +312,7 @@ function copy(direction) {
   }
   kind = "instrument";
   if (shapes.length) commit(changed([...state.frames[at].shapes, ...shapes]));
-  else noInstrument();
+  else if (!state.frames[at].shapes.length) noInstrument();
 }
 function useDraft() {
   const draft = draftOf();
@@ -317,7 +331,7 @@ function text() {
   return JSON.stringify({format: about.format, frames: about.count, width, height, keys, never: state.never}) + "\n";
 }
 function save() {
-  if (open) close();
+  settle();
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([text()], {type: "application/json"}));
   link.download = "keys.json";
@@ -326,7 +340,7 @@ function save() {
   saved = state;
   refresh();
 }
-window.addEventListener("beforeunload", (event) => { if (state !== saved) event.preventDefault(); });
+window.addEventListener("beforeunload", (event) => { if (state !== saved || open || stroke) event.preventDefault(); });
 
 // ---------------------------------------------------------------- buttons and text
 const strip = frames.map((f, i) => {
@@ -334,7 +348,7 @@ const strip = frames.map((f, i) => {
   const name = document.createElement("span"), said = document.createElement("span");
   image.src = f.picture;
   image.alt = "";
-  name.textContent = f.name;
+  name.textContent = button.title = f.name;
   said.className = "state";
   button.append(image, name, said);
   onClick(button, () => show(i));
@@ -343,7 +357,7 @@ const strip = frames.map((f, i) => {
 });
 function show(i) {
   if (i < 0 || i >= frames.length) return;
-  if (open) close();
+  settle();
   at = i;
   const {button} = strip[i], row = element("strip"), left = button.offsetLeft - row.offsetLeft;
   const least = left + button.offsetWidth - row.clientWidth;
@@ -356,7 +370,7 @@ function stateText(i) {
   return frames[i].draft ? "draft, not used" : "not drawn";
 }
 function choose(name, value) {
-  if (open) close();
+  settle();
   if (name === "kind") kind = value;
   else tool = value;
   refresh();
@@ -374,18 +388,19 @@ function refresh() {
   element("draft").disabled = !draftOf();
   element("copy_before").disabled = copySource(-1) === null;
   element("copy_after").disabled = copySource(1) === null;
-  element("clear").disabled = !shapesOf(state, kind).length;
+  element("clear").disabled = !clearable();
   element("radius").value = radius;
   element("radius_text").textContent = radius + " px";
   const draft = draftOf(), keys = state.frames.filter((f) => f.key).length;
   const parts = [`Frame ${frames[at].frame} (${frames[at].name}), ${stateText(at)}`];
-  parts.push(`${keys} of ${frames.length} frames are keys`);
+  parts.push(`key frames: ${keys} of ${frames.length}`);
   if (draft) parts.unshift(ORIGINS[draft.origin] + ": dashed outline, inspect it before you use it");
   if (state !== saved) parts.push("not saved");
   element("shown").textContent = parts.join("; ");
   paint();
 }
 function undo() {
+  if (stroke || held) { stroke = held = pressed = null; return refresh(); }
   if (open) { open = open.length > 1 ? open.slice(0, -1) : null; return refresh(); }
   if (!done.length) return;
   undone.push(state);
@@ -393,12 +408,16 @@ function undo() {
   refresh();
 }
 function redo() {
-  if (!undone.length) return;
+  if (!undone.length || stroke || held) return;
   done.push(state);
   state = undone.pop();
   refresh();
 }
-function clear() { if (shapesOf(state, kind).length) commit(changed([])); }
+const clearable = () => shapesOf(state, kind).length > 0 || (kind === "instrument" && state.frames[at].key);
+function clear() {  // a frame without an instrument becomes one that is not drawn
+  settle();
+  if (clearable()) commit(changed([]));
+}
 function resize(value) { radius = Math.min(Math.max(value, 1), 80); refresh(); }
 
 // ---------------------------------------------------------------- mouse, pen, fingers, keys
@@ -413,7 +432,12 @@ canvas.addEventListener("pointerdown", (event) => {
   canvas.setPointerCapture(event.pointerId);
   event.preventDefault();
   if (event.pointerType === "touch") fingers.set(event.pointerId, [event.clientX, event.clientY]);
-  if (fingers.size === 2) { stroke = held = pressed = open = null; pinch = spread(); return paint(); }
+  if (fingers.size === 2) {  // the first finger was the beginning of a zoom: what it began is dropped
+    if (pressed) open = pressed.open;
+    stroke = held = pressed = null;
+    pinch = spread();
+    return paint();
+  }
   if (event.button) { panning = [event.clientX, event.clientY]; return; }
   crossShown = false;
   cross = inside(place(event));
@@ -476,12 +500,14 @@ const KEYS = {
   PageUp: () => show(at - 1), PageDown: () => show(at + 1), Delete: clear, Backspace: undo,
   Enter: close, Escape: () => { open = stroke = held = null; refresh(); },
 };
+const ONCE = "axcvs ";  // keys that act once when they are held
 window.addEventListener("keydown", (event) => {
   const typed = event.target.tagName, key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   if (event.altKey || ((event.ctrlKey || event.metaKey) && !["z", "y", "s"].includes(key))) return;
   if (typed === "INPUT" && key.startsWith("Arrow")) return;
   if ((typed === "BUTTON" || typed === "SUMMARY") && (key === "Enter" || key === " ")) return;
-  if (ARROWS[key]) arrow(ARROWS[key], event.shiftKey ? 10 : 1);
+  if (event.repeat && ONCE.includes(key)) event.preventDefault();
+  else if (ARROWS[key]) arrow(ARROWS[key], event.shiftKey ? 10 : 1);
   else if (key === " ") space();
   else if (key === "z" && event.shiftKey) redo();
   else if (KEYS[key]) KEYS[key]();
