@@ -2,8 +2,8 @@
 
 In: the dictionary of metrics.json, or the rows of `evaluation.compare.compare`. Out: a table of means and paired
 differences; or a CSV file (RFC 4180 but for lines that end with LF alone, `.` in numbers, an empty cell for no value)
-with one row per method and frame or per method and metric. Its numbers have all digits and are read back exactly. A text
-that a spreadsheet would compute, `=1+1` as the name of a method, has an apostrophe before it.
+with one row per method and frame or per method and metric. Its numbers have all digits and are read back exactly. A
+text that a spreadsheet would compute, `=1+1` as the name of a method, has an apostrophe before it.
 """
 
 import csv
