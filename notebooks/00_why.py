@@ -355,8 +355,8 @@ assert held[1] > 0 > held[4] and held[6] > held[4], "not monotonic in the rate"
 #   have hardly begun to follow the motion, so A paints the rest.
 # - On a **simulated clip at full size**, `paper` loses about as much as the blend of both frames where the tissue moves by
 #   three pixels between two training frames ({doc}`/full_size`). It shows vessels twice there ({doc}`14_full_sequence`).
-# - With **light alone**, false motion is the same with and without A ({doc}`/effects`). So is the picture: over three
-#   seeds and 1000 iterations its PSNR is the same with A and without, within the interval. The gain of A in the table
+# - With **light alone**, false motion is the same with and without A ({doc}`/effects`). No difference of PSNR is
+#   resolved: over three seeds and 1000 iterations the interval of the difference contains 0. The gain of A in the table
 #   above is that of one seed after 500 iterations; it does not show that A is needed for this clip.
 #
 # Two rules follow. First, a gain on training frames does not show that A is right; held-out frames can show that it is

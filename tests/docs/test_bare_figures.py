@@ -40,6 +40,18 @@ def test_every_name_of_the_table_is_used_and_has_a_value():
 def test_a_setting_that_the_code_has_not_is_refused():
     with pytest.raises(InputError, match=r"the code has no endotsr\.config:PAPER\.gone"):
         figures.value(figures.Setting("endotsr.config:PAPER.gone"))
+
+
+def test_an_entry_of_a_list_is_found_by_its_values(tmp_path):
+    (tmp_path / "a.json").write_text('{"rows": [{"n": 1, "p": "x", "v": 2.5}, {"n": 1, "p": "y", "v": 4}]}')
+    at = lambda path: figures.value(figures.Figure("a.json", path, "{}"), tmp_path)
+    assert at("rows.n=1&p=y.v") == 4 and at("rows.0.v") == 2.5
+    for path in ("rows.n=1.v", "rows.p=z.v"):  # two entries, and none
+        with pytest.raises(InputError, match=re.escape(f"no {path}")):
+            at(path)
+
+
+def test_a_formula_is_a_function_of_other_figures():
     double = figures.Formula(lambda one, other: one + other, ("flow.tissue", "flow.tissue"), "{:.2f}")
     assert figures.value(double) == 2 * figures.value(figures.FIGURES["flow.tissue"])
 

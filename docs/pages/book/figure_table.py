@@ -9,7 +9,7 @@ class Figure(NamedTuple):
     """The mean of one number of several records."""
 
     records: str  # pattern of files of docs/results
-    path: str  # keys and indices, joined by dots; * is the mean over a list
+    path: str  # keys, and indices or `key=value` of a list, joined by dots; * is the mean over a list
     form: str
     scale: float = 1.0
 
@@ -36,6 +36,7 @@ PAPER = "pulling_paper_seed?.json"
 ALONE = "clips.endonerf_pulling.every eighth frame.baselines"
 CUTTING = "clips.endonerf_cutting.every eighth frame.baselines"
 BLOCKS8, BLOCKS16 = "clips.endonerf_pulling.blocks of 8 frames.baselines", "pulling_sharp_blocks16.json"
+CLAMPED, LATER = "tradeoff_cutting_sharp.json", "preset=sharp&register_bytes=64&passes=1"
 TRUTH, PULL = "effects_truth.json", "scenes.pull and breath"
 FIGURES: dict[str, Figure | Setting | Formula] = {
     "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
@@ -68,6 +69,13 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "truth.sharp.still": Figure(TRUTH, "scenes.light.`sharp`.*.scene_units", "{:.2f}"),
     "truth.paper.still": Figure(TRUTH, "scenes.light.`paper`.*.scene_units", "{:.2f}"),
     "biker.largest": Figure("tradeoff_biker.json", "points.0.error.max", "{:.2f}"),  # of `paper`
+    "cutting.paper": Figure(CLAMPED, "points.name=paper.error.rms", "{:.2f}", 255),
+    "cutting.unclamped": Figure(CLAMPED, "points.name=float32, cutoff 1/255, stop 1e-4.error.rms", "{:.2f}", 255),
+    "cutting.stop": Figure(CLAMPED, "points.name=float64, cutoff 1e-12, stop 1e-4.error.max", "{:.0f}", 255),
+    "cutting.cutoff": Figure(CLAMPED, "points.name=alpha cutoff 1/255.error.max", "{:.0f}", 255),
+    "cutting.alpha": Figure(CLAMPED, "points.79.error.rms", "{:.3f}", 255),  # alpha clamp 0.99
+    "waiting.pulling": Figure("waiting.json", f"rows.clip=endonerf_pulling&{LATER}.held_out.psnr_tissue", "{:.2f}"),
+    "waiting.cutting": Figure("waiting.json", f"rows.clip=endonerf_cutting&{LATER}.held_out.psnr_tissue", "{:.2f}"),
     "truth.paper.light": Figure(TRUTH, "scenes.light.`paper`.*.depth_mm", "{:.3f}"),
     "truth.still.light": Figure(TRUTH, "scenes.light.`paper` without S.*.depth_mm", "{:.3f}"),
     "sharp.blocks16": Figure(BLOCKS16, "held_out.mean.psnr_tissue", "{:.2f}"),
@@ -107,7 +115,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "sharp.bridged": Setting("endotsr.config:SHARP.training.bridge_fraction", scale=100),
     "rate.motion": Setting("endotsr.config:PAPER.optimiser.spectral_motion_factor", scale=100),
     "scale.memory": Setting("pages.bench.scale:MEMORY"),
-    "duration.assumed": Setting("endotsr.clips.sequences.checks.duration:SECONDS", "{:.2f}"),
+    "duration.assumed": Setting("endotsr.clips.sequences.checks.duration:SECONDS", "{:.3f}"),
     "claims.hundredth": Setting("pages.claims.rules:HUNDREDTH", "{:.2f}"),
     "claims.power": Setting("pages.claims.power:POWER", scale=100),
     "sfm.registered": Setting("endotsr.clips.poses.structure:REGISTERED", scale=100),

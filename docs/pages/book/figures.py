@@ -72,10 +72,19 @@ def _at(found: Any, path: str, file: Path) -> float:
 def _part(found: Any, path: str, file: Path) -> Any:
     for key in path.split("."):
         try:
-            found = found[int(key)] if isinstance(found, list) else found[key]
-        except (KeyError, IndexError, ValueError, TypeError):
+            found = _entry(found, key) if isinstance(found, list) else found[key]
+        except (KeyError, IndexError, ValueError, TypeError, AttributeError):
             raise InputError(f"{file}: no {path}") from None
     return found
+
+
+def _entry(found: list[Any], key: str) -> Any:
+    """An entry of a list by its index, or the one whose keys have these values, as in `clip=pulling&seed=0`."""
+    if "=" not in key:
+        return found[int(key)]
+    wanted = dict(one.split("=", 1) for one in key.split("&"))
+    (only,) = (one for one in found if all(str(one.get(name)) == told for name, told in wanted.items()))
+    return only
 
 
 @cache

@@ -42,7 +42,7 @@ def answer(folder: Path, found: Mapping[str, Record | None], half: list[Record |
     parts += [beaten(folder, clip, record) for clip, record in known.items()]
     parts.append(splits(found, half))
     if right_eye:
-        parts.append(f"On the right camera at held-out times (half size) the components change PSNR by {right_eye}.")
+        parts.append(f"On the right camera at held-out times the components change PSNR by {right_eye}.")
     parts.append(truth(loaded(folder / "effects_truth.json")))
     parts += [f"The ablation on {clip} is not finished." for clip in CLIPS if clip not in known]
     return "\n".join(f"- {part}" for part in parts if part) + "\n\n" + levels(folder, found)
@@ -159,7 +159,7 @@ def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
     head = ["EndoNeRF", "published", "here", "its base", "blend", "flow", "blend, tissue only", "flow, tissue only"]
     about = (
         "PSNR of the whole image in dB, every eighth frame held out. ± is a 95 % interval over the seeds. Blend is the"
-        " mean of the two neighbouring frames; *tissue only* reads no pixel that the masks exclude, as the method does."
+        " mean of the two neighbouring frames; like the method, *tissue only* reads no excluded pixel."
         " *Level with* means within the interval over the seeds."
     )
     return noted(head, rows, about + black(folder))
@@ -225,7 +225,9 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
     if not groups:
         return ""
     measured = f"{len(groups)} combinations of clip, size and held-out frames measured"
-    return f"The mean of the full method is below the blend in {below} of the {measured}."
+    short = [rows[0]["iterations"] for rows in groups.values() if rows[0]["iterations"] < PAPER.training.iterations]
+    at_half = f", {len(short)} of them at half size with {min(short)} iterations" if short else ""
+    return f"The mean of the full method is below the blend in {below} of the {measured}{at_half}."
 
 
 def truth(found: Record) -> str:

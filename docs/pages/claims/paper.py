@@ -14,7 +14,7 @@ import sys
 from typing import Any, NamedTuple
 
 from pages.claims.estimates import runs_of
-from pages.claims.verdicts import CLIPS, HEADS
+from pages.claims.verdicts import CLIPS, HEADS, implied_base
 from pages.store.commands import loaded
 from pages.store.intervals import student
 from pages.store.program import DOCS, RESULTS, Program
@@ -198,8 +198,10 @@ def systems() -> str:
     ablation = loaded(RESULTS / "ablation_pulling.json")
     recorded = loaded(RESULTS / "pulling_paper_seed0.json")["baselines"]
     given = lambda name: f"{recorded[name]['mean']['psnr_full']:.2f}"
+    low, high = implied_base("pulling")
+    base = f"configuration `base`: matched input, no A, S, L; the gain of the paper implies {low:.2f} to {high:.2f} dB"
     rows = [
-        ["SurgicalGS", f"{SURGICALGS:.2f}", level(ablation, "base"), "configuration `base`: matched input, no A, S, L"],
+        ["SurgicalGS", f"{SURGICALGS:.2f}", level(ablation, "base"), base],
         ["Endo-TSR", f"{PUBLISHED['pulling']['psnr_full']:.2f}", level(ablation, "A+S+L"), "preset `paper`"],
         *(
             [f"other system {k} of its table", f"{value:.2f}", "-", "not trained here"]

@@ -113,7 +113,10 @@ def gain_of_the_right_eye(pairs: Record | None) -> str:
     """Mean and interval of the gain on the right camera at held-out times, or ""."""
     label = next(protocol[0] for protocol in PROTOCOLS if protocol[3] == RIGHT_EYE[0])
     _, _, verdict, mean, limits, _ = next(row for row in protocol_rows([], pairs) if row[0] == label)
-    return "" if verdict == UNMEASURED[0] else f"{mean} (95 % interval {limits})"
+    if pairs is None or verdict == UNMEASURED[0]:
+        return ""
+    row = pairs["rows"][0]
+    return f"{mean} (95 % interval {limits}; {row['width']}x{row['height']}, {row['iterations']} iterations)"
 
 
 def with_right_eye(row: Record) -> Record:

@@ -147,17 +147,23 @@ def _level_row(found: Record, clip: str, key: str, of: str, unit: float) -> list
     return [*claim, metric.form.format(mean), seeds_of(len(values)), between(limits, metric.form), verdict, "-", "-"]
 
 
-def _base_row(found: Record, clip: str) -> list[str]:
-    """The level of the base that follows from the paper: its level minus its gain with matched input."""
+def implied_base(clip: str) -> tuple[float, float]:
+    """The PSNR in dB of the base that the paper's level minus its gain with matched input gives: least and most."""
     level, (least, most) = PUBLISHED[clip]["psnr_full"], MATCHED_PSNR
     assert level is not None
+    return level - most, level - least
+
+
+def _base_row(found: Record, clip: str) -> list[str]:
+    """The level of the base that follows from the paper: its level minus its gain with matched input."""
+    low, high = implied_base(clip)
     claim = ["Level: PSNR of the base, from the level and the gain with matched input", "base",
-             f"{level - most:.2f} to {level - least:.2f} dB"]  # fmt: skip
+             f"{low:.2f} to {high:.2f} dB"]  # fmt: skip
     values = list(runs_of(found, "base", "psnr_full").values())
     if not values:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
     mean, limits = student(values)
-    inside = level - most - 0.005 <= mean <= level - least + 0.005
+    inside = low - 0.005 <= mean <= high + 0.005
     verdict = unless_few("the mean lies inside" if inside else "the mean lies outside", len(values))
     return [*claim, f"{mean:.2f} dB", seeds_of(len(values)), between(limits, "{:.2f} dB"), verdict, "-", "-"]
 

@@ -28,7 +28,7 @@ TILES = (8, 16, 32)
 OMITTED = {
     "low-pass of 0.3 px^2, near plane": "they change the model, not the arithmetic, so there is no error",
     "off-axis clamp of the Jacobian": "part of the presets; with a centred principal point it acts on Gaussians "
-    "outside the picture only",
+    "whose centre is outside the picture, and changes the pixels that they reach",
     "culling": "exact in every setting: a Gaussian that reaches no pixel is never visited",
     "reuse of the depth order between frames": "not offered: the order is exact in every frame",
     "T stored or replayed in the reverse pass": "fixed by the compositor: `definition` keeps T, `blocks` replays it",

@@ -141,7 +141,9 @@ def summary(result: dict[str, Any]) -> list[str]:
     for name, (seconds, psnr) in ends.items():
         better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
         if better:
-            lines.append(f"*{name}* is slower than the following, and worse beyond noise: {', '.join(better)}.")
+            lines.append(
+                f"*{name}* is slower than the following, and worse by more than this difference: {', '.join(better)}."
+            )
     return lines
 
 
