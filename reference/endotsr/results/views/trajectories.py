@@ -16,6 +16,7 @@ from endotsr.clips.sequences.record import nearest_frame
 from endotsr.method.equations.exposure import exposure_forward
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, camera_centre
+from endotsr.method.splatting.covariance import LOG_SCALE_LIMIT
 from endotsr.method.splatting.harmonics import harmonics_forward
 from endotsr.results.export.scene import MovingScene
 from endotsr.training.scene.parameters import exposure_at
@@ -49,14 +50,16 @@ class Trajectories(NamedTuple):
 def key_times(scene: MovingScene, most: int) -> FloatArray:
     """Key times: the frames' times and 1, or `most` evenly spaced ones if these are more.
 
-    Spectral motion alone has `most` evenly spaced ones; a static scene without an exposure of its frames has one.
+    Spectral motion alone has `most` evenly spaced ones; a static scene has one, if neither an exposure of its frames
+    nor the direction of a moving camera changes its colours.
     """
     times = np.unique(np.append(np.asarray(scene.record.times, np.float64), 1.0))
     gaussians, frames = scene.model.gaussians, scene.model.frames
     if gaussians.fdm_weight is None and gaussians.appearance_coefficients is None:
         if gaussians.motion_coefficients is not None:
             return np.linspace(0, 1, most)
-        if frames is None or frames.exposure_log_gain is None:
+        turning = not scene.record.static_camera and scene.model.config.model.harmonics_degree > 0
+        if not turning and (frames is None or frames.exposure_log_gain is None):
             return times[:1]
     return times if times.size <= most else np.linspace(0, 1, most)
 
@@ -71,7 +74,8 @@ def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
     for k, time in enumerate(times):
         camera = cameras[nearest_frame(known, float(time))]
         values[:, k], rotation[:, k] = _at_time(scene, float(time), camera, seen)
-    low, high = values.min(axis=(1, 2)).astype(np.float64), values.max(axis=(1, 2)).astype(np.float64)
+    ends = (values.min(axis=(1, 2)), values.max(axis=(1, 2))) if values.size else np.zeros((2, 9))  # none is visible
+    low, high = (end.astype(np.float64) for end in ends)
     high = np.where(high > low, high, low + 1)
     levels = np.array([LEVELS_16] * 6 + [LEVELS_8] * 3)[:, None, None]
     rounded = np.rint((values - low[:, None, None]) / (high - low)[:, None, None] * levels)
@@ -81,16 +85,26 @@ def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
 
 
 def _at_time(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
-    """Position, log-scale and colour (9, N), and unit quaternion (4, N), of the Gaussians with `seen`."""
+    """Position, log-scale and colour (9, N), and unit quaternion (4, N), of the Gaussians with `seen`.
+
+    As in (B2), a log-scale is clipped, and a quaternion of zeros is no rotation.
+    """
     deformed, degree = scene.at(time), scene.model.config.model.harmonics_degree
     centre = camera_centre(camera)
     colour = harmonics_forward(deformed.harmonics, deformed.residual, deformed.position, centre, degree)[0]
     exposure = exposure_at(scene.model.frames, time)
     if exposure is not None:
         colour = exposure_forward(colour[:, None], exposure.log_gain, exposure.bias)[0][:, 0]
-    norm = np.maximum(np.linalg.norm(deformed.quaternion, axis=0), 1e-12)
-    values = np.concatenate([deformed.position, deformed.log_scale, colour])
-    return values[:, seen], (deformed.quaternion / norm)[:, seen]
+    log_scale = np.clip(deformed.log_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)
+    values = np.concatenate([deformed.position, log_scale, colour])
+    return values[:, seen], unit(deformed.quaternion)[:, seen]
+
+
+def unit(quaternion: FloatArray) -> FloatArray:
+    """Unit quaternions (4, N); that of zeros is 1, 0, 0, 0."""
+    largest = np.abs(quaternion).max(axis=0, initial=0)
+    scaled = np.where(largest > 0, quaternion / np.where(largest > 0, largest, 1), np.eye(4, 1))
+    return scaled / np.linalg.norm(scaled, axis=0)
 
 
 def rotation_levels(rotation: FloatArray) -> FloatArray:

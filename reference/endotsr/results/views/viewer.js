@@ -1,6 +1,7 @@
 "use strict";
 // The moving scene in WebGL 2: every Gaussian is a rectangle around its ellipse alpha >= cutoff, drawn back to front by
-// the formulas of the specification: B2 covariance, B3 projection, B5 compositing.
+// the formulas of the specification: B2 covariance, B3 projection, B5 compositing without its stop and without the tiles
+// of the preset legacy.
 (async function () {
 const element = (id) => document.getElementById(id);
 const about = JSON.parse(element("about").textContent);
@@ -38,6 +39,10 @@ element("stage").style.setProperty("--whole", `calc(94vh * ${about.width / about
 const gl = canvas.getContext("webgl2", {antialias: false, preserveDrawingBuffer: true});
 if (!gl) return fail("This page requires WebGL 2, which this browser does not support.");
 const precise = gl.getExtension("EXT_color_buffer_float") !== null;
+canvas.addEventListener("webglcontextlost", () => {
+  stop();
+  fail("The browser has given up the graphics of this page; reload it.");
+});
 
 const SPLAT_VERTEX = `#version 300 es
 precision highp float; precision highp int; precision highp usampler2DArray;
@@ -183,6 +188,7 @@ async function part(numbers, text) {  // numbers: count, times, low, high, camer
     layered(made, gl.RGBA_INTEGER, gl.RGBA8UI, gl.UNSIGNED_BYTE, (out, o, i) => {
       for (let c = 0; c < 4; c++) out[o + c] = small[4 + c][i];
     }, Uint8Array)];
+  if (gl.getError()) throw new Error("the graphics memory cannot hold the Gaussians.");
   made.depth = new Float32Array(N);
   made.order = [new Uint32Array(N), new Uint32Array(N)];
   return made;
@@ -315,12 +321,12 @@ function keysAt({times, K}, time) {
   return [k, k + 1, Math.min(Math.max((time - times[k]) / (times[k + 1] - times[k]), 0), 1)];
 }
 
-function nearestFrame(time) {
-  const times = about.frames.times;
+function nearest(times, time) {
   let best = 0;
   for (let i = 1; i < times.length; i++) if (Math.abs(times[i] - time) < Math.abs(times[best] - time)) best = i;
   return best;
 }
+const nearestFrame = (time) => nearest(about.frames.times, time);
 
 function multiply(a, b) {  // row-major 3x3
   const out = new Array(9);
@@ -407,6 +413,7 @@ function splats(of, camera, layer) {  // draw one part into the bound buffer
 
 let shownPart = null, weight = 0;  // the part whose camera is used; weight of the later of two blended parts
 function draw(layer = state.layer) {
+  if (layer === 3 && truth !== held) return describe();  // not decoded yet: keep the last picture
   const parts = partsNow();
   if (!parts.length) return describe();  // still loading: keep the last picture
   weight = parts.length > 1 ? parts[1][1] : 0;
@@ -432,7 +439,7 @@ function draw(layer = state.layer) {
 
 // ---------------------------------------------------------------- the page
 const LAYERS = ["colour", "depth", "opacity", "error"];
-let held = null;  // the held-out frame shown next to the scene
+let held = null, truth = null;  // the held-out frame shown next to the scene, and the one whose picture is decoded
 const moved = () => state.yaw !== 0 || state.pitch !== 0 || state.closer !== 1 || state.right !== 0 || state.down !== 0;
 const short = (number) => Number(number.toPrecision(4)).toString();
 
@@ -465,7 +472,7 @@ function address() {  // store this view in the address of the page
   try { history.replaceState(null, "", "#" + view); } catch (refused) { /* optional */ }
 }
 
-const nearestHeld = (time) => about.held_out.reduce((a, b) => Math.abs(b.time - time) < Math.abs(a.time - time) ? b : a);
+const nearestHeld = (time) => about.held_out[nearest(about.held_out.map((frame) => frame.time), time)];
 
 function choose(layer) {
   state.layer = layer;
@@ -504,13 +511,15 @@ function go(time) {  // in the error layer: to the nearest held-out frame, becau
 async function visit(frame, error = false) {
   if (!error) stop();
   look(0, 0, 1, 0, 0);
-  leave();
+  if (!error || state.layer !== 3) leave();
   unmark();
   state.time = frame.time;
   held = frame;
+  if (error) choose(3);
   draw();  // updates the chips
   for (const chip of element("chips").querySelectorAll("button")) chip.classList.toggle("on", chip.title === frame.name);
-  const source = frame.picture || (await fetched(frame.window)).held_out[frame.place].picture;
+  const source = frame.picture || await fetched(frame.window).then((of) => of.held_out[frame.place].picture, () => null);
+  if (!source && held === frame) leave();  // its window is missing
   if (held !== frame) return;
   element("truth").src = source;
   element("truth_name").textContent = "Held-out frame " + frame.name + "; grey: excluded";
@@ -522,7 +531,7 @@ async function visit(frame, error = false) {
   gl.activeTexture(gl.TEXTURE5);
   gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-  if (error) choose(3);
+  truth = frame;
   draw();
 }
 
@@ -537,10 +546,15 @@ function look(yaw, pitch, closer, right = state.right, down = state.down) {
   if (moved() && held) leave();
 }
 
+function pressed(id, on) {
+  element(id).classList.toggle("on", on);
+  element(id).setAttribute("aria-pressed", on);
+}
+
 function stop() {
   state.playing = state.orbiting = false;
   element("play").textContent = "Play";
-  element("orbit").classList.remove("on");
+  pressed("orbit", false);
 }
 
 let before = 0;
@@ -565,13 +579,13 @@ function toggle(name, button) {
   state[name] = !state[name];
   state.clock = state.time;
   element("play").textContent = state.playing ? "Stop" : "Play";
-  element("orbit").classList.toggle("on", state.orbiting);
+  pressed("orbit", state.orbiting);
   if (!running) requestAnimationFrame((now) => { before = now; tick(now); });
 }
 
 element("play").onclick = () => toggle("playing");
 element("orbit").onclick = () => toggle("orbiting");
-element("reset").onclick = () => { state.orbiting = false; element("orbit").classList.remove("on"); look(0, 0, 1, 0, 0); draw(); };
+element("reset").onclick = () => { state.orbiting = false; pressed("orbit", false); look(0, 0, 1, 0, 0); draw(); };
 element("slider").oninput = (event) => { go(Number(event.target.value)); draw(); };
 element("layer").onchange = (event) => {
   const layer = event.target.selectedIndex;
@@ -580,6 +594,7 @@ element("layer").onchange = (event) => {
   draw();
 };
 element("speed").onchange = (event) => { state.speed = Number(event.target.value); };
+element("full").hidden = !document.fullscreenEnabled;
 element("full").onclick = () => document.fullscreenElement ? document.exitFullscreen() : element("stage").requestFullscreen();
 element("picture").onclick = () => {
   draw();
@@ -598,6 +613,7 @@ function unmark() {
 }
 
 function surface(x, y) {  // the point of the rendered surface at a pixel of the picture, or null
+  if (!partsNow().length) return null;  // a gap, or not loaded: the buffers hold another picture
   draw(1);
   const sum = [0, 0, 0, 0];
   [[buffers[0], 1 - weight], [buffers[1], weight]].forEach(([buffer, share]) => {
@@ -629,9 +645,10 @@ function mark(x, y) {
       " on the rendered surface at this time. An estimate: it is only as accurate as the prior depth used in training.";
 }
 
+element("measure").hidden = !precise;  // 8 bits hold no depth beyond the range of the depth layer
 element("measure").onclick = () => {
   marks = marks ? null : [];
-  element("measure").classList.toggle("on", marks !== null);
+  pressed("measure", marks !== null);
   canvas.classList.toggle("aim", marks !== null);
   element("length").hidden = !marks;
   if (marks) { stop(); unmark(); }
@@ -658,7 +675,7 @@ canvas.onpointermove = (event) => {
   fingers.set(event.pointerId, now);
   if (fingers.size === 2) look(state.yaw, state.pitch, state.closer * before / apart());
   const pixels = about.width / canvas.getBoundingClientRect().width;
-  if (marks) return;
+  if (marks && fingers.size === 1) return;
   if (fingers.size === 1 && (event.shiftKey || event.buttons === 2)) look(state.yaw, state.pitch, state.closer,
     state.right + (now[0] - last[0]) * pixels, state.down + (now[1] - last[1]) * pixels);
   else if (fingers.size === 1)
@@ -670,22 +687,24 @@ canvas.addEventListener("wheel", (event) => {
   look(state.yaw, state.pitch, state.closer * Math.exp(event.deltaY * 0.001));
   draw();
 }, {passive: false});
-function step(frames) {  // to the previous or next frame
-  const times = about.frames.times, count = times.length;
+function step(frames) {  // to the previous or next frame; in the error layer, held-out frame
+  const times = state.layer === 3 ? about.held_out.map((frame) => frame.time) : about.frames.times;
   stop();
-  go(times[(nearestFrame(state.time) + frames + count) % count]);
+  go(times[(nearest(times, state.time) + frames + times.length) % times.length]);
 }
 
 const TURNS = {ArrowLeft: [-0.05, 0, 1], ArrowRight: [0.05, 0, 1], ArrowUp: [0, -0.05, 1], ArrowDown: [0, 0.05, 1],
   "+": [0, 0, 0.95], "-": [0, 0, 1 / 0.95]};
 const KEYS = {" ": () => toggle("playing"), o: () => toggle("orbiting"), ",": () => step(-1), ".": () => step(1),
   0: () => element("reset").onclick()};
-document.onkeydown = (event) => {  // buttons, slider and lists handle their own keys
+document.onkeydown = (event) => {  // slider and lists handle their own keys; space presses a button
   if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName)) return;
+  const on = event.target.tagName;
+  if (on === "INPUT" || on === "SELECT" || (on === "BUTTON" && event.key === " ")) return;
   const turn = TURNS[event.key];
   if (!turn && !KEYS[event.key]) return;
   event.preventDefault();
+  if (event.repeat && (event.key === " " || event.key === "o")) return;  // a key that is held starts or stops once
   if (turn && event.shiftKey && event.key.startsWith("Arrow")) look(state.yaw, state.pitch, state.closer,
     state.right + 200 * turn[0], state.down + 200 * turn[1]);
   else if (turn) look(state.yaw + turn[0], state.pitch + turn[1], state.closer * turn[2]);
@@ -709,12 +728,12 @@ function chips() {
   element("chips").hidden = frames.length === 0;
 }
 element("layer").options[3].disabled = about.held_out.length === 0;
-element("note").textContent = about.count.toLocaleString("en") + " Gaussians" +
+element("note").textContent = about.count.toLocaleString("en") + (about.count === 1 ? " Gaussian" : " Gaussians") +
   (about.windows ? " at most in each of " + spans.length + " windows, loaded on demand; lengths in "
-    : ", " + about.times.length + " key times; lengths in ") + about.unit +
+    : ", " + about.times.length + (about.times.length === 1 ? " key time" : " key times") + "; lengths in ") + about.unit +
   ". The page interpolates between key times. Drag to rotate; use the wheel or two fingers to zoom, Shift or the right " +
   "button to pan. Keys: space plays, arrows rotate, Shift and arrows pan, + and - zoom, comma and full stop step by one frame, o orbits, 0 resets.";
-if (!about.windows && about.times.length < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
+if (!about.windows && about.times.length < 2 && about.cameras.length < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
 
 // `#t=0.4&layer=depth&yaw=0.2` opens the page at a view; `probe` adds the drawn picture and its duration as text.
 const asked = new URLSearchParams(location.hash.slice(1));
@@ -724,7 +743,7 @@ look(wish("yaw"), wish("pitch"), wish("closer", 1), wish("right"), wish("down"))
 const layer = LAYERS.indexOf(asked.get("layer"));
 choose(layer > 0 && layer < 3 ? layer : 0);
 try { await Promise.all(shows(state.time).map(fetched)); }
-catch (error) { return about.windows ? null : fail("This browser cannot unpack the scene: " + error); }
+catch (error) { return about.windows ? null : fail("This browser cannot show the scene: " + error.message); }
 draw();
 if (asked.has("held_out")) {
   const frame = about.held_out[Number(asked.get("held_out"))];
