@@ -177,7 +177,10 @@ def test_letters_with_several_meanings_are_listed():
     several = {letter for letter in letters if letters.count(letter) > 1} - {"-", r"\hat I"}
     text = GLOSSARY.read_text(encoding="utf-8")
     said = text[text.index("The letters $A$") : text.index("In the code each meaning")]
-    assert several == set(re.findall(r"\$([^$]+)\$", said)) - {"T", "w"}, "$T_k$ and $w_{cji}$ have an index"
+    listed = set(re.findall(r"\$([^$]+)\$", said)) - {"T", "w"}  # $T_k$ and $w_{cji}$ have an index in the rows
+    assert several == listed, (
+        f"rows of several meanings: {several - listed} not in the sentence, {listed - several} only there"
+    )
 
 
 def test_every_class_that_the_glossary_names_exists():

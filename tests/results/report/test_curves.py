@@ -124,6 +124,18 @@ def test_terms_without_a_positive_value_have_no_chart():
     assert [c.title for c in curves.charts([{"iteration": 1, "depth": 0.0, "ssim": 0.5}])] == ["Loss terms"]
 
 
+def test_more_terms_than_colours_have_dashed_curves(monkeypatch):
+    """A new term of the loss ended the report of a run with a traceback."""
+    names = tuple(f"term {k}" for k in range(len(style.LIGHT.colours) + 2))
+    monkeypatch.setattr(curves, "TERMS", names)
+    log = [{"iteration": k, "loss": 1.0, **dict.fromkeys(names, 1.0 + k)} for k in range(3)]
+    (chart,) = (chart for chart in curves.charts(log) if "terms" in chart.title.lower())
+    axes = style.new_figure(4, 3).add_subplot()
+    chart.draw(axes, style.LIGHT)
+    drawn = [(line.get_color(), line.get_linestyle()) for line in axes.lines]
+    assert len(set(drawn)) == len(names) and [dashes for _, dashes in drawn][-2:] == ["--", "--"]
+
+
 def test_the_level_of_the_held_out_frames_is_that_of_the_tables():
     """Extrapolated frames are not in the means of the tables and cards."""
     rows = [{"frame": frame, "name": "", "time": 0.0, "psnr_tissue": value} for frame, value in ((1, 30.0), (9, 20.0))]

@@ -131,14 +131,14 @@ def _leave_room_above(axes: Any, fraction: float) -> None:
     axes.set_ylim(top=high * (high / low) ** more if axes.get_yscale() == "log" else high + (high - low) * more)
 
 
-def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: bool = True) -> None:
+def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: bool = True, dashes: str = "-") -> None:
     iterations, values = series(log, key)
     if not values.size:
         return
     window = max(1, values.size // 60)
     if raw and window > 1:
         axes.plot(iterations, values, color=colour, linewidth=0.5, alpha=0.25)
-    axes.plot(iterations, smoothed(values, window), color=colour, linewidth=1.6, label=label)
+    axes.plot(iterations, smoothed(values, window), dashes, color=colour, linewidth=1.6, label=label)
 
 
 def _draw_loss(axes: Any, theme: Theme, log: LogEntries) -> None:
@@ -150,7 +150,8 @@ def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
         if positive := _positive(log, key):
             label = "1 − ssim" if key == "ssim" else key
-            _curve(axes, positive, key, theme.colours[position], label, raw=False)
+            again, colour = divmod(position, len(theme.colours))  # more terms than colours: the others are dashed
+            _curve(axes, positive, key, theme.colours[colour], label, raw=False, dashes="--" if again else "-")
     _log_scale(axes, log, TERMS)
 
 
