@@ -4,6 +4,7 @@ The surrounding page defines the colours, in a light and a dark scheme.
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 460.0, 240.0, 52.0, 10.0, 30.0, 30.0  
 MOST_POINTS = 300  # per curve; more points are averaged in groups
 COLOURS = ("var(--accent)", "var(--bad)", "var(--good)")
 LINES = 4  # approximate number of grid lines
+MOST_DIGITS = 9  # of a label
 
 
 class ChartCurve(NamedTuple):
@@ -43,7 +45,8 @@ def chart_svg(
     across = (WIDTH - LEFT - RIGHT) / max(end, 1.0)
     down = (HEIGHT - TOP - BOTTOM) / max(high - low, 1e-12)
     apart = (WIDTH - LEFT - RIGHT) / len(shown)  # of the names
-    parts = [_grid_line(HEIGHT - BOTTOM - down * (at - low), 10.0**at if logarithmic else at) for at in ticks]
+    labels = _labels([10.0**at if logarithmic else at for at in ticks])
+    parts = [_grid_line(HEIGHT - BOTTOM - down * (at - low), label) for at, label in zip(ticks, labels, strict=True)]
     for number, (name, points) in enumerate(shown):
         colour, where = COLOURS[number % len(COLOURS)], points * [across, -down] + [LEFT, HEIGHT - BOTTOM + down * low]
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in where)
@@ -92,8 +95,18 @@ def _decades(low: float, high: float) -> list[float]:
     return [at for at in found if low <= at <= high] or [low, high]
 
 
-def _grid_line(y: float, value: float) -> str:
+def _labels(values: list[float]) -> list[str]:
+    """Values with three digits, or with as many as keep their rounding below a tenth of the least distance of two."""
+    apart = min((b - a for a, b in pairwise(values)), default=math.inf)
+    for digits in range(3, MOST_DIGITS):
+        rounded = [float(f"{value:.{digits}g}") for value in values]
+        if all(abs(shown - value) <= 0.1 * apart for shown, value in zip(rounded, values)):
+            break
+    return [f"{shown:.{MOST_DIGITS}g}" for shown in rounded]
+
+
+def _grid_line(y: float, label: str) -> str:
     return (
         f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}" stroke="var(--line)"/>'
-        f'<text x="{LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{value:.3g}</text>'
+        f'<text x="{LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{label}</text>'
     )

@@ -393,7 +393,7 @@ function refresh() {
   element("radius_text").textContent = radius + " px";
   const draft = draftOf(), keys = state.frames.filter((f) => f.key).length;
   const parts = [`Frame ${frames[at].frame} (${frames[at].name}), ${stateText(at)}`];
-  parts.push(`key frames: ${keys} of ${frames.length}`);
+  parts.push(`${keys} of ${frames.length} frames are keys`);
   if (draft) parts.unshift(ORIGINS[draft.origin] + ": dashed outline, inspect it before you use it");
   if (state !== saved) parts.push("not saved");
   element("shown").textContent = parts.join("; ");
