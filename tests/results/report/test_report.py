@@ -222,7 +222,9 @@ def test_a_render_that_is_not_finite_is_the_worst_frame():
 
 
 def test_absent_values_are_a_dash_with_a_reason(page):
-    assert "no weights file was given" in page and "2 value(s) were not finite" in page
+    assert "no weights file was given" in page and "2 values were not finite and are shown" in page
+    one = made_up_data(evaluation=made_up_data().evaluation | {"not_finite": 1})
+    assert "1 value was not finite and is shown as a dash" in report_html(one)
     assert not re.search(r"\b(nan|inf|None)\b", " ".join(Reader(page).words))
 
 

@@ -12,6 +12,7 @@ import pytest
 from browser import browser
 from remote import Remote
 
+from endotsr.clips.masks import drawn_masks
 from endotsr.clips.masks.drawing import Draft, DrawnClip, DrawnFrame
 from endotsr.clips.masks.drawn_masks import key_masks, read_drawn
 from endotsr.clips.masks.mask_shapes import MOST_POINTS, MaskShape
@@ -422,6 +423,15 @@ def test_a_long_stroke_is_a_file_that_is_read(key, opened):
 def test_the_page_divides_a_stroke_where_the_file_ends_it():
     text = draw_page(drawing(), "a", "b")
     assert int(re.search(r"MOST_POINTS = (\d+)", text)[1]) == MOST_POINTS
+    assert int(re.search(r"MOST_OF_FILE = (\d+)", text)[1]) == drawn_masks.MOST_POINTS
+
+
+def test_the_page_says_that_its_file_has_too_many_points(tmp_path, remote):
+    many = MaskShape(tool="polygon", points=[(40 + k / 50, 40 + k % 2) for k in range(5000)])
+    for count, said in ((20, False), (21, True)):
+        write_draw_page(tmp_path / "draw.html", drawing([many] * count), "a clip", "x")
+        page = Page(remote.open(tmp_path / "draw.html", tmp_path), tmp_path)
+        assert ("105000 points: the command reads a file of at most 100000" in page.said()) is said
 
 
 def test_frames_of_long_names_are_as_wide_as_the_others(opened):

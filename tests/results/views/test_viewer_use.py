@@ -78,6 +78,20 @@ def test_a_scene_without_a_visible_gaussian_is_a_dark_page(tmp_path):
     assert "0 Gaussians, 5 key times" in dom(tmp_path / "a.html", "t=0")
 
 
+def test_colours_below_zero_are_not_clamped_before_they_are_summed(tmp_path):
+    """The exposure belongs to the sum (B13): with a negative bias, dark Gaussians made the page too bright."""
+    browser()
+    scene = moving_scene(400, exposure=True)
+    scene.model.gaussians.opacity_logit[:] = 3
+    scene.model.gaussians.log_scale[:] += 1
+    scene.model.frames.exposure_bias[:] = -0.4
+    write_page(tmp_path / "a.html", scene, "a", 8)
+    out = scene.render(0.0, CAMERA)
+    solid = out.opacity > 0.99
+    off = (drawn(tmp_path / "a.html", "t=0").astype(float) - bytes_image(out.colour))[solid]
+    assert solid.mean() > 0.9 and -10 * np.log10(np.mean(off**2) / 255**2) > 45
+
+
 def test_a_quaternion_of_zeros_is_no_rotation():
     """As in (B2); in the page, its Gaussian was not drawn."""
     rows = np.array([[0, 0, 0, 0], [1e-30, 0, 0, 1e-30], [0, 1e30, 0, 0]], np.float32).T

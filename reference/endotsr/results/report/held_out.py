@@ -12,6 +12,7 @@ from endotsr.results.evaluation.records import FramesMeasured, Means
 from endotsr.results.report import parts
 from endotsr.results.report.data import COLUMNS, DECIDING, SEEN, ReportData
 from endotsr.results.report.tables import html_table
+from endotsr.untrusted.names import counted
 
 Column = tuple[str, str, int, int]  # of COLUMNS
 MOST_NAMED = 12  # extrapolated frames that are listed by number
@@ -84,11 +85,11 @@ def _extrapolated(data: ReportData, columns: list[Column]) -> str:
 
 def _seldom_seen(data: ReportData, rows: list[MetricsRow]) -> str:
     """The folded table with and without pixels that at most one training frame shows."""
-    counted = (data.evaluation.get("frames") or {}).get("coverage") or []
+    covered = (data.evaluation.get("frames") or {}).get("coverage") or []
     if mean_of(data, "held_out", extrapolated=True):  # the rows are means over the other frames
         outside = extrapolated_frames(data)
-        counted = [row for row in counted if row["frame"] not in outside]
-    never, once, tissue = (sum(row[key] for row in counted) for key in ("never_seen", "seen_once", "tissue"))
+        covered = [row for row in covered if row["frame"] not in outside]
+    never, once, tissue = (sum(row[key] for row in covered) for key in ("never_seen", "seen_once", "tissue"))
     if not never + once:
         return ""
     sentence = (
@@ -140,5 +141,6 @@ def _absent_reasons(data: ReportData) -> str:
     if frames := left_out(data.evaluation):
         reasons.append(f"excluded from the tissue means (no finite value): {', '.join(frames)}")
     if count := data.evaluation.get("not_finite"):
-        reasons.append(f"{count} value(s) were not finite and are shown as a dash")
+        verbs = ("was", "is") if count == 1 else ("were", "are")
+        reasons.append(f"{counted(count, 'value')} {verbs[0]} not finite and {verbs[1]} shown as a dash")
     return f'<p class="note">{parts.text("; ".join(reasons))}.</p>' if reasons else ""

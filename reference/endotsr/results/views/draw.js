@@ -11,7 +11,7 @@ const TINT = {instrument: "#00c98d", never: "#e8a317"};
 const CLOSE = 9, FREEHAND = 4, SPACING = 2, SNAP = 5;
 const AROUND = 310; // px of the window for the title above the picture, and for the text and the frames below it
 const MOST_ZOOM = 16, MOST_UNDO = 300, LEAST_NODES = 12;
-const MOST_POINTS = 5000;  // of a shape in the file that the package reads
+const MOST_POINTS = 5000, MOST_OF_FILE = 100000;  // points of a shape, and of a file, that the package reads
 const ORIGINS = {colour: "Draft by colour", carried: "Draft carried from the drawn frames"};
 const canvas = element("picture"), context = canvas.getContext("2d");
 
@@ -396,6 +396,8 @@ function refresh() {
   parts.push(`${keys} of ${frames.length} frames are keys`);
   if (draft) parts.unshift(ORIGINS[draft.origin] + ": dashed outline, inspect it before you use it");
   if (state !== saved) parts.push("not saved");
+  const points = [state.never, ...state.frames.map((f) => f.shapes)].flat().reduce((sum, s) => sum + s.points.length, 0);
+  if (points > MOST_OF_FILE) parts.push(`${points} points: the command reads a file of at most ${MOST_OF_FILE}`);
   element("shown").textContent = parts.join("; ");
   paint();
 }

@@ -98,7 +98,7 @@ def about_frames(record: SequenceRecord, numbers: Iterable[int]) -> dict[str, ob
 
 
 def depths_shown(scene: MovingScene) -> tuple[float, float, float]:
-    """Minimum and maximum depth of the first picture, and the pivot depth; scene units."""
+    """Ends of the depth colours, from the first picture, and the pivot depth; scene units."""
     out = scene.render(scene.record.times[0], scene.cameras[0])
     return *depth_range(normalised_depth(out)), pivot_depth_of(out.depth, out.opacity)
 

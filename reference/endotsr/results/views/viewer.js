@@ -64,7 +64,8 @@ void main() {
   uvec4 c0 = texelFetch(third, ivec3(at, keys.x), 0), c1 = texelFetch(third, ivec3(at, keys.y), 0);
   vec3 centre = low[0] + range[0] * mix(vec3(a0.xyz), vec3(a1.xyz), between) / 65535.0;
   vec3 logs = low[1] + range[1] * mix(vec3(a0.w, b0.xy), vec3(a1.w, b1.xy), between) / 65535.0;
-  vec3 colour = max(low[2] + range[2] * mix(vec3(c0.xyz), vec3(c1.xyz), between) / 255.0, 0.0);
+  // A negative bias of the exposure gives colours below 0, which (B13) does not clamp.
+  vec3 colour = low[2] + range[2] * mix(vec3(c0.xyz), vec3(c1.xyz), between) / 255.0;
   float opacity = mix(float(c0.w), float(c1.w), between) / 255.0;
   vec4 q = normalize(mix(rotation(b0), rotation(b1), between));
   vec3 p = turn * centre + move;

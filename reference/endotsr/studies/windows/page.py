@@ -65,7 +65,7 @@ class PagePart(NamedTuple):
     """One window of the page."""
 
     span: Span
-    depths: tuple[float, float, float]  # minimum, maximum, pivot
+    depths: tuple[float, float, float]  # ends of the depth colours, pivot
     held_out: list[HeldOutFrame]
     script: str  # content of its file
 
