@@ -4,26 +4,19 @@ import html
 import json
 import re
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import browser
-from remote import Remote
+from drawing_page import HEIGHT, NAMES, SHIFT, WIDTH, Page, drawing
 
-from endotsr.clips.masks import drawn_masks
-from endotsr.clips.masks.drawing import Draft, DrawnClip, DrawnFrame
-from endotsr.clips.masks.drawn_masks import key_masks, read_drawn
-from endotsr.clips.masks.mask_shapes import MOST_POINTS, MaskShape
+from endotsr.clips.masks.drawn_masks import key_masks
+from endotsr.clips.masks.mask_shapes import MaskShape
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.clip import Clip
 from endotsr.errors import InputError
 from endotsr.results.views.draw_page import check_draw_page, draw_page, write_draw_page
 
 pytestmark = pytest.mark.slow  # a browser
-WIDTH, HEIGHT, STEP, COLUMNS = 320, 240, 16, 20
-NAMES = ["000", "</script><img src=x onerror=document.title='taken'>", 'c" onload="x', "003"]
 PAINTED = f"""(() => {{
   const canvas = new OffscreenCanvas({WIDTH}, {HEIGHT}), c = canvas.getContext("2d");
   c.lineCap = c.lineJoin = "round";
@@ -36,80 +29,6 @@ PAINTED = f"""(() => {{
   const data = [...c.getImageData(0, 0, {WIDTH}, {HEIGHT}).data];
   return data.filter((_, i) => i % 4 === 3).map((a) => +(a > 127)).join("");
 }})()"""
-SHIFT = (24.0, 8.0)  # px from one frame of the page to the next
-
-
-def drawing(shapes: list[MaskShape] | None = None) -> DrawnClip:
-    """Four of seven frames; the second one has a draft, the third one may be drawn already."""
-    rng = np.random.default_rng(0)
-    ahead = np.tile(np.array(SHIFT)[:, None], COLUMNS * (HEIGHT // STEP))
-    draft = Draft("colour", [MaskShape(tool="polygon", points=[(200, 20), (300, 20), (300, 90)], origin="colour")])
-    frames = []
-    for i, name in enumerate(NAMES):
-        picture = rng.integers(90, 160, (HEIGHT, WIDTH, 3), np.uint8)
-        drawn = (shapes or []) if i == 2 else []
-        motion = (ahead if i < 3 else None, -ahead if i else None)
-        frames.append(DrawnFrame(2 * i, name, picture, drawn, bool(drawn), draft if i == 1 else None, *motion))
-    return DrawnClip(7, WIDTH, HEIGHT, frames, [], STEP, COLUMNS)
-
-
-def clip() -> Clip:
-    names = [NAMES[i // 2] if i % 2 == 0 else f"between {i}" for i in range(7)]
-    return Clip("pictures", Path("clip"), names, lambda chosen: iter(()))
-
-
-class Page:
-    """The page in the browser, addressed by pixels of the picture."""
-
-    def __init__(self, remote: Remote, folder: Path) -> None:
-        self.remote, self._folder = remote, folder
-        box = remote.value("(({left, top, width, height}) => [left, top, width, height])"
-                           "(document.getElementById('picture').getBoundingClientRect())")  # fmt: skip
-        self._scale = min(box[2] / WIDTH, box[3] / HEIGHT)
-        self._left = box[0] + (box[2] - self._scale * WIDTH) / 2
-        self._top = box[1] + (box[3] - self._scale * HEIGHT) / 2
-
-    def at(self, x: float, y: float) -> tuple[float, float]:
-        """A point of the picture in the window."""
-        return self._left + x * self._scale, self._top + y * self._scale
-
-    def polygon(self, *corners: tuple[float, float]) -> None:
-        for corner in (*corners, corners[0]):
-            self.remote.click(*self.at(*corner))
-
-    def drag(self, *points: tuple[float, float], **how: str) -> None:
-        self.remote.drag([self.at(*point) for point in points], **how)
-
-    def keys(self, text: str) -> None:
-        for key in text:
-            self.remote.key(key)
-
-    def press(self, label: str) -> None:
-        """Click a button by its identifier."""
-        box = self.remote.value(f"(({{left, top, width, height}}) => [left + width / 2, top + height / 2])"
-                                f"(document.getElementById('{label}').getBoundingClientRect())")  # fmt: skip
-        self.remote.click(*box)
-
-    def said(self) -> str:
-        return self.remote.value("document.getElementById('shown').textContent")
-
-    def saved(self):
-        """The file that the page saves, as the package reads it."""
-        file = self._folder / "keys.json"
-        file.unlink(missing_ok=True)
-        self.press("save")
-        end = time.monotonic() + 60
-        while not (file.exists() and file.stat().st_size):  # the browser reserves the name with an empty file
-            assert time.monotonic() < end
-            time.sleep(0.05)
-        return read_drawn(file, clip(), WIDTH, HEIGHT)
-
-
-@pytest.fixture(scope="module")
-def remote(tmp_path_factory):
-    browser()
-    with Remote(tmp_path_factory.mktemp("profile")) as found:
-        yield found
 
 
 @pytest.fixture
@@ -292,152 +211,6 @@ def test_the_page_needs_nothing_else():
     assert about["command"] == "run <it>" and about["frames"][1]["ahead"]["x"][0] == SHIFT[0]
     with pytest.raises(InputError, match=r"allowed: a name that ends in \.html"):
         check_draw_page(Path("draw.png"))
-
-
-def test_a_zoom_with_two_fingers_keeps_the_corners_that_are_set(opened):
-    for corner in ((40, 40), (140, 40), (140, 100)):
-        opened.remote.click(*opened.at(*corner))
-    opened.remote.touch("touchStart", opened.at(100, 150))
-    opened.remote.touch("touchStart", opened.at(100, 150), opened.at(140, 150))
-    opened.remote.touch("touchMove", opened.at(80, 150), opened.at(160, 150))
-    opened.remote.touch("touchEnd")
-    opened.remote.key("Enter")
-    (shape,) = opened.saved().keys[0].shapes
-    np.testing.assert_allclose(shape.points, [(40, 40), (140, 40), (140, 100)], atol=0.6)
-
-
-def test_what_is_drawn_stays_on_the_frame_on_which_it_began(opened):
-    """A key during a stroke or an adjustment shows another frame: its shapes do not change."""
-    remote = opened.remote
-    opened.keys("b")
-    remote.mouse("Pressed", *opened.at(60, 60))
-    remote.mouse("Moved", *opened.at(120, 60))
-    opened.keys(".")
-    remote.mouse("Moved", *opened.at(180, 60))
-    remote.mouse("Released", *opened.at(180, 60))
-    opened.keys("p")
-    opened.polygon((200, 150), (300, 150), (300, 200))
-    opened.keys(",p")
-    opened.polygon((40, 140), (140, 140), (140, 200))
-    opened.keys("m")
-    remote.mouse("Pressed", *opened.at(120, 150))
-    remote.mouse("Moved", *opened.at(130, 150))
-    opened.keys(".")
-    remote.mouse("Moved", *opened.at(200, 150))
-    remote.mouse("Released", *opened.at(200, 150))
-    first, second = opened.saved().keys
-    assert [s.tool for s in first.shapes] == ["brush", "polygon"] and len(second.shapes) == 1
-    assert max(x for x, _ in first.shapes[0].points) < 130
-    np.testing.assert_allclose(first.shapes[1].points, [(50, 140), (150, 140), (150, 200)], atol=1.2)
-    np.testing.assert_allclose(second.shapes[0].points, [(200, 150), (300, 150), (300, 200)], atol=0.8)
-
-
-def test_a_lowered_brush_is_part_of_the_saved_file(opened):
-    opened.remote.value("document.getElementById('picture').focus()")
-    opened.keys("b ")
-    opened.remote.key("ArrowUp", 3, held="shift")
-    assert len(opened.saved().keys[0].shapes) == 1
-    opened.keys(" ")
-    opened.remote.key("ArrowUp", 3, held="shift")
-    opened.keys("z ")  # gives the stroke up, and lowers the brush again
-    assert len(opened.saved().keys[0].shapes) == 2
-
-
-def test_a_copy_of_a_frame_without_an_instrument_deletes_nothing(opened):
-    opened.press("none")
-    opened.keys(".")
-    opened.polygon((40, 40), (140, 40), (140, 100))
-    opened.keys("c")
-    assert len(opened.saved().keys[1].shapes) == 1
-    opened.remote.key("Delete")
-    opened.keys("c")
-    found = opened.saved()
-    assert [key.frame for key in found.keys] == [0, 2] and found.keys[1].shapes == []
-
-
-def test_an_eraser_on_an_empty_frame_makes_no_key(opened):
-    """The frame would count as one without an instrument."""
-    opened.keys("e")
-    opened.drag((60, 60), (120, 60))
-    assert opened.saved().keys == [] and "not drawn" in opened.said()
-
-
-def test_a_frame_that_was_said_to_have_no_instrument_is_cleared(opened):
-    opened.press("none")
-    assert len(opened.saved().keys) == 1
-    opened.press("clear")
-    assert opened.saved().keys == [] and "not drawn" in opened.said()
-
-
-LEAVING = "!window.dispatchEvent(new Event('beforeunload', {cancelable: true}))"
-
-
-def test_an_outline_that_is_not_closed_is_no_saved_work(opened):
-    assert not opened.remote.value(LEAVING)
-    opened.remote.click(*opened.at(40, 40))
-    assert opened.remote.value(LEAVING)
-    opened.remote.key("Escape")
-    assert not opened.remote.value(LEAVING)
-
-
-HELD = """((key) => { for (const repeat of [false, true, true]) document.getElementById('picture').dispatchEvent(
-  new KeyboardEvent('keydown', {key, repeat, bubbles: true, cancelable: true})); })"""
-
-
-def test_a_key_that_is_held_acts_once(opened):
-    opened.polygon((40, 40), (140, 40), (140, 100))
-    opened.keys(".")
-    opened.remote.value(f"{HELD}('c')")
-    assert len(opened.saved().keys[1].shapes) == 1
-    opened.keys("..b")
-    opened.remote.value(f"{HELD}(' ')")
-    opened.remote.key("ArrowUp", 3, held="shift")
-    opened.keys(" ")
-    (stroke,) = opened.saved().keys[2].shapes
-    assert len(stroke.points) > 1
-
-
-@pytest.mark.parametrize("key", ["b", "p"])
-def test_a_long_stroke_is_a_file_that_is_read(key, opened):
-    """A shape of the file has at most 5000 points."""
-    opened.keys(key)
-    opened.remote.mouse("Pressed", *opened.at(20, 20))
-    x0, y0 = opened.at(20, 20)
-    scribble = f"""(() => {{ const c = document.getElementById('picture');
-      for (let i = 0; i < 6000; i++) c.dispatchEvent(new PointerEvent('pointermove', {{pointerId: 1, buttons: 1,
-        clientX: {x0} + (i % 2) * 300, clientY: {y0} + i / 20}})); }})()"""
-    opened.remote.value(
-        f"for (const f of ['stroke', 'lineTo']) CanvasRenderingContext2D.prototype[f] = () => 0; {scribble}"
-    )
-    opened.remote.mouse("Released", *opened.at(20, 160))
-    found = opened.saved()
-    assert sum(len(shape.points) for shape in found.keys[0].shapes) > 2500
-    if key == "b":
-        assert len(found.keys[0].shapes) == 2
-        assert found.keys[0].shapes[0].points[-1] == found.keys[0].shapes[1].points[0]
-        assert key_masks(found).keys[0][:, 30:100].any(axis=1).sum() > 100
-        opened.keys("z")
-        assert opened.saved().keys == []
-
-
-def test_the_page_divides_a_stroke_where_the_file_ends_it():
-    text = draw_page(drawing(), "a", "b")
-    assert int(re.search(r"MOST_POINTS = (\d+)", text)[1]) == MOST_POINTS
-    assert int(re.search(r"MOST_OF_FILE = (\d+)", text)[1]) == drawn_masks.MOST_POINTS
-
-
-def test_the_page_says_that_its_file_has_too_many_points(tmp_path, remote):
-    many = MaskShape(tool="polygon", points=[(40 + k / 50, 40 + k % 2) for k in range(5000)])
-    for count, said in ((20, False), (21, True)):
-        write_draw_page(tmp_path / "draw.html", drawing([many] * count), "a clip", "x")
-        page = Page(remote.open(tmp_path / "draw.html", tmp_path), tmp_path)
-        assert ("105000 points: the command reads a file of at most 100000" in page.said()) is said
-
-
-def test_frames_of_long_names_are_as_wide_as_the_others(opened):
-    widths = opened.remote.value("[...document.querySelectorAll('#strip button')].map((b) => b.offsetWidth)")
-    titles = opened.remote.value("[...document.querySelectorAll('#strip button')].map((b) => b.title)")
-    assert len(set(widths)) == 1 and titles == NAMES
 
 
 def test_the_commands_draw_carry_and_draw_again(tmp_path, capsys):

@@ -29,13 +29,6 @@ SLIDE = """((time) => { const slider = document.getElementById('slider'); slider
 
 
 @pytest.fixture(scope="module")
-def remote(tmp_path_factory):
-    browser()
-    with Remote(tmp_path_factory.mktemp("profile")) as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
 def held_out(tmp_path_factory):
     """A page with three held-out frames, and their names and times."""
     sequence = simulate(SimulatorSettings(width=64, height=48, frames=20)).sequence

@@ -24,7 +24,7 @@ let open = null;     // corners of the polygon that is being drawn
 let stroke = null;   // brush stroke that is being drawn
 let held = null;     // {index, corner, from, points}: what Adjust moves
 let cross = [width / 2, height / 2], crossShown = false;
-let view = {scale: 1, x: 0, y: 0};  // screen = picture * scale + (x, y), in pixels of the canvas
+let view = {scale: 0, x: 0, y: 0};  // screen = picture * scale + (x, y), in pixels of the canvas
 
 const shapesOf = (s, k) => (k === "never" ? s.never : s.frames[at].shapes);
 function changed(shapes) {  // the shapes of the current kind
@@ -89,9 +89,7 @@ function paint() {
   const tall = Math.min(clientWidth * height / width, room);
   canvas.style.height = tall + "px";
   if (canvas.width !== Math.round(clientWidth * factor) || canvas.height !== Math.round(tall * factor)) {
-    canvas.width = Math.round(clientWidth * factor);
-    canvas.height = Math.round(tall * factor);
-    fit();
+    sized(Math.round(clientWidth * factor), Math.round(tall * factor));
   }
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.clearRect(0, 0, canvas.width, canvas.height);
@@ -151,15 +149,24 @@ function corner([x, y], pixel, colour) {
 }
 
 // ---------------------------------------------------------------- the view
+const least = () => Math.min(canvas.width / width, canvas.height / height);
+function sized(across, down) {  // a zoom stays, with the same point in the middle
+  const {scale, x, y} = view, zoomed = scale / least();
+  const middle = [(canvas.width / 2 - x) / scale, (canvas.height / 2 - y) / scale];
+  canvas.width = across;
+  canvas.height = down;
+  fit();
+  const now = zoomed * least();
+  if (zoomed > 1) view = {scale: now, x: across / 2 - middle[0] * now, y: down / 2 - middle[1] * now};
+}
 function fit() {
-  const scale = Math.min(canvas.width / width, canvas.height / height);
+  const scale = least();
   view = {scale, x: (canvas.width - scale * width) / 2, y: (canvas.height - scale * height) / 2};
 }
 function zoom(factor, [x, y]) {  // about a point of the picture
-  const least = Math.min(canvas.width / width, canvas.height / height);
-  const scale = Math.min(Math.max(view.scale * factor, least), MOST_ZOOM * least);
+  const scale = Math.min(Math.max(view.scale * factor, least()), MOST_ZOOM * least());
   view = {scale, x: view.x + x * (view.scale - scale), y: view.y + y * (view.scale - scale)};
-  if (scale === least) fit();
+  if (scale === least()) fit();
   paint();
 }
 function pan(dx, dy) { view = {...view, x: view.x + dx, y: view.y + dy}; paint(); }
