@@ -2,9 +2,10 @@
 
 Compares the working tree with REVISION (the last commit by default; with a clean tree, the commit before it), and
 prints the commands in order: lint, types of the changed files, the golden cases to make again, the lists that have to
-name a new component, the other programs whose output depends on the change, the tests of the rooms that it touches, and
-all other tests that import a changed module, which take longest. `--run` runs them and stops at the first that fails.
-It leaves out `golden/make.py write`, because no run of tests rewrites its expected values: run that command first.
+name a new component, the other programs whose output depends on the change, the tests of names, words and generated
+tables, the tests of the rooms that it touches, and all other tests that import a changed module, which take longest.
+`--run` runs them and stops at the first that fails. It leaves out `golden/make.py write`, because no run of tests
+rewrites its expected values: run that command first.
 """
 
 import argparse
@@ -16,8 +17,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = "reference/endotsr/"
 FORMATTED = ("reference", "golden", "tests", "notebooks", "docs/_extensions", "docs/pages", "docs/make.py")
-# Hold for the whole package: names, words, layers. Less than a minute together.
-ALWAYS = ("tests/test_layout.py", "tests/test_conventions.py", "tests/docs/test_glossary.py")
+# Hold for the whole tree: names, words, layers, generated tables. They take minutes, and less than any room.
+ALWAYS = (
+    "tests/test_layout.py",
+    "tests/test_conventions.py",
+    *(f"tests/docs/test_{name}.py" for name in ("glossary", "strong_words", "bare_figures", "generated_pages")),
+)
 # Compare lists that are written by hand with the package: what is missing there shows in seconds, not after minutes.
 LISTS = (
     "tests/definition/test_door.py",
@@ -54,6 +59,8 @@ MORE = {
     f"{PACKAGE}clips/formats/": ("tests/clips/sequences", "tests/docs/test_generated_pages.py"),
     f"{PACKAGE}clips/prepare/": ("tests/clips/sequences",),
     f"{PACKAGE}config.py": ("tests/test_specification.py", "tests/cli/test_cli_options.py", "tests/port/vectors"),
+    f"{PACKAGE}training/fitting/records.py": ("tests/results/report",),
+    "tests/fuzz/": ("tests/fuzz",),
     f"{PACKAGE}api.py": ("tests/test_api.py",),
     f"{PACKAGE}cli/": ("tests/cli",),
     "golden/": ("tests/port/vectors", "tests/port/judge/test_profiles.py", "tests/docs/test_equation_map.py"),
@@ -130,12 +137,12 @@ def importing(paths: list[str]) -> list[str]:
 
 def tested(paths: list[str]) -> list[str]:
     """The tests of the rooms, then the other tests that import a changed module; a folder stands for its files."""
-    tests = dict.fromkeys([*ALWAYS, *(test for path in paths for test in tests_of(path))])
+    tests = dict.fromkeys(test for path in paths for test in tests_of(path) if test not in ALWAYS)
     folders = {test for test in tests if not test.partition("::")[0].endswith(".py")}
     outside = lambda test: not any(str(up) in folders for up in Path(test).parents)
     near = filter(outside, tests)
-    far = (test for test in importing(paths) if outside(test) and test not in tests)
-    return [f"pytest -q {words}" for words in map(" ".join, (near, far)) if words]
+    far = (test for test in importing(paths) if outside(test) and test not in {*tests, *ALWAYS})
+    return [f"pytest -q --maxfail 3 {words}" for words in map(" ".join, (near, far)) if words]
 
 
 def commands(paths: list[str]) -> list[str]:
@@ -154,6 +161,7 @@ def commands(paths: list[str]) -> list[str]:
         *written,  # a list below reads the stored cases, and refuses those of another VERSION
         *([f"pytest -q -n 0 {' '.join(LISTS)}"] if any(path.startswith(LISTED) for path in paths) else []),
         *(name for name in programs if name not in written),
+        f"pytest -q -n 0 {' '.join(ALWAYS)}",
         *tested(paths),
     ]
 

@@ -209,6 +209,7 @@ def main(root: Path) -> None:
     print(f"functions above {LONGEST_FUNCTION} lines: {len(long)}")
     for f in sorted(long, key=lambda f: -f.lines):
         print(f"    {f.lines:4d} {f.name}")
+    print(f"functions of exactly {LONGEST_FUNCTION} lines: {sum(f.lines == LONGEST_FUNCTION for f in found)}")
     loose = untyped(root)
     print(f"lines with dict[str, Any]: {sum(loose.values())}:", ", ".join(f"{name} {n}" for name, n in loose.items()))
     up, round_ = upward(root), circles(root)

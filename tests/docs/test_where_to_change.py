@@ -21,6 +21,7 @@ CHANGES = {  # the most files of code that a change may take
     "effect of the simulator": 4,
     "row of the report": 1,
     "key of a reader": 5,
+    "record of a run": 4,
 }
 
 SECTIONS = re.findall(r"^## \d+\. (.+?)\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)

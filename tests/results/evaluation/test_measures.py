@@ -17,9 +17,10 @@ from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.results.evaluation import measures
+from endotsr.results.evaluation.baselines import unit_image
 from endotsr.results.evaluation.depth import held_out_depth
 from endotsr.results.evaluation.measures import MEASURES, flicker, measure_lines, measured
-from endotsr.results.evaluation.right_view import moved_left, right_view, stereo_baseline
+from endotsr.results.evaluation.right_view import FLOW, moved_flow, moved_left, right_view, stereo_baseline
 
 LEVEL = np.float32(1 / 255)
 
@@ -191,10 +192,31 @@ def test_the_true_right_view_is_better_than_the_moved_left_picture_and_that_than
     rows = rows_of(found)
     assert rows["this model"]["held_out_psnr"] == pytest.approx(40.0, abs=0.5)  # a constant error of 0.01
     order = [rows[label]["held_out_psnr"] for label in rows]
-    assert list(rows) == ["this model", "left picture moved by the prior depth", "left picture as it is"]
-    assert order == sorted(order, reverse=True) and order[1] > order[2] + 1
+    assert list(rows) == ["this model", "left picture moved by the prior depth", FLOW, "left picture as it is"]
+    assert order == sorted(order, reverse=True) and order[2] > order[3] + 1
     assert asked[0].translation[0] == pytest.approx(-settings.stereo.baseline, rel=0.05)
     assert rows["this model"]["training_psnr"] == pytest.approx(40.0, abs=0.5)
+
+
+def test_the_moved_flow_is_a_prediction_for_held_out_frames_and_reads_none_of_them(pair):
+    folder, sequence, settings = pair
+    found = rows_of(
+        right_view(sequence, str(folder), SequenceConfig(), lambda i, camera: render_of(unit_image(sequence, i)))
+    )
+    assert "training_psnr" not in found[FLOW] and found[FLOW]["held_out_psnr"] > 20
+    held_out = int(sequence.test_index[0])
+    before = moved_flow(sequence, held_out, settings.stereo.baseline)
+    sequence.images[held_out], sequence.depth[held_out] = 0, 0
+    np.testing.assert_array_equal(moved_flow(sequence, held_out, settings.stereo.baseline), before)
+
+
+def test_flow_at_rest_moves_by_the_disparity_and_its_hole_repeats_the_nearest_column():
+    sequence = sequence_of(textured(0.0))
+    moved = moved_flow(sequence, 1, 5.0)  # f B / z = 6 px
+    np.testing.assert_allclose(moved[:, :, :58], unit_image(sequence, 1)[:, :, 6:], atol=2e-3)
+    np.testing.assert_array_equal(moved[:, :, 58:], np.repeat(moved[:, :, 57:58], 6, axis=2))
+    sequence.depth[:] = 0
+    np.testing.assert_allclose(moved_flow(sequence, 1, 5.0), unit_image(sequence, 1), atol=2e-3)
 
 
 def test_the_instrument_does_not_count_in_the_right_view(pair):

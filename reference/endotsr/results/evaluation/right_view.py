@@ -10,6 +10,9 @@ Evaluated pixels: every left pixel is warped to the right picture by its prior d
 is kept. A left pixel without depth is warped by the depth of the nearest pixel with one. A right pixel is evaluated if
 the left pixel that it then shows is tissue and has a depth of its own, except in a margin along the border of these
 pixels. This choice does not depend on a model.
+
+At held-out times the moved left picture is itself held out, and a model does not see it. A prediction that sees what a
+model sees is the optical flow between the neighbouring left pictures, moved by the blend of their prior depths.
 """
 
 from collections.abc import Callable
@@ -26,7 +29,8 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
-from endotsr.results.evaluation.baselines import unit_image
+from endotsr.results.evaluation.baselines import flow_interpolation, unit_image
+from endotsr.results.evaluation.depth import blended_prior
 from endotsr.results.evaluation.evaluate import training_sample
 from endotsr.results.evaluation.metrics import psnr_tissue, ssim_tissue
 from endotsr.results.evaluation.records import Measured, MeasureRow
@@ -37,6 +41,7 @@ FOLDER = "images_right"
 MATCHED_FRAMES = 5  # number of frames for the stereo baseline
 SEARCHED = 4  # disparities up to 1 / SEARCHED of the width
 SPREAD = 0.15  # largest (third - first quartile) / median of the baseline for a calibrated pair
+FLOW = "flow between the neighbours, moved by the blend of their depths"
 MARGIN = 3  # px removed at the border of the evaluated region
 LEAST_PIXELS = 100  # tissue pixels with disparity and depth
 
@@ -56,7 +61,8 @@ def right_view(
     source   sequence folder with images_right/
     render   frame number and camera -> render
     returns  {"baseline", "spread", "unit", "rows": [{"label", "held_out_psnr", "held_out_ssim", "training_psnr",
-             "training_ssim"}]} for the model, the warped left picture, and the unchanged left picture; or {"reason"}
+             "training_ssim"}]} for the model, the warped left picture, the warped flow between its neighbours (at
+             held-out times alone), and the unchanged left picture; or {"reason"}
     """
     folder = Path(source) / FOLDER
     if source in (SIMULATED, IN_MEMORY) or not folder.is_dir():  # these words name no folder
@@ -70,7 +76,7 @@ def right_view(
         return {"reason": f"disparity and depth give no consistent baseline ({baseline:.3g}, spread {spread:.0%})"}
     rows: dict[str, MeasureRow] = {}
     for part, frames in (("held_out", sequence.test_index), ("training", training_sample(sequence))):
-        values = [_frame(sequence, int(i), baseline, right(i), render) for i in frames]
+        values = [_frame(sequence, int(i), baseline, right(i), render, part == "held_out") for i in frames]
         for label in values[0] if values else ():
             psnr, ssim = np.array([value[label] for value in values]).T
             row = rows.setdefault(label, {"label": label})
@@ -106,7 +112,7 @@ def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]
 
 def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
     """The left picture warped by its prior depth; holes are 0 and not evaluated."""
-    from scipy.ndimage import binary_erosion, distance_transform_edt
+    from scipy.ndimage import binary_erosion
 
     from endotsr.clips.opencv import sample_bilinear
 
@@ -114,21 +120,54 @@ def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
     height, width = mask.shape
     if not (depth > 0).any():
         return Moved(np.zeros((3, height, width), np.float32), np.zeros(mask.shape, bool))
-    nearest = np.asarray(distance_transform_edt(depth <= 0, return_distances=False, return_indices=True))
-    filled = np.where(depth > 0, depth, depth[nearest[0], nearest[1]])
-    shift = sequence.cameras[index].fx * baseline / filled
-    rows, columns = np.indices(mask.shape)
-    there = np.rint(columns - shift).astype(int)
-    inside = there >= 0
-    front = np.full(mask.shape, np.inf, np.float32)
-    np.minimum.at(front, (rows[inside], there[inside]), filled[inside])
-    seen = np.isfinite(front)
-    x = columns + np.where(seen, sequence.cameras[index].fx * baseline / np.where(seen, front, 1), 0)
+    x, seen = _shown_columns(depth, sequence.cameras[index].fx * baseline)
+    rows = np.indices(mask.shape)[0]
     at = np.clip(np.rint(x).astype(int), 0, width - 1)
     counted = seen & (x <= width - 1) & mask[rows, at] & (depth[rows, at] > 0)
     kept: BoolArray = np.asarray(binary_erosion(counted, iterations=MARGIN)).astype(bool)
     picture = sample_bilinear(unit_image(sequence, index), x, rows.astype(float))
     return Moved(np.where(seen, picture, 0).astype(np.float32), kept)
+
+
+def moved_flow(sequence: Sequence, index: int, baseline: float) -> FloatArray:
+    """The flow between the neighbouring training frames, warped by the blend of their prior depths.
+
+    returns   (3, H, W) display units; a hole has the colour of the nearest pixel that is shown, and without any depth
+              the picture is not warped
+    """
+    from endotsr.clips.opencv import sample_bilinear
+
+    predicted, depth = flow_interpolation(sequence, index), blended_prior(sequence, index)
+    if not (depth > 0).any():
+        return predicted
+    x, seen = _shown_columns(depth, sequence.cameras[index].fx * baseline)
+    picture = sample_bilinear(predicted, x, np.indices(seen.shape)[0].astype(float)).astype(np.float32)
+    return picture[:, *_nearest(seen)]
+
+
+def _shown_columns(depth: FloatArray, focal_baseline: float) -> tuple[NDArray[np.float64], BoolArray]:
+    """The column of the left picture that every pixel of the right one shows, and whether one shows there; (H, W).
+
+    depth            (H, W) of the left picture, positive somewhere; a pixel without one has that of the nearest pixel
+    focal_baseline   f B, px times scene units
+    """
+    filled = depth[_nearest(depth > 0)]
+    rows, columns = np.indices(depth.shape)
+    there = np.rint(columns - focal_baseline / filled).astype(int)
+    inside = there >= 0
+    front = np.full(depth.shape, np.inf, np.float32)
+    np.minimum.at(front, (rows[inside], there[inside]), filled[inside])
+    seen: BoolArray = np.isfinite(front)
+    return np.where(seen, columns + focal_baseline / np.where(seen, front, 1), columns), seen
+
+
+def _nearest(known: BoolArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Row and column of the nearest known pixel, for every pixel; (H, W) each."""
+    from scipy.ndimage import distance_transform_edt
+
+    found = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    rows, columns = np.asarray(found, np.intp)
+    return rows, columns
 
 
 def _frame(
@@ -137,6 +176,7 @@ def _frame(
     baseline: float,
     right: NDArray[np.uint8],
     render: Callable[[int, Camera], RenderOut],
+    held_out: bool,
 ) -> dict[str, tuple[float, float]]:
     """PSNR and SSIM of one frame by label."""
     truth = right.astype(np.float32) / np.float32(255)
@@ -144,6 +184,7 @@ def _frame(
     pictures = {
         "this model": np.clip(render(index, camera).colour, 0, 1),
         "left picture moved by the prior depth": moved.picture,
+        **({FLOW: moved_flow(sequence, index, baseline)} if held_out else {}),
         "left picture as it is": unit_image(sequence, index),
     }
     return {
