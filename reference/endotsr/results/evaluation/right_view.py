@@ -152,7 +152,8 @@ def _shown_columns(depth: FloatArray, focal_baseline: float) -> tuple[NDArray[np
     focal_baseline   f B, px times scene units
     """
     filled = depth[_nearest(depth > 0)]
-    rows, columns = np.indices(depth.shape)
+    height, width = depth.shape
+    rows, columns = np.indices((height, width))
     there = np.rint(columns - focal_baseline / filled).astype(int)
     inside = there >= 0
     front = np.full(depth.shape, np.inf, np.float32)
