@@ -220,7 +220,7 @@ def gain(name, variant):
 # ## The pictures
 #
 # The figures show one held-out frame of the first two clips. The lower row of each has the absolute error over tissue,
-# from 0 (black) to 0.1 (white), and on its left the change of the frame since frame 0.
+# from 0 (black) to 0.1 (pale yellow), and on its left the change of the frame since frame 0.
 
 
 # %% tags=["hide-input"]
@@ -326,7 +326,7 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 # loss constrains the painted colour there, and A loses several decibels. A gain on training frames occurs in both cases
 # and does not distinguish them.
 #
-# How the loss depends on the rate is not obvious. The next cell adds two rates, with one seed each.
+# How this change of the PSNR depends on the rate is not obvious. The next cell adds two rates, with one seed each.
 
 # %%
 for cycles in (2.0, 6.0):
@@ -342,7 +342,7 @@ print(", ".join(f"{cycles} breaths: {value:+.1f} dB" for cycles, value in held.i
 assert held[1] > 0 > held[4] and held[6] > held[4], "not monotonic in the rate"
 
 # %% [markdown]
-# The loss does not grow monotonically with the rate.
+# The decrease of the PSNR does not grow monotonically with the rate.
 #
 # Other pages of the book report the following numbers; the explanations are our interpretation and were not tested:
 #

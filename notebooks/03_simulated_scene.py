@@ -313,18 +313,23 @@ assert report.passed
 # 1. Why can no Gaussian start at a pixel without prior depth? What follows for tissue under an instrument?
 # 2. Write `initialise` for given draws and let the golden cases judge it: `--only initialisation` ({doc}`index`). The
 #    case `one_point` has no neighbour from which a scale could be made.
-# 3. The cell below answers this one. No picture, mask or depth of a held-out frame contributes to the initial
-#    Gaussians. How would you test whether that is true of a program whose source you cannot read?
+# 3. The cell below answers this one. Once a clip is read, no picture, mask or depth of a held-out frame contributes to
+#    the initial Gaussians; {doc}`/specification/b12_initialisation` says what has an effect before. How would you test
+#    whether that is true of a program whose source you cannot read?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Change the held-out frames arbitrarily; the result must stay bitwise equal.
 import dataclasses
 
 spoiled = dataclasses.replace(
-    sequence, images=sequence.images.copy(), depth=sequence.depth.copy()
+    sequence,
+    images=sequence.images.copy(),
+    depth=sequence.depth.copy(),
+    masks=sequence.masks.copy(),
 )
 spoiled.images[sequence.test_index] = 7
 spoiled.depth[sequence.test_index] = 1e6
+spoiled.masks[sequence.test_index] ^= True
 few = InitialisationConfig(first_frame_points=300, other_frame_points=600, motion_threshold=1.0)
 one, other = (
     initialise(s, few, ModelConfig(), np.random.default_rng(3)) for s in (sequence, spoiled)

@@ -353,9 +353,9 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # %% [markdown]
 # ## The gradient check
 #
-# The weights span five decades, and the gradient is small by construction ($10^{-7}$ with 30 000 Gaussians). A check
-# with an absolute tolerance, or with one norm over all entries, would accept a wrong weight of a low frequency. This
-# check is relative and treats each atom separately.
+# The weights span five decades, and the gradient is small by construction: with 30 000 Gaussians its factors
+# $\rho_f/(3NF)$ are $4\cdot10^{-11}$ to $10^{-5}$. A check with an absolute tolerance, or with one norm over all
+# entries, would accept a wrong weight of a low frequency. This check is relative and treats each atom separately.
 
 # %%
 with one_thread():
@@ -373,10 +373,10 @@ assert all(report.passed for report in reports)
 #    the fastest frequency change?
 # 2. Write the pair of the penalty {eq}`eq-4` and let the golden cases judge it: `--only matern`. Then write the pair of
 #    {eq}`eq-3`: `--only motion` ({doc}`index`).
-# 3. The cell below answers this one. The raw cosines are 1 at $t=0$, so $C$ can contain a constant offset of the
-#    position. The canonical position could represent this offset at no cost. Does the penalty allow it in $C$? Then
-#    fit a slow drift $x=t$ with the atoms. How does its penalty compare with that of an oscillation of the same size
-#    at 16 cycles?
+# 3. The cell below answers this one. Raw atoms whose frequency is no whole number have a mean over the clip that is not
+#    0, so $C$ can contain a constant offset of the position. The canonical position could represent this offset at no
+#    cost. Does the penalty allow it in $C$? Then fit a slow drift $x=t$ with the atoms. How does its penalty compare
+#    with that of an oscillation of the same size at 16 cycles?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The penalty allows the offset at a cost, and the canonical position represents it at

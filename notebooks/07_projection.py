@@ -330,8 +330,9 @@ plt.show()
 # same way for $v$.
 #
 # **(7.9) The depth in $J$.** With $x'$ held fixed, $\partial J_{00}/\partial z=-f_x/z^2$ and
-# $\partial J_{02}/\partial z=2f_xx'/z^3$. The definition keeps the slope $x'/z$ fixed instead: $J_{02}=-f_x(x'/z)/z$ then
-# has a single $1/z$, and the rest is the term of (7.7).
+# $\partial J_{02}/\partial z=2f_xx'/z^3$. The definition takes the slope $x'/z$ as the variable instead:
+# $J_{02}=-f_x(x'/z)/z$ then has a single $1/z$. A free slope also depends on $z$, by $\partial(x/z)/\partial z=-x/z^2$; a
+# clamped one does not.
 #
 # **(7.10) Into the world.** The point $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
 #

@@ -17,7 +17,7 @@
 # paper derives this number, $\lambda_{\mathrm{lap}}$, from gradients. During training a ramp raises the weight from 0 to
 # $\lambda_{\mathrm{lap}}$, its full value ({doc}`14_full_sequence`). At full weight, and in the median over the views, the
 # gradient of the Laplacian loss with respect to the rendered image has a fixed ratio $r$ to the gradient of the
-# photometric loss. The paper uses the result, 0.83, for all sequences. Whether another sequence asks for another weight
+# photometric loss. The paper uses the result, 0.83, for all sequences. Whether another sequence needs another weight
 # is not measured here; a table of {doc}`/specification/rulings` has the weights of two recorded clips.
 #
 # The preset `paper` does not calibrate. With `loss.lambda_lap = "auto"` the program first trains the base model, without
@@ -122,11 +122,11 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # def calibrate(views, gradient_ratio):
 #     """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or without finite numbers is dropped.
 #
-#     Raises: ValueError if no view remains or the median is 0.
+#     Raises: ValueError if no view remains, or the median is 0 or too small to divide by.
 #     """
 #     ratios = np.array([fine / rgb for _, rgb, fine in views if 0 < rgb < np.inf and np.isfinite(fine / rgb)])  # (12.6)
-#     if ratios.size == 0 or np.median(ratios) == 0:
-#         raise ValueError("calibration: no view has a ratio, or their median is 0")
+#     if ratios.size == 0 or np.median(ratios) == 0 or not np.isfinite(gradient_ratio / np.median(ratios)):
+#         raise ValueError("calibration: no view has a ratio, or their median is 0 or too small")
 #     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (12.3), (12.4)
 # ```
 

@@ -656,8 +656,8 @@ assert ratio > 1.2 and growth[-1] == clip.about["gaussians"]
 assert np.diff(growth).max() < 1.02 * np.diff(growth)[np.diff(growth) > 0].min()
 
 # %% [markdown]
-# More of the steepest Gaussians lie along vessels and around highlights, where a shift of a Gaussian changes the
-# picture, than on flat tissue: the true picture is steeper at their centres.
+# At the centres of the steepest Gaussians the true picture is steeper on average, as it is along vessels and around
+# highlights, where a shift of a Gaussian changes the picture.
 
 # %%
 steepness = np.where(

@@ -246,7 +246,7 @@ def score(state, constants, frames, **components):
 # %% [markdown]
 # ## One frame
 #
-# This run uses only the first training frame. Nothing moves, so every component of motion is off.
+# This run uses only the first training frame. Nothing moves, so every component of motion is off, and so is A.
 
 # %%
 first = int(sequence.train_index[0])
@@ -396,10 +396,11 @@ for k in sequence.test_index:
 # %% [markdown]
 # ## Held-out frames: the pictures
 #
-# Held-out frames are not used in any part of training: neither in the losses, nor for the initial points, nor in the
-# statistics of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each
-# residual on the image. The effect of S on the picture is small in this run. {doc}`00_why` shows that a larger
-# learning rate does not make S follow the motion.
+# Once the clip is read, no pixel of a held-out frame is used in training: neither in the losses, nor for the initial
+# points, nor in the statistics of the atoms. Their number, the far limits of their depth and a repeated picture have an
+# effect before ({doc}`/specification/b12_initialisation`). The figure shows the truth, the render, the error over
+# tissue, and the effect of each residual on the image. The effect of S on the picture is small in this run.
+# {doc}`00_why` shows that a larger learning rate does not make S follow the motion.
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
@@ -543,7 +544,9 @@ plt.show()
 # Preset `quick`, 1600 iterations, 22000 Gaussians; AMD EPYC, 2026-11-26.
 # <!-- running_clip:table:end -->
 #
-# ![PSNR of every held-out frame at full size](/results/full_size/curves.svg)
+# ![PSNR of every held-out frame: paper, an earlier run of quick, copy, blend and flow](/results/full_size/curves.svg)
+#
+# The run of `quick` in the picture is that of {doc}`/full_size`, an earlier one than those of the table.
 #
 # The book keeps an extract of the first of these runs: the held-out frame at which the blend is worst, its neighbours, and
 # the trained scene at its time. Where will the errors of blend and model lie?

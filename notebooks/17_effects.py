@@ -257,8 +257,8 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # this limit? It need not. The slower sinusoid is seldom one of the eight of the dictionary, and the rank is then full.
 # The plan therefore limits three quantities: the highest frequency, the rank, and the condition number, which is the
 # ratio of the largest to the smallest singular value. The relative error of fitted coefficients is at most the
-# condition number times the relative error of the values to which they are fitted. Of the lengths below, only 20 frames
-# have a condition above 100. From 33 frames on it is at most 1.5 times that of 63 frames.
+# condition number times the error of the values, relative to the part of them that the atoms fit. Of the lengths below,
+# only 20 frames have a condition above 100. From 33 frames on it is at most 1.5 times that of 63 frames.
 
 
 # %% tags=["transcription"]

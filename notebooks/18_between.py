@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 18. Targets between the frames
 #
-# Every loss on images so far is computed at the time of a training frame, and none reads a render between two of them. In
-# {doc}`00_why` a clip breathes four times. There the colour residual gains on the training frames and loses several
-# decibels on the held-out frames. The preset `sharp` therefore also renders times between the frames. It compares these
-# renders with targets that are made from both frames, moved along their optical flow.
+# Apart from chapter 14, which trains its full sequence with the targets of this chapter, every loss on images so far is
+# computed at the time of a training frame, and none reads a render between two of them. In {doc}`00_why` a clip
+# breathes four times. There the colour residual gains on the training frames and loses several decibels on the held-out
+# frames. The preset `sharp` therefore also renders times between the frames. It compares these renders with targets
+# that are made from both frames, moved along their optical flow.
 #
 # The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is optional and not in the paper.
 
@@ -389,8 +390,8 @@ assert q[8:40, 16:-16].mean() < 0.02 and q[56:-8, 16:-16].mean() > 0.98
 #
 # The clip has breathing, a beat, a pulled spot, light that changes, highlights and a grasper, here with 16 frames.
 # Frame 8 is predicted from the frames 6 and 10; the frames between them are not read. Below each picture is its error,
-# from 0 (black) to 0.15 (white). The last panel shows $q$. Its mean is about one half where the motion is below a tenth
-# of a pixel. It is smaller where the static frames differ more.
+# from 0 (black) to 0.15 (pale yellow); excluded pixels are white. The last panel shows $q$. Its mean is about one half
+# where the motion is below a tenth of a pixel. It is smaller where the static frames differ more.
 
 # %% tags=["hide-input"]
 scene = replace(named_scene("pulling"), width=160, height=128, frames=16)

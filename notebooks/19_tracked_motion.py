@@ -299,11 +299,11 @@ assert error[-1, one] > 1, "found again, on other tissue"
 # $r_i=0$. Without the weights of $C$, the 17 unknowns fit $17/21$ of the variance of independent noise at the 21
 # training times of the first clip. With them they fit less than 0.7 of it.
 #
-# **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion
-# that consists of one atom of amplitude $A$ would be fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$, if this atom
-# were orthogonal to all others and to a constant. With $n=20$ the weight $0.1$ costs $0.1/10.1$ of the amplitude;
-# $30\rho$ removes more than half of the two fastest atoms. In this way the penalty {eq}`eq-4` acts before training
-# begins.
+# **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
+# consists of one atom of amplitude $A$ would be fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$, if this atom were
+# orthogonal to all others and to a constant. With $n=20$ the weight $0.1$ costs $0.1/10.1$ of the amplitude; $30\rho$
+# removes more than half of the atoms of the two fastest frequencies. In this way the penalty {eq}`eq-4` acts before
+# training begins.
 #
 # <!-- definition: endotsr.training.scene.tracked_motion.with_tracked_motion -->
 # ```python
@@ -470,8 +470,9 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. A track is 4 frames long in a clip of 60, and the point is carried through the other frames. Use (19.7) to say
-#    which frames decide the path. What would $a_{pi}=0$ change for a point that is followed at one frame only?
+# 1. A track is 4 frames long in a clip of 60 training frames, and the point is carried through the other frames. Use
+#    (19.7) to say which frames decide the path. What would $a_{pi}=0$ change for a point that is followed at one frame
+#    only?
 # 2. Write `motion_reverse` of {eq}`eq-3`, with which (19.6) can be written for any loss, and let the golden cases judge
 #    it: `--only motion` ({doc}`index`). Then write the solution of (19.7) and let the cell below (19.6) judge it.
 # 3. The cell below answers this one. Replace the weight $30\rho_k+0.1$ by 0.1 for all atoms. What happens to the paths

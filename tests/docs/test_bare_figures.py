@@ -46,7 +46,8 @@ def test_an_entry_of_a_list_is_found_by_its_values(tmp_path):
     (tmp_path / "a.json").write_text('{"rows": [{"n": 1, "p": "x", "v": 2.5}, {"n": 1, "p": "y", "v": 4}]}')
     at = lambda path: figures.value(figures.Figure("a.json", path, "{}"), tmp_path)
     assert at("rows.n=1&p=y.v") == 4 and at("rows.0.v") == 2.5
-    for path in ("rows.n=1.v", "rows.p=z.v"):  # two entries, and none
+    assert at("rows.*.v") == 3.25 and at("rows.*n=1&p=x.v") == 2.5
+    for path in ("rows.n=1.v", "rows.p=z.v", "rows.*p=z.v"):  # two entries, and none
         with pytest.raises(InputError, match=re.escape(f"no {path}")):
             at(path)
 

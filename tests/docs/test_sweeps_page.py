@@ -3,11 +3,12 @@
 import json
 
 import pytest
-from pages.full_size import sweeps
+from pages.full_size import other_views, sweeps
 from pages.store.intervals import interval
 from pages.store.program import RESULTS
 
 from endotsr.errors import InputError
+from endotsr.results.evaluation import right_view
 
 KEPT_BY_A_CHECKPOINT = ("deformation", "exposure", "pose_correction", "bases", "harmonics_degree", "frequencies")
 FILES = {file.stem: file for file in sweeps.files()}
@@ -23,7 +24,7 @@ def row(configuration, seed, psnr, **changes):
 def test_a_file_is_a_sweep_of_three_seeds_with_a_question(name):
     spec, clips = sweeps.read(FILES[name])
     assert sweeps.question(FILES[name]).count("?") >= 1
-    assert spec.seeds == (0, 1, 2) and set(clips) <= {"endonerf_pulling", "endonerf_cutting"}
+    assert spec.seeds == (0, 1, 2) and set(clips) <= {"endonerf_pulling", "endonerf_cutting", "pulling_pairs"}
     assert all(len(c.name) < 40 for c in spec.configurations) and len(spec.configurations) >= 2
 
 
@@ -167,3 +168,24 @@ def test_differences_of_two_clips_are_not_mixed():
     ]
     together = sweeps.differences(rows, "exposure", "base", "psnr_full")
     assert sorted(together) == sorted([*of_clips[0], *of_clips[1]]) and len(together) == 6
+
+
+def test_what_is_said_of_the_right_camera_and_of_held_out_depth():
+    """In every seed `sharp` is ahead of the moved left picture, and behind moved flow and the blend of the priors."""
+    record = json.loads((RESULTS / "other_views.json").read_text(encoding="utf-8"))
+    without = other_views.labelled(record["measures"])
+    runs = [row for row in sweeps.rows_of(FILES["other_views"]) if row["configuration"] == "sharp"]
+    assert len(runs) == 3
+    moved, flow = without["right_view", other_views.MOVED], without["right_view", right_view.FLOW]
+    blend = without["depth", "blend of the neighbouring priors"]
+    for row in runs:
+        scene = other_views.labelled(row["measures"])
+        seen, depth = scene["right_view", other_views.MODEL], scene["depth", other_views.MODEL]
+        assert moved["held_out_psnr"] < seen["held_out_psnr"] < flow["held_out_psnr"]
+        assert moved["training_psnr"] < seen["training_psnr"] and depth["mean_absolute"] > blend["mean_absolute"]
+
+
+def test_scenes_and_predictions_of_different_frames_are_refused():
+    record = json.loads((RESULTS / "other_views.json").read_text(encoding="utf-8"))
+    with pytest.raises(InputError, match="must be of the same frames"):
+        other_views.table(record | {"arrays_sha256": {"images": "other"}})

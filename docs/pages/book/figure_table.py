@@ -9,7 +9,9 @@ class Figure(NamedTuple):
     """The mean of one number of several records."""
 
     records: str  # pattern of files of docs/results
-    path: str  # keys, and indices or `key=value` of a list, joined by dots; * is the mean over a list
+    path: str
+    """Keys, and indices or `key=value` of a list, joined by dots; `*` is the mean over a list, and `*key=value` the
+    mean over its entries with this value."""
     form: str
     scale: float = 1.0
 
@@ -38,6 +40,10 @@ CUTTING = "clips.endonerf_cutting.every eighth frame.baselines"
 BLOCKS8, BLOCKS16 = "clips.endonerf_pulling.blocks of 8 frames.baselines", "pulling_sharp_blocks16.json"
 CLAMPED, LATER = "tradeoff_cutting_sharp.json", "preset=sharp&register_bytes=64&passes=1"
 TRUTH, PULL = "effects_truth.json", "scenes.pull and breath"
+VIEWS, WITHOUT, OF_SHARP = "sweeps/other_views.json", "other_views.json", "rows.*configuration=sharp.measures"
+MODEL, MOVED = "rows.label=this model", "rows.label=left picture moved by the prior depth"
+FLOW = "rows.label=flow between the neighbours, moved by the blend of their depths"
+BLEND = "rows.label=blend of the neighbouring priors"
 FIGURES: dict[str, Figure | Setting | Formula] = {
     "flow.tissue": Figure(PULLING, "baselines.flow_interpolation.mean.psnr_tissue", "{:.2f}"),
     "blend.tissue": Figure(PULLING, "baselines.two_neighbours.mean.psnr_tissue", "{:.2f}"),
@@ -74,6 +80,14 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "cutting.stop": Figure(CLAMPED, "points.name=float64, cutoff 1e-12, stop 1e-4.error.max", "{:.0f}", 255),
     "cutting.cutoff": Figure(CLAMPED, "points.name=alpha cutoff 1/255.error.max", "{:.0f}", 255),
     "cutting.alpha": Figure(CLAMPED, "points.79.error.rms", "{:.3f}", 255),  # alpha clamp 0.99
+    "right.baseline": Figure(WITHOUT, "measures.right_view.baseline", "{:.1f}"),
+    "right.sharp": Figure(VIEWS, f"{OF_SHARP}.right_view.{MODEL}.held_out_psnr", "{:.2f}"),
+    "right.sharp.training": Figure(VIEWS, f"{OF_SHARP}.right_view.{MODEL}.training_psnr", "{:.2f}"),
+    "right.moved": Figure(WITHOUT, f"measures.right_view.{MOVED}.held_out_psnr", "{:.2f}"),
+    "right.moved.training": Figure(WITHOUT, f"measures.right_view.{MOVED}.training_psnr", "{:.2f}"),
+    "right.flow": Figure(WITHOUT, f"measures.right_view.{FLOW}.held_out_psnr", "{:.2f}"),
+    "right.depth": Figure(VIEWS, f"{OF_SHARP}.depth.{MODEL}.mean_absolute", "{:.2f}"),
+    "right.depth.blend": Figure(WITHOUT, f"measures.depth.{BLEND}.mean_absolute", "{:.2f}"),
     "waiting.pulling": Figure("waiting.json", f"rows.clip=endonerf_pulling&{LATER}.held_out.psnr_tissue", "{:.2f}"),
     "waiting.cutting": Figure("waiting.json", f"rows.clip=endonerf_cutting&{LATER}.held_out.psnr_tissue", "{:.2f}"),
     "truth.paper.light": Figure(TRUTH, "scenes.light.`paper`.*.depth_mm", "{:.3f}"),

@@ -33,6 +33,7 @@ UNITS = "dB|mm|ms|us|s|seconds|min|minutes|hours|[KMG]i?B|px|pixels|%|times"
 MARK = re.compile(  # a number, its unit if any, and the name of the figure
     rf"(?P<number>[-+]?\d[\d.]*)(?P<unit>(?: ?(?:{UNITS}))?)<!--=(?P<key>[\w.]+)-->"
 )
+STAR = re.compile(r"(?P<list>.*?)\.\*(?P<values>[^.]*)\.(?P<rest>.*)")  # the mean over the entries of a list
 ANY = re.compile(r"<!--=.*?-->")
 
 
@@ -62,10 +63,11 @@ def _constant(dotted: str) -> float:
 
 def _at(found: Any, path: str, file: Path) -> float:
     """The number at a path, or the mean of the list of numbers there."""
-    first, star, rest = path.partition(".*.")
-    if star:
-        found = _part(found, first, file)
-        return float(np.mean([_at(one, rest, file) for one in found]))
+    if star := STAR.fullmatch(path):
+        chosen = [one for one in _part(found, star["list"], file) if _has(one, star["values"])]
+        if not chosen:
+            raise InputError(f"{file}: no {path}")
+        return float(np.mean([_at(one, star["rest"], file) for one in chosen]))
     return float(np.mean(_part(found, path, file)))
 
 
@@ -82,9 +84,14 @@ def _entry(found: list[Any], key: str) -> Any:
     """An entry of a list by its index, or the one whose keys have these values, as in `clip=pulling&seed=0`."""
     if "=" not in key:
         return found[int(key)]
-    wanted = dict(one.split("=", 1) for one in key.split("&"))
-    (only,) = (one for one in found if all(str(one.get(name)) == told for name, told in wanted.items()))
+    (only,) = (one for one in found if _has(one, key))
     return only
+
+
+def _has(entry: Any, values: str) -> bool:
+    """Whether the keys of an entry have these values, as in `clip=pulling&seed=0`; "" asks for none."""
+    wanted = (one.split("=", 1) for one in values.split("&") if one)
+    return all(str(entry.get(name)) == told for name, told in wanted)
 
 
 @cache

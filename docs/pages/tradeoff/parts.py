@@ -104,8 +104,9 @@ def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> st
     best = min(kept, key=lambda name: (sum(kept[name]), name))
     listed = ", ".join(f"{ratio:.1f} ({scene})" for scene, ratio in zip(every, kept[best], strict=True))
     return (
-        f" The setting *{best}* is off by at most one level of 8 bits in the measured view of each of the {len(every)} "
-        f"scenes of this page. Its visited pairs, as multiples of those of `paper`: {listed}."
+        f" The setting *{best}*, without the Jacobian clamp of the presets, is off by at most one level of 8 bits in"
+        f" the measured view of each of the {len(every)} scenes of this page. Its visited pairs, as multiples of those"
+        f" of `paper`: {listed}."
     )
 
 

@@ -20,9 +20,9 @@ def calibration_views(n_train, count):
 def calibrate(views, gradient_ratio):
     """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or without finite numbers is dropped.
 
-    Raises: ValueError if no view remains or the median is 0.
+    Raises: ValueError if no view remains, or the median is 0 or too small to divide by.
     """
     ratios = np.array([fine / rgb for _, rgb, fine in views if 0 < rgb < np.inf and np.isfinite(fine / rgb)])  # (12.6)
-    if ratios.size == 0 or np.median(ratios) == 0:
-        raise ValueError("calibration: no view has a ratio, or their median is 0")
+    if ratios.size == 0 or np.median(ratios) == 0 or not np.isfinite(gradient_ratio / np.median(ratios)):
+        raise ValueError("calibration: no view has a ratio, or their median is 0 or too small")
     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (12.3), (12.4)
