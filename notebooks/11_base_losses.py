@@ -558,8 +558,8 @@ assert all(report.passed for report in reports)
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The derivative along D_hat itself is zero, so the sum is 0. The term of the maximum
-# ensures this: without it the gradient would have a component along the depth image itself, which would change the
-# scale of the scene.
+# ensures this: without it the gradient would have a component along the depth image itself,
+# which would change the scale of the scene.
 g_D = normalised_depth_reverse(1.0, saved_depth)
 whole, without_largest = (g_D * D_hat).sum(), (g_D * D_hat)[D_hat < D_hat.max()].sum()
 print(f"sum: {whole:.1e}; without the largest pixel: {without_largest:.2f}")
