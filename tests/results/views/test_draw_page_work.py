@@ -32,25 +32,26 @@ def test_a_zoom_with_two_fingers_keeps_the_corners_that_are_set(opened):
     np.testing.assert_allclose(shape.points, [(40, 40), (140, 40), (140, 100)], atol=0.6)
 
 
+def drag_across_a_key(opened, columns, row):
+    """A drag through three columns, with the key of the next frame pressed at the second."""
+    first, second, third = columns
+    opened.remote.mouse("Pressed", *opened.at(first, row))
+    opened.remote.mouse("Moved", *opened.at(second, row))
+    opened.keys(".")
+    opened.remote.mouse("Moved", *opened.at(third, row))
+    opened.remote.mouse("Released", *opened.at(third, row))
+
+
 def test_what_is_drawn_stays_on_the_frame_on_which_it_began(opened):
     """A key during a stroke or an adjustment shows another frame: its shapes do not change."""
-    remote = opened.remote
     opened.keys("b")
-    remote.mouse("Pressed", *opened.at(60, 60))
-    remote.mouse("Moved", *opened.at(120, 60))
-    opened.keys(".")
-    remote.mouse("Moved", *opened.at(180, 60))
-    remote.mouse("Released", *opened.at(180, 60))
+    drag_across_a_key(opened, (60, 120, 180), 60)
     opened.keys("p")
     opened.polygon((200, 150), (300, 150), (300, 200))
     opened.keys(",p")
     opened.polygon((40, 140), (140, 140), (140, 200))
     opened.keys("m")
-    remote.mouse("Pressed", *opened.at(120, 150))
-    remote.mouse("Moved", *opened.at(130, 150))
-    opened.keys(".")
-    remote.mouse("Moved", *opened.at(200, 150))
-    remote.mouse("Released", *opened.at(200, 150))
+    drag_across_a_key(opened, (120, 130, 200), 150)
     first, second = opened.saved().keys
     assert [s.tool for s in first.shapes] == ["brush", "polygon"] and len(second.shapes) == 1
     assert max(x for x, _ in first.shapes[0].points) < 130
