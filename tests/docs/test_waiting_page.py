@@ -15,22 +15,27 @@ RISEN = {  # asked for: 0.1; the page shows these rises
     # before the parts of an iteration depended on the vectors, and the second thread slowed it by more than its share
     ("simulated_breathing", "sharp", "wall"): 0.15,
 }
-TOO_LONG = {  # the page says so; by the bytes of a register: 32 = AVX2, 64 = AVX-512
-    ("endonerf_cutting", "sharp", "wall", 32, "forecast"): 0.23,
+MISSED = {  # the page says so; by the bytes of a register: 32 = AVX2, 64 = AVX-512
+    ("endonerf_cutting", "sharp", "AMD EPYC", 32, "forecast"): 0.23,
+    ("endonerf_pulling", "quick", "Intel(R) Xeon(R) Processor", 64, "forecast"): 0.23,
+    ("endonerf_pulling", "quick", "Intel(R) Xeon(R) Processor", 64, "today"): 0.3,
 }
 
 
+def machine_of(row):
+    return row["clip"], row["preset"], row["processor"], row["register_bytes"]
+
+
 @pytest.mark.parametrize("row", RECORD["rows"], ids=waiting_text.named)
-def test_the_recorded_forecasts_hold_within_15_percent_but_one(row):
-    """The first line too, if the speed was measured; one is as in `TOO_LONG`. The time left rises by a tenth, or as in
+def test_the_recorded_forecasts_hold_within_15_percent_but_two(row):
+    """The first line too, if the speed was measured; two are as in `MISSED`. The time left rises by a tenth, or as in
     `RISEN`."""
     for when in ("start", "forecast", "minute"):
         said = row["said"].get(when)
         if said is None or said.get("speed") == "assumed":
             continue
         left = row["whole"] - said["at"]
-        allowed = TOO_LONG.get((row["clip"], row["preset"], row["clock"], row["register_bytes"], when), 0.15)
-        assert abs(said["left"] - left) <= allowed * left, when
+        assert abs(said["left"] - left) <= MISSED.get((*machine_of(row), when), 0.15) * left, when
     assert row["largest_rise"] <= RISEN.get((row["clip"], row["preset"], row["clock"]), 0.1)
 
 
@@ -40,7 +45,7 @@ def test_the_first_line_of_an_assumed_speed_holds_today_on_the_machine_it_was_me
     former = row.get("passes", waiting_text.PASSES) > 1
     assert (shown == "-") == (row["said"]["start"]["speed"] == "measured" or not row["register_bytes"] or former)
     if shown != "-":
-        assert abs(float(shown.partition("(")[2].rstrip("%)"))) <= 15
+        assert abs(float(shown.partition("(")[2].rstrip("%)"))) <= 100 * MISSED.get((*machine_of(row), "today"), 0.15)
 
 
 def test_what_the_page_says_of_the_evaluation_of_sharp():
