@@ -23,6 +23,7 @@ def calibrate(views, gradient_ratio):
     Raises: ValueError if no view remains, or the median is 0 or too small to divide by.
     """
     ratios = np.array([fine / rgb for _, rgb, fine in views if 0 < rgb < np.inf and np.isfinite(fine / rgb)])  # (12.6)
-    if ratios.size == 0 or np.median(ratios) == 0 or not np.isfinite(gradient_ratio / np.median(ratios)):
+    median = np.median(ratios) if ratios.size else 0.0
+    if median == 0 or not np.isfinite(gradient_ratio / median):
         raise ValueError("calibration: no view has a ratio, or their median is 0 or too small")
-    return Calibration(gradient_ratio / np.median(ratios), ratios)  # (12.3), (12.4)
+    return Calibration(gradient_ratio / median, ratios)  # (12.3), (12.4)

@@ -35,12 +35,19 @@ def test_hard_K1_invalid_views_are_dropped_and_listed():
 
 
 @pytest.mark.parametrize(
-    "pairs", [[], [(0.0, 0.0)], [(np.nan, np.nan), (0.0, 1.0)], [(1.0, 0.0)], [(1.0, 0.0), (1.0, 0.0), (1.0, 3.0)]]
-)
+    "pairs",
+    [
+        [], [(0.0, 0.0)], [(np.nan, np.nan), (0.0, 1.0)], [(1.0, 0.0)], [(1.0, 0.0), (1.0, 0.0), (1.0, 3.0)],
+        [(1.0, 1e-310)],
+    ],
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")  # of the definition, which divides before it refuses
 def test_hard_K1_no_answer_is_an_error_with_a_table(pairs):
     with pytest.raises(CalibrationError) as caught:
         calibrate(views(pairs), 0.25)
     assert "g_rgb" in str(caught.value)
+    with pytest.raises(ValueError, match="no view has a ratio"), np.errstate(invalid="ignore", divide="ignore"):
+        definition.calibrate(views(pairs), 0.25)
     assert all(f"frame-{i:03d}" in str(caught.value) for i in range(len(pairs)))
 
 

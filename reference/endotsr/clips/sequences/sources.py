@@ -197,16 +197,14 @@ def with_stated(clip: Clip, options: SourceOptions) -> Clip:
     depth = stated_depth(options, frames, clip.source_names)
     if depth is not None and (options.depth_unit == ARBITRARY) != clip.arbitrary:
         raise InputError(f"{clip.where}: --depth-unit {options.depth_unit} with the unit {clip.unit}")
-    notes = [
-        *(replaced("masks of the source", "masks") if masks and clip.masks else []),
-        *(replaced("depth of the source", "depth") if depth and clip.depth else []),
-    ]
+    both = (("masks", masks, clip.masks), ("depth", depth, clip.depth))
+    notes = [replaced(f"{name} of the source", name) for name, stated, own in both if stated and own]
     return replace(clip, masks=masks or clip.masks, depth=depth or clip.depth, notes=[*clip.notes, *notes])
 
 
-def replaced(part: str, option: str) -> list[str]:
+def replaced(part: str, option: str) -> str:
     """The note on a part of a source in whose place an option states another file."""
-    return [f"{part}: not read, because --{option} is stated"]
+    return f"{part}: not read, because --{option} is stated"
 
 
 def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> StatedCamera:

@@ -141,7 +141,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     masked, planes = ([_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
     masks = stated_masks(options, files, width, height)
-    notes += replaced("mask_path", "masks") if masks and any(masked) else []
+    notes += [replaced("mask_path", "masks")] if masks and any(masked) else []
     unit = options.trajectory_unit or ARBITRARY
     factor, applied = scene_factor(unit), _applied_scale(data, file, notes)
     depth = depth_of(planes, DEPTH_STEP * factor * applied) if any(planes) else None

@@ -64,7 +64,7 @@ def describe_points(path: Path, options: SourceOptions) -> Clip:
     mask = path / "mask.png"
     inside = masks_of([mask] * len(frames), "black", width, height) if mask.is_file() else None
     masks = stated_masks(options, frames, width, height)
-    notes = replaced(mask.name, "masks") if masks and inside else []
+    notes = [replaced(mask.name, "masks")] if masks and inside else []
     visible, points = found["visible"].astype(bool), found["points"].astype(np.float64)
     return Clip(
         layout="points",

@@ -17,7 +17,7 @@ from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.layouts.video import describe_video
 from endotsr.clips.sequences.pairing import matching_files, of_no_or_all_frames
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import masks_of
+from endotsr.clips.sequences.sources import masks_of, replaced
 from endotsr.clips.sequences.unread import folders_of
 from endotsr.errors import InputError
 
@@ -79,7 +79,7 @@ def _overridden(path: Path, options: SourceOptions) -> list[str]:
     """Notes on the parts of the folder in whose place an option states another file."""
     parts = {"calibration": CALIBRATION, "trajectory": TRAJECTORY, "masks": MASKS}
     return [
-        f"{name}: not read, because --{option} is stated"
+        replaced(name, option)
         for option, name in parts.items()
         if (stated := getattr(options, option)) is not None
         and (path / name).exists()

@@ -142,7 +142,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
     poses = _poses(options, given, times, notes)
     planes = read_list(path / DEPTH_LIST)[1] if (path / DEPTH_LIST).is_file() else []
     if planes and options.depth is not None:
-        notes += replaced(DEPTH_LIST, "depth")
+        notes.append(replaced(DEPTH_LIST, "depth"))
     steps_of_depth = _depth_steps(settings, notes) if planes and options.depth is None else STEPS
     steps = np.diff(times)
     return Clip(
