@@ -14,7 +14,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from endotsr.method.kernels.machine import compiled_for
+from endotsr.method.kernels.target import compiled_for
 from endotsr.port.judge.format import Case, FileEntry, FlagNote, Manifest, read_struct, schema_text, to_json
 from endotsr.port.judge.npy import header_of, npy_bytes
 from endotsr.port.judge.schemas import SCHEMAS

@@ -9,7 +9,8 @@ import msgspec
 import pytest
 
 from endotsr.config import DEMO, PAPER
-from endotsr.method.kernels.machine import compiled_for, usable_cores
+from endotsr.method.kernels.machine import usable_cores
+from endotsr.method.kernels.target import compiled_for
 from endotsr.training.fitting import compile_ahead
 from makers.files import machine_class
 

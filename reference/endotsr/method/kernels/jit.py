@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 import numba
 
 from endotsr.method.kernels.kernel_cache import KernelCache, use_kernel_folder
+from endotsr.method.kernels.target import compile_for_full_vectors
 
 # Numba's parallel loops, which no kernel uses, need semaphores; without /dev/shm it warns when it prepares them.
 warnings.filterwarnings("ignore", message="Could not obtain multiprocessing lock", module=r"numba\.")
@@ -27,6 +28,7 @@ warnings.filterwarnings("ignore", message="Could not obtain multiprocessing lock
 F = TypeVar("F", bound=Callable)
 
 use_kernel_folder()
+compile_for_full_vectors()
 if not os.environ.get("NUMBA_THREADING_LAYER"):
     numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]  # only its thread count is used
 

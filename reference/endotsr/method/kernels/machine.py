@@ -1,8 +1,6 @@
-"""Properties of this machine: cores, memory, and the compile target, which affects the last bits of results."""
+"""Properties of this machine: cores and memory."""
 
-import hashlib
 import os
-import platform
 from pathlib import Path
 
 CGROUP_OF_PROCESS = "/proc/self/cgroup"
@@ -14,24 +12,6 @@ NO_LIMIT = 1 << 62  # version 1 writes a number near 2^63 instead of `max`
 def usable_cores() -> int:
     """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def compiled_for() -> str:
-    """The compile target of kernels, a string without spaces: everything that can change a rounding.
-
-    On Linux with glibc and without variables of Numba it is the processor name. Another system, whose C library has
-    other `exp` and `log`, and a digest of NUMBA_CPU_FEATURES are appended.
-    """
-    import numba
-    from llvmlite.binding import get_host_cpu_name
-
-    name, features = numba.config.CPU_NAME, numba.config.CPU_FEATURES  # type: ignore[attr-defined]
-    words = [name or get_host_cpu_name()]
-    if not (platform.system() == "Linux" and platform.libc_ver()[0] == "glibc"):
-        words.append(platform.system().lower())
-    if features is not None:
-        words.append("features" + hashlib.sha256(features.encode()).hexdigest()[:8])
-    return "-".join(words)
 
 
 def memory_of_machine() -> int | None:

@@ -17,7 +17,8 @@ from typing import Any
 import msgspec
 
 from endotsr.config import PAPER, Config, with_settings
-from endotsr.method.kernels.machine import compiled_for, usable_cores
+from endotsr.method.kernels.machine import usable_cores
+from endotsr.method.kernels.target import compiled_for
 
 READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # referenced until this process ends, which does not wait for them
