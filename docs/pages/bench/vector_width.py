@@ -56,7 +56,7 @@ def table(found: dict[str, Any]) -> str:
         for name in ("iteration", *SHOWN):
             half, whole = ([repeat[at][name] for repeat in found["cases"][width]] for width in ("32", "64"))
             ratio = statistics.median(b / a for a, b in zip(half, whole))
-            rows.append([name, threads, _spread(half), _spread(whole), f"{ratio:.2f}"])
+            rows.append([name, str(threads), _spread(half), _spread(whole), f"{ratio:.2f}"])
     head = ["stage", "threads", "half registers, ms", "whole registers, ms", "ratio"]
     machine, repeats = found["machine"], len(found["cases"]["64"])
     note = f"Medians of {repeats} processes each, in turn, with least and largest; {machine['processor']},"
