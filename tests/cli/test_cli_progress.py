@@ -16,6 +16,7 @@ from endotsr.clips.sequences.checks.duration import (
     assumed_unit,
     at_start,
     estimated_seconds,
+    evaluation_units,
     frames_of,
     iteration_work,
     vector_factor,
@@ -25,7 +26,7 @@ from endotsr.clips.sequences.checks.duration import (
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.training.fitting.records import Making
-from endotsr.training.runs.time_left import SLOWED, Timed, TimeLeft, unit_seconds
+from endotsr.training.runs.time_left import LEAST_QUIET, QUIET_BEFORE, SLOWED, Timed, TimeLeft, quiet, unit_seconds
 
 PIXELS, GAP = 640 * 512, 0.15  # of a frame; seconds on one thread for the targets of a gap at full size
 UNIT = 0.1
@@ -206,6 +207,14 @@ def test_what_the_second_thread_costs_the_iterations_is_no_part_of_their_unit():
     assert unit_seconds(iterations(*[0.1] * 50, beside=1.0), 0.8) == pytest.approx(0.05), "half at least"
 
 
+def test_iterations_without_the_second_thread_tell_the_speed_once_there_are_some():
+    slowed, plain = iterations(*[0.14] * 40, beside=0.1), iterations(*[0.1] * (1 + LEAST_QUIET))
+    assert unit_seconds([*slowed, *plain], 0.8) == pytest.approx(0.1), "whatever the second thread costs here"
+    assert unit_seconds([*slowed, *plain[:-1]], 0.8) < 0.09, "too few of them"
+    between = iterations(*[0.14] * QUIET_BEFORE)  # a target takes as long as several iterations
+    assert quiet([*slowed, *between, *slowed]) == []
+
+
 def test_the_first_line_adds_up_and_names_what_comes_first():
     plan = plan_of("quick", 156, 2)._replace(perceived=True)
     found = estimated_seconds(plan, 0.05)
@@ -308,7 +317,8 @@ def test_the_time_of_the_initial_motion_tells_the_speed_of_the_libraries(monkeyp
     found = estimated_seconds(shown._plan, UNIT)
     assert kept[-1].start == pytest.approx(plan.alone(UNIT) / 2)
     assert found.start == pytest.approx(said.start / 2) and found.targets == pytest.approx(said.targets / 2)
-    assert found.evaluation == pytest.approx(said.evaluation / 2**0.5) and found.iterations == said.iterations
+    assert found.evaluation == pytest.approx(plan.alone(UNIT) / 2**0.5 * evaluation_units(plan))
+    assert found.iterations == said.iterations
     for seconds, iteration in ((2.9, 0), (9.0, 1)):  # too short; resumed
         assert begun(monkeypatch, plan, seconds, iteration)[2] == [Beside()]
     still = plan._replace(config=with_settings(plan.config, initialisation={"motion": "none"}))

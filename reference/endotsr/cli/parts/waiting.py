@@ -1,8 +1,17 @@
 """What a person waits for in `endotsr train`, in one line before the first iteration, also of a resumed training."""
 
-from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.checks.duration import (
+    COMPILATION,
+    MEASURED_SPEEDS,
+    Standing,
+    TimedCommand,
+    assumed_unit,
+    estimated_seconds,
+)
 from endotsr.results.report.tables import duration
 from endotsr.untrusted.names import counted
+
+UNKNOWN = "the speed of this machine is assumed; machines took {:.1f} to {:.1f} times as long".format(*MEASURED_SPEEDS)
 
 
 def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Standing | None = None) -> str:
@@ -22,7 +31,7 @@ def waiting_line(plan: TimedCommand, unit: float | None, compiled: bool, at: Sta
         "evaluation": found.evaluation,
     }
     named = ", ".join(f"{name} {duration(seconds)}" for name, seconds in steps.items() if seconds >= 1)
-    known = "at the speed of the last training" if unit is not None else "the speed of this machine is assumed"
+    known = "at the speed of the last training" if unit is not None else UNKNOWN
     whole = f"about {in_words(sum(steps.values()))} for {counted(plan.frames.total, 'frame')} ({known})"
     return f"{whole}: {named}" if named else whole
 

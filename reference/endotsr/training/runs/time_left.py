@@ -6,7 +6,7 @@ frames is no part of the time of an iteration: it is counted separately, and end
 
 import statistics
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from endotsr.clips.sequences.checks.duration import (
@@ -27,9 +27,12 @@ LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
 REMEMBERED = 0.125
 SPIKE = 4.0  # medians; longer iterations are left out, such as those that compiled or loaded code
 # Seconds, times the threads, by which one second of the second thread prolongs the iterations: 0.82 and 0.83 on two
-# cores, in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. A guess at the cause: of three threads on
-# two cores, a parallel loop waits for the one that shares a core.
+# cores (AMD EPYC), in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. A guess at the cause: of three
+# threads on two cores, a parallel loop waits for the one that shares a core. On an Intel Xeon and frames of half size it
+# was half as much, so the constant is used only until there are LEAST_QUIET iterations without the second thread.
 SLOWED = 1.6
+LEAST_QUIET = 8
+QUIET_AFTER, QUIET_BEFORE = 1, 8  # iterations after and before which no target was finished: the second thread rests
 PIXELS_OF_FULL = 4  # times those of a frame of a coarse start
 # Weight of the time expected of a gap, in gaps. The first ones are no measure: after the coarse start of `quick` on
 # EndoNeRF pulling, two of them took 0.38 s each, and all of them 0.22 s on average.
@@ -102,7 +105,8 @@ class TimeLeft:
 def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
     """Seconds per unit of work, without the iterations beyond SPIKE medians; None = too few iterations.
 
-    slowed   seconds that one of the second thread costs the iterations, unless these wait for targets meanwhile
+    slowed   seconds that one of the second thread costs the iterations, unless these wait for targets meanwhile; for
+             fewer than LEAST_QUIET iterations without it
 
     Edges:   at least half of the fastest iteration, which shares a core at most; the work of the second thread is known
              by target, not by iteration.
@@ -110,8 +114,17 @@ def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
     known = list(timed)
     if len(known) < LEAST_ITERATIONS:
         return None
+    rest = quiet(known)
+    known = rest if len(rest) >= LEAST_QUIET else known
     each = [one.seconds / one.work for one in known]
     limit = SPIKE * statistics.median(each)
     kept = [one for one, unit in zip(known, each) if unit <= limit]
     lost = slowed * max(sum(one.beside - one.waited for one in kept), 0.0)
     return max((sum(one.seconds for one in kept) - lost) / sum(one.work for one in kept), min(each) / 2)
+
+
+def quiet(timed: Sequence[Timed]) -> list[Timed]:
+    """The iterations during which the second thread rests: no target is finished in them, just before or soon after."""
+    made = [k for k, one in enumerate(timed) if one.beside or one.waited]
+    near = {k for at in made for k in range(at - QUIET_BEFORE, at + QUIET_AFTER + 1)}
+    return [one for k, one in enumerate(timed) if k not in near]

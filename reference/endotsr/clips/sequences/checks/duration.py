@@ -30,6 +30,8 @@ PARTS = (0.08, 0.35, 0.57)  # of its iteration: constant, of the pixels, of the 
 PARTS_WITHOUT = (0.02, 0.36, 0.62)  # and on one without
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.085  # of its iteration on two cores: 0.05 to 0.105 s were measured on four machines without other work
+# From the fastest of these to the slowest of all, an Intel Xeon that did other work as well: 0.17 s.
+MEASURED_SPEEDS = (0.05 / SECONDS, 0.17 / SECONDS)
 # Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.14 s were measured on one
 # machine. The parts beside the iterations are assumed to take as long on both.
 WITHOUT_AVX512 = 1.5
@@ -205,20 +207,26 @@ class TimedCommand(NamedTuple):
     beside: Beside = Beside()
 
     def alone(self, unit: float) -> float:
-        """Seconds per unit of the parts beside the iterations, on one thread: timed, or from `unit`.
+        """Seconds per unit of the parts beside the iterations, on one thread: timed, or by `like_iterations`."""
+        return self.beside.start or self.like_iterations(unit)
+
+    def like_iterations(self, unit: float) -> float:
+        """Seconds per unit on one thread, if libraries are as fast as the iterations.
 
         unit   seconds per unit of the iterations, with the threads of the plan
 
-        Edges:   untimed, AVX-512 is assumed to be no gain there.
+        Edges:   AVX-512 is assumed to be no gain for libraries.
         """
-        return self.beside.start or unit * (SERIAL if self.threads > 1 else 1.0) / self.vectors
+        return unit * (SERIAL if self.threads > 1 else 1.0) / self.vectors
 
     def evaluating(self, unit: float) -> float:
-        """Seconds per unit of the evaluation: timed, or the geometric mean of `alone` and of an assumed machine.
+        """Seconds per unit of the evaluation: timed, or the geometric mean of `like_iterations` and of the libraries.
 
-        Libraries do most of this work, and their speed follows that of the iterations in part. The mean is a guess.
+        The libraries have the time of the initial motion, or that of an assumed machine. The mean is a guess. On an
+        Intel Xeon the evaluation took 13 to 15 % longer (three runs of `quick` on EndoNeRF pulling).
         """
-        return self.beside.evaluation or float(np.sqrt(self.alone(unit) * SECONDS * SERIAL))
+        libraries = self.beside.start or SECONDS * SERIAL
+        return self.beside.evaluation or float(np.sqrt(libraries * self.like_iterations(unit)))
 
 
 class PartSeconds(NamedTuple):
