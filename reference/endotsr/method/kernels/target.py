@@ -1,8 +1,8 @@
 """The processor that kernels are compiled for. Vector widths and the C library affect the last bits of results.
 
 For Intel processors with AVX-512, LLVM prefers vectors of 32 bytes, half of a register, and calls this preference
-`prefer-256-bit`. The blocks and lanes of the kernels fill whole registers, so the preference is switched off
-(docs/bench.md has the times). Other processors have no such preference.
+`prefer-256-bit`. It is switched off here: blocks and lanes of the kernels fill whole registers (docs/bench.md has the
+times).
 """
 
 import hashlib

@@ -27,12 +27,12 @@ LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations
 REMEMBERED = 0.125
 SPIKE = 4.0  # medians; longer iterations are left out, such as those that compiled or loaded code
 # Seconds, times the threads, by which one second of the second thread prolongs the iterations: 0.82 and 0.83 on two
-# cores (AMD EPYC), in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs. A guess at the cause: of three
-# threads on two cores, a parallel loop waits for the one that shares a core. On an Intel Xeon and frames of half size it
-# was half as much, so the constant is used only until there are LEAST_QUIET iterations without the second thread.
+# cores (AMD EPYC), in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs; 0.67 to 0.79 on an Intel Xeon
+# with full frames and 0.52 to 0.63 with half ones, four runs of `quick` on pulling. A guess at the cause: of three threads
+# on two cores, a parallel loop waits for the one that shares a core. Used for less than LEAST_QUIET quiet iterations.
 SLOWED = 1.6
 LEAST_QUIET = 8
-QUIET_AFTER, QUIET_BEFORE = 1, 8  # iterations after and before which no target was finished: the second thread rests
+QUIET_AFTER, QUIET_BEFORE = 1, 8  # iterations of the distance to the last finished target, and to the next one
 PIXELS_OF_FULL = 4  # times those of a frame of a coarse start
 # Weight of the time expected of a gap, in gaps. The first ones are no measure: after the coarse start of `quick` on
 # EndoNeRF pulling, two of them took 0.38 s each, and all of them 0.22 s on average.

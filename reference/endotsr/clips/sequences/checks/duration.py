@@ -30,7 +30,7 @@ PARTS = (0.08, 0.35, 0.57)  # of its iteration: constant, of the pixels, of the 
 PARTS_WITHOUT = (0.02, 0.36, 0.62)  # and on one without
 EARLY, LATE_FROM = 0.77, 0.35  # first over late iteration; fraction of the run before late ones
 SECONDS = 0.085  # of its iteration on two cores: 0.05 to 0.105 s were measured on four machines without other work
-# From the fastest of these to the slowest of all, an Intel Xeon that did other work as well: 0.17 s.
+# From the fastest of these to an Intel Xeon, whose two cores probably shared their parts with other work: 0.17 s.
 MEASURED_SPEEDS = (0.05 / SECONDS, 0.17 / SECONDS)
 # Factor of its time on a processor without AVX-512, whose vectors are half as long: 0.10 to 0.14 s were measured on one
 # machine. The parts beside the iterations are assumed to take as long on both.
