@@ -28,8 +28,8 @@ REMEMBERED = 0.125
 SPIKE = 4.0  # medians; longer iterations are left out, such as those that compiled or loaded code
 # Seconds, times the threads, by which one second of the second thread prolongs the iterations: 0.82 and 0.83 on two
 # cores (AMD EPYC), in the first 100 iterations of `sharp` on EndoNeRF cutting, two runs; 0.67 to 0.79 on an Intel Xeon
-# with full frames and 0.52 to 0.63 with half ones, four runs of `quick` on pulling. A guess at the cause: of three threads
-# on two cores, a parallel loop waits for the one that shares a core. Used for less than LEAST_QUIET quiet iterations.
+# with full frames and 0.52 to 0.63 with half ones, four runs of `quick` on pulling. A guess at the cause: of three
+# threads on two cores, a parallel loop waits for the one that shares a core. Used below LEAST_QUIET quiet iterations.
 SLOWED = 1.6
 LEAST_QUIET = 8
 QUIET_AFTER, QUIET_BEFORE = 1, 8  # iterations of the distance to the last finished target, and to the next one
