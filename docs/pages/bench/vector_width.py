@@ -14,6 +14,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from llvmlite.binding import get_host_cpu_features
+
 from endotsr.errors import InputError
 from endotsr.method.kernels import target, vectors
 from endotsr.results.report.tables import markdown
@@ -28,7 +30,7 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
     """{"bytes of a vector": [one list of cases per repeat]}."""
     if vectors.REGISTER < 64:
         raise InputError("bench.vector_width: this processor has no registers of 64 bytes")
-    half = os.environ | {"NUMBA_CPU_FEATURES": vectors.get_host_cpu_features().flatten()}
+    half = os.environ | {"NUMBA_CPU_FEATURES": get_host_cpu_features().flatten()}
     found: dict[str, Any] = {"32": [], "64": []}
     for _ in range(options.repeats):
         found["32"].append(_fresh(half))
