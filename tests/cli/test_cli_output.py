@@ -13,6 +13,7 @@ from endotsr.cli.parts.completion import ALWAYS, SCRIPTS, words_of
 from endotsr.cli.parts.fields import fields_of
 from endotsr.cli.parts.output import OutputOptions, split_output
 from endotsr.cli.train import TrainOptions
+from endotsr.config import DEMO
 
 
 def test_quiet_prints_nothing_but_errors(capsys):
@@ -86,7 +87,27 @@ def test_the_short_help_is_short_and_names_the_whole_one(capsys):
                                                 fields_of(TrainOptions))  # fmt: skip
     assert "--model.bases" not in short and "--model.bases" in whole and hidden > 50
     assert "`endotsr train --help-all` lists" in short and "--help-all` lists" not in whole
-    assert main(["demo", "--help-all"]) == 0 and "--model.bases" in capsys.readouterr().out
+
+
+def test_the_whole_help_of_demo_names_no_sequence_and_its_own_defaults(capsys):
+    assert main(["demo", "--help-all"]) == 0
+    whole = capsys.readouterr().out
+    assert (
+        "--model.bases" in whole
+        and "SEQUENCE [OPTIONS]" not in whole
+        and "arguments:" not in whole
+        and "--windows" not in whole
+    )
+    assert whole.startswith("usage: endotsr demo") and "Simulate a sequence" in whole
+    length = whole.partition("--training.iterations INT")[2].partition("--")[0]
+    assert f"default: {DEMO.training.iterations})" in length
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_both_helps(name, capsys):
+    for word in ("-h", "--help", "--help-all"):
+        assert main([name, word]) == 0
+        assert capsys.readouterr().out.startswith(f"usage: endotsr {name}")
 
 
 def test_every_command_has_words_of_its_own():

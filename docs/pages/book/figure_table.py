@@ -109,6 +109,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "report.preview": Setting("endotsr.results.views.preview:PREVIEW_BYTES", "{:.1f}", 1e-6),
     "kill.least": Setting("endotsr.training.runs.training:FEWEST_SECONDS"),
     "kill.most": Setting("endotsr.training.runs.training:MOST_SECONDS", scale=1 / 60),
+    "kill.patience": Setting("endotsr.training.runs.stopping:PATIENCE", form="{:.1f}"),
     "kill.share": Setting("endotsr.training.runs.training:LARGEST_LOSS", scale=100),
     "kill.cost": Setting("endotsr.training.runs.training:LARGEST_FRACTION", scale=100),
     "depth.farther": Setting("endotsr.clips.sequences.depth_outliers:FARTHER", "{:.1f}"),

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.fields import Option, fields_of
+from endotsr.cli.parts.help_page import PART_OF, help_page, terminal_width
 from endotsr.cli.parts.parser import HELP_ALL, parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.config import DEMO
@@ -16,7 +17,7 @@ from endotsr.training.runs.sources import SIMULATED
 class DemoOptions:
     """Simulate a sequence, train on it with the stretched schedule, evaluate, and write a report.
 
-    The same as `endotsr train simulated --preset demo`; every option of `endotsr train` is accepted.
+    The same as `endotsr train simulated --preset demo`, with every option of `endotsr train` but those of --windows.
     """
 
     out: Annotated[Path, Option("RUN")]
@@ -40,7 +41,10 @@ def run(words: list[str]) -> int:
     if {"-h", "--help"} & set(words):
         parse(DemoOptions, words, "demo")
     if HELP_ALL in words:
-        parse(train.TrainOptions, words, "demo")
+        fields = fields_of(train.TrainOptions, train.TrainOptions(settings=DEMO))
+        taken = [f for f in fields if not (f.positional or f.name == "--windows" or f.help.startswith(PART_OF))]
+        print(help_page(DemoOptions, taken, "demo", terminal_width()), end="")
+        return 0
     words = [SIMULATED, "--preset", "demo", *words]
     if parse(train.TrainOptions, words, "demo").out is None:
         raise InputError("demo: --out RUN is missing: the run folder to create")

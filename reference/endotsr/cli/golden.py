@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import HELP, parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
@@ -108,10 +108,11 @@ SUBCOMMANDS = {
 
 def run(words: list[str]) -> int:
     """The command."""
-    if not words or words[0] in ("-h", "--help"):
+    if not words or words[0] in HELP:
         width = max(map(len, SUBCOMMANDS))
         print("usage: endotsr golden SUBCOMMAND [OPTIONS]\n")
         print("\n".join(f"  {name:<{width}}  {text}" for name, text in SUBCOMMANDS.items()))
+        print("\n`endotsr golden SUBCOMMAND --help` lists the options of a subcommand.")
         return 0
     if words[0] not in SUBCOMMANDS:
         raise InputError(f"unknown subcommand golden {words[0]!r}; allowed: {', '.join(SUBCOMMANDS)}")

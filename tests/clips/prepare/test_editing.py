@@ -22,6 +22,7 @@ from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.config import PAPER
 from endotsr.errors import InputError
+from synthetic_folder import write_synthetic_folder
 
 
 def recording(count=20, **known):
@@ -71,6 +72,18 @@ def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
         assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 2
         said = capsys.readouterr().err
         assert "frame_rate in" in said and FILE_NAME in said and "--source-rate" not in said
+
+
+def test_an_endonerf_folder_takes_the_rate_that_its_refusal_names(tmp_path, capsys):
+    """The layout states no times: --rate asked for --source-rate, which was refused too."""
+    write_synthetic_folder(tmp_path / "clip", frames=8)
+    out, base = tmp_path / "o", ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o")]
+    assert main([*base, "--rate", "5"]) == 2 and "allowed: --source-rate" in capsys.readouterr().err
+    for words, rate in ((["--rate", "5"], 5), (["--frames", "0.1s:0.5s"], 10)):
+        shutil.rmtree(out, ignore_errors=True)
+        assert main([*base, "--source-rate", "10", *words]) == 0
+        found = read_sequence_file(out)
+        assert (found.frames, found.frame_rate) == (4, rate)
 
 
 def test_frames_are_left_out():

@@ -57,7 +57,7 @@ class EvaluateOptions:
     json: JsonFile = None
     """also write the metrics as JSON"""
     csv: Annotated[Path | None, Option("FILE", written=True)] = None
-    """also write the metrics of every held-out frame as CSV"""
+    """also write the metrics of every held-out frame, or the table of a comparison, as CSV"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
     measures: Annotated[tuple[str, ...], Option("NAME")] = ()

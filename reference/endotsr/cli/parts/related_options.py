@@ -49,7 +49,7 @@ PREPARE = (
     Needs(("model",), ("layout=colmap",), "only COLMAP leaves several models"),
     Excludes(
         ("source-rate",),
-        tuple(f"layout={name}" for name in ("common", "endonerf", "euroc", "scared", "servct", "tum")),
+        tuple(f"layout={name}" for name in ("common", "euroc", "scared", "servct", "tum")),
         "the layout states its times, or has none",
     ),
 )  # fmt: skip
