@@ -182,6 +182,17 @@ def test_one_frame_is_refused_and_two_are_enough(tmp_path, capsys):
     assert "[poses]" in (tmp_path / "2" / "sequence.toml").read_text("utf-8")
 
 
+@pytest.mark.parametrize(("frames", "warned"), [(2, True), (6, True), (7, False)])
+def test_up_to_six_frames_get_poses_with_a_warning(frames, warned, tmp_path, capsys):
+    """Without --force, though the scope is still: so few frames do not show it."""
+    views = still_views()
+    folder = written(tmp_path / "clip", Views(*(plane[:frames] for plane in views[:3]), views.camera))
+    code, said = main(["poses", str(folder)]), capsys.readouterr().out
+    assert ("too few frames match" in said) == ("warning: if the scope is still" in said) == warned
+    assert ("[poses]" in (folder / "sequence.toml").read_text("utf-8")) == (code == 0)
+    assert code == 0 or not warned
+
+
 @pytest.mark.parametrize(("width", "height"), [(96, 80), (80, 64)])
 def test_small_pictures_are_estimated_and_smaller_ones_are_refused(width, height, tmp_path):
     settings = with_effects(SimulatorSettings(width=width, height=height, frames=14), "camera_motion", "noise")
