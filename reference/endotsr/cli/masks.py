@@ -23,7 +23,7 @@ class MasksOptions:
 
     Without --out, SEQUENCE is a folder from `endotsr prepare`, and the masks are added to it. With --out, SEQUENCE is
     any source of `prepare`; masks/ and the overlay are written to FOLDER and marked as a proposal. Inspect
-    proposed_masks.png before training. Exit code 1: no instrument found, nothing written.
+    proposed_masks.png before training. Exit code 1: nothing found and written.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
