@@ -74,6 +74,13 @@ def test_a_prepared_folder_is_told_where_its_rate_is_stated(tmp_path, capsys):
         assert "frame_rate in" in said and FILE_NAME in said and "--source-rate" not in said
 
 
+def test_separate_pairs_have_no_rate_to_state():
+    """--source-rate is refused for SERV-CT, so it is no remedy there."""
+    with pytest.raises(InputError, match="frame rate is unknown; allowed: a recording") as refused:
+        thinned(replace(recording(), layout="servct"), [0, 1, 2], 5.0, [])
+    assert "--source-rate" not in str(refused.value)
+
+
 def test_an_endonerf_folder_takes_the_rate_that_its_refusal_names(tmp_path, capsys):
     """The layout states no times: --rate asked for --source-rate, which was refused too."""
     write_synthetic_folder(tmp_path / "clip", frames=8)

@@ -91,6 +91,8 @@ def _seconds(part: str, clip: Clip) -> list[int]:
 
 def _stated_rate(clip: Clip) -> str:
     """Where a user states the frame rate of a clip."""
+    if clip.layout == "servct":
+        return "a recording, which separate pairs are not,"
     return f"frame_rate in {clip.stated_in}" if clip.layout == "common" else "--source-rate HZ"
 
 
