@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.untrusted.names import counted
+
+if TYPE_CHECKING:
+    from endotsr.results.export.scene import MovingScene
 
 
 @dataclass
@@ -68,19 +71,14 @@ def run(words: list[str]) -> int:
     from endotsr.results.views import pictures
     from endotsr.results.views.film import speed_in_words, write_film
     from endotsr.results.views.plan import ViewRequest
-    from endotsr.studies.windows.scene import open_any, shown_frames
-    from endotsr.training.runs.sources import refuse_inside_data
+    from endotsr.studies.windows.scene import shown_frames
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
     request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate, options.slow, options.replace)
     use_threads(options.threads)
-    scene = open_any(options.scene)
-    print(*(f"  {note}\n" for note in scene.notes), sep="", end="")
-    for path in filter(None, (options.out, options.film)):
-        if scene.folder is not None:
-            refuse_inside_data(path, scene.folder)
+    scene = _opened(options)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
     shown_at, duration = [view.time for view in views], scene.record.duration
     rate = _rate(options, shown_at, duration)
@@ -103,6 +101,19 @@ def run(words: list[str]) -> int:
         film(made)
     write_result(options.json, folder=options.out, film=options.film, rate=rate, times=shown_at)
     return 0
+
+
+def _opened(options: RenderOptions) -> "MovingScene":
+    """The scene, whose notes are printed. Raises: InputError if an output lies in the folder of its frames."""
+    from endotsr.studies.windows.scene import open_any
+    from endotsr.training.runs.sources import refuse_inside_data
+
+    scene = open_any(options.scene)
+    print(*(f"  {note}\n" for note in scene.notes), sep="", end="")
+    for path in filter(None, (options.out, options.film)):
+        if scene.folder is not None:
+            refuse_inside_data(path, scene.folder)
+    return scene
 
 
 def _rate(options: RenderOptions, times: list[float], duration: float) -> float | None:
