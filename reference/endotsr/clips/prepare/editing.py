@@ -147,6 +147,12 @@ def written_times(
     return [round(float(s), 6) for s in times - times[0]], stated if known else 0.0
 
 
+def _within(window: tuple[int, ...], camera: Intrinsics) -> Intrinsics:
+    """The intrinsics of a window of the pictures."""
+    x, y, width, height = window
+    return camera._replace(cx=camera.cx - x, cy=camera.cy - y, width=width, height=height)
+
+
 def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
     """The clip cropped to a window x, y, width, height of its pictures, with the principal point shifted.
 
@@ -178,10 +184,8 @@ def cropped(clip: Clip, window: tuple[int, ...]) -> Clip:
             left, right = cut(pair.left, "pictures", i), pair.right
             yield PicturePair(left, None if right is None else cut(right, "pictures", i))
 
-    def intrinsics(old: Intrinsics) -> Intrinsics:
-        return old._replace(cx=old.cx - x, cy=old.cy - y, width=width, height=height)
-
     masks, depth, calibration = clip.masks, clip.depth, clip.calibration
+    intrinsics = partial(_within, window)
     return replace(
         clip,
         pictures=pictures,

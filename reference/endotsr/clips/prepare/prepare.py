@@ -35,6 +35,7 @@ from endotsr.clips.sequences.checks.cameras import baseline_findings, intrinsics
 from endotsr.clips.sequences.checks.depth_pair import depth_pair_findings
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.clips.sequences.checks.guard import notes_of
+from endotsr.clips.sequences.checks.kinds import Finding
 from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.clip import Clip, PicturePair
 from endotsr.clips.sequences.crop import Crop
@@ -191,10 +192,7 @@ def _write_frames(
         seen.add(new.left, tissue, depth)
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    where = str(clip.where)
-    of_cameras = intrinsics_findings(straight.intrinsics, where, clip.crop)
-    of_cameras += baseline_findings(straight.baseline, clip.arbitrary, where)
-    notes += notes_of(frame_findings(facts, where) + of_cameras)
+    notes += notes_of(_findings(clip, straight, facts))
     notes += seen.notes(clip, settings.border)
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
@@ -203,6 +201,14 @@ def _write_frames(
     masks = mask_entry(clip, folder, len(chosen), seen, settings.border, notes)
     turned = [straight.pose(pose) for pose in poses] if poses else None
     return _file_of(clip, straight, turned, chosen, masks, depth_scale, settings, notes)
+
+
+def _findings(clip: Clip, straight: Straightener, facts: list[FrameFacts]) -> list[Finding]:
+    """What is noticeable about the pictures and the camera."""
+    where = str(clip.where)
+    found = frame_findings(facts, where)
+    found += intrinsics_findings(straight.intrinsics, where, clip.crop)
+    return found + baseline_findings(straight.baseline, clip.arbitrary, where)
 
 
 def _unchanged(scale: float, width: int, height: int, straight: Straightener) -> list[str]:

@@ -44,10 +44,7 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
     found = folder.tried(lambda: read_sequence_file(path), "sequence-file", where)
     if found is None:
         return Clip("common", path, [], folder.pictures, stated_in=where, faults=folder.faults)
-    folder.list_pictures(IMAGES, RIGHT)
-    if folder.images and len(folder.images) != found.frames:
-        what = f"{where}: frames = {found.frames}, but images/ holds {counted(len(folder.images), 'picture')}"
-        folder.faults.append(finding("sequence-file", where, what))
+    _list_pictures(folder, found, where)
     intrinsics = found.camera.intrinsics(where)
     folder.size, folder.size_said = (intrinsics.width, intrinsics.height), STATES
     masks, notes = _masks(folder, found, options)
@@ -80,6 +77,14 @@ def describe_common(path: Path, options: SourceOptions) -> Clip:
         read_here=tuple(entry.folder.lower() for entry in (found.masks, found.depth) if entry is not None),
     )
     return with_stated(clip, options)
+
+
+def _list_pictures(folder: FolderReader, found: SequenceFile, where: Path) -> None:
+    """List the pictures; another number of them than the stated one is a fault."""
+    folder.list_pictures(IMAGES, RIGHT)
+    if folder.images and len(folder.images) != found.frames:
+        what = f"{where}: frames = {found.frames}, but images/ holds {counted(len(folder.images), 'picture')}"
+        folder.faults.append(finding("sequence-file", where, what))
 
 
 def describe_prepared(path: Path) -> Clip:

@@ -44,10 +44,7 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
         masks=MASKS if (path / MASKS).is_dir() else "none",
         excluded_value="black" if options.excluded_value == "black" else "white",
     )
-    if path.is_file():
-        raise InputError(f"{path}: is a file; allowed: a folder with images/, depth/, {settings.masks}/ and poses")
-    if not path.is_dir():
-        raise InputError(f"{path}: sequence folder not found")
+    _refuse_other_than_folder(path, settings)
     folder = FolderReader(path)
     folder.list_pictures(IMAGES, RIGHT)
     masks = None if settings.masks == "none" else folder.masks(settings.masks, settings.excluded_value)
@@ -80,6 +77,13 @@ def describe_endonerf(path: Path, options: SourceOptions) -> Clip:
         **({} if found is None else found._asdict()),
     )
     return with_stated(clip, options)
+
+
+def _refuse_other_than_folder(path: Path, settings: SequenceConfig) -> None:
+    if path.is_file():
+        raise InputError(f"{path}: is a file; allowed: a folder with images/, depth/, {settings.masks}/ and poses")
+    if not path.is_dir():
+        raise InputError(f"{path}: sequence folder not found")
 
 
 def _other_poses(path: Path, where: Path) -> list[str]:

@@ -50,11 +50,7 @@ def _sides(path: Path) -> tuple[Path, Path] | None:
 def describe_video(path: Path, options: SourceOptions) -> Clip:
     """The video as a clip. Raises InputError."""
     sides = _sides(path)
-    if sides and options.right is not None:
-        raise InputError(f"{path}: has a right video, and --right names another; allowed: one of them")
-    path, right = sides or (path, options.right)
-    if right is not None and options.stereo not in ("auto", "none"):
-        raise InputError(f"{path}: two videos of a pair and --stereo {options.stereo}; allowed: one of them")
+    path, right = _left_and_right(path, sides, options)
     facts = video_facts(path)
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
@@ -71,7 +67,6 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         + _turn_notes(facts, quarters, options, path)
     )
     poses, note = stated_poses(options, facts.count, rate, times)
-
     return Clip(
         layout="video",
         where=path,
@@ -89,6 +84,16 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         read_here=tuple(file.name.lower() for file in sides or ()),
         notes=[*notes, *camera.notes, *note],
     )
+
+
+def _left_and_right(path: Path, sides: tuple[Path, Path] | None, options: SourceOptions) -> tuple[Path, Path | None]:
+    """The video and that of the right view, if there is one. Raises InputError if the options state both otherwise."""
+    if sides and options.right is not None:
+        raise InputError(f"{path}: has a right video, and --right names another; allowed: one of them")
+    path, right = sides or (path, options.right)
+    if right is not None and options.stereo not in ("auto", "none"):
+        raise InputError(f"{path}: two videos of a pair and --stereo {options.stereo}; allowed: one of them")
+    return path, right
 
 
 def _pictures(
