@@ -74,7 +74,7 @@ def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, i
         raise RefusedArray(f"its header has {length} bytes; allowed: {LONGEST_HEADER}")
     shape, fortran, dtype = _entries(file.read(length).decode("latin-1"))
     if dtype.hasobject:
-        raise RefusedArray("it holds Python objects")
+        raise RefusedArray("it holds Python objects; allowed: numbers, as numpy.stack makes of arrays of one size")
     if (
         dtype.kind not in NUMBERS
         or dtype.itemsize > 8

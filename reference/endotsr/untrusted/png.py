@@ -13,6 +13,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
+from endotsr.untrusted.first_bytes import true_name
 from endotsr.untrusted.names import plain_line
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -66,7 +67,7 @@ def _chunks(data: bytes, name: object) -> list[tuple[bytes, bytes]]:
     """Kind and content of every chunk up to IEND, each with its checksum verified."""
     if data[:8] != SIGNATURE:
         reason = "is empty" if not data else "does not start with the PNG signature"
-        raise InputError(f"{name}: not a PNG file: it {reason}")
+        raise InputError(f"{name}: not a PNG file: it {reason}{true_name(data)}")
     found, position = [], 8
     while not found or found[-1][0] != b"IEND":
         if position + 12 > len(data):

@@ -18,7 +18,6 @@ from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.cost import estimated_cost
 from endotsr.clips.sequences.checks.duration import Standing, expected_frames, work_left
 from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
-from endotsr.clips.sequences.checks.masks import MaskSteps, mask_findings
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME
 from endotsr.clips.simulator.settings import SimulatorSettings
@@ -122,6 +121,14 @@ WRONG = {
     "masks full": (lambda p: each(p, "masks", lambda x: x * 0 + 255), "tissue-fraction", "refusal", None),
     "numbers with a gap": (renamed, "number-gap", "warning", 5),
     "duplicated frame": (lambda p: copied(p, 3, 4), "duplicated-frame", "warning", 4),
+    "a frame that returns": (lambda p: copied(p, 2, 6), "returning-frames", "warning", 6),
+    "one picture without its colours": (lambda p: each(p, "images", colourless, [4]), "colour-jump", "warning", 4),
+    "another light": (lambda p: each(p, "images", blue_light, range(4, FRAMES)), "colour-jump", "warning", 4),
+    "a picture that was not decoded to its end": (lambda p: each(p, "images", half_decoded, [3]), "plain-frame",
+                                                  "warning", 3),
+    "masks of two polarities": (lambda p: each(p, "masks", lambda x: 255 - x, range(4, FRAMES)), "turned-masks",
+                                "warning", 4),
+    "a pose that stays": (lambda p: poses(p, stays), "repeated-pose", "note", 3),
     "black frame": (lambda p: each(p, "images", lambda x: x * 0, [3]), "black-frame", "warning", 3),
     "white frame": (lambda p: each(p, "images", lambda x: x * 0 + 255, [3]), "white-frame", "warning", 3),
     "black clip": (lambda p: each(p, "images", lambda x: x * 0), "no-picture", "refusal", 0),
@@ -190,6 +197,24 @@ def holed(mask):
     """Another 5 % of the pixels excluded, as where stereo matching fails."""
     mask[4:16, 30:43] = 255
     return mask
+
+
+def colourless(image):
+    return np.repeat(image[:, :, 1:2], 3, 2)
+
+
+def blue_light(image):
+    return (image * [0.6, 1.0, 1.0]).astype(np.uint8)
+
+
+def half_decoded(image):
+    image[len(image) // 2 :] = 128
+    return image
+
+
+def stays(rows):
+    drift(rows)
+    rows[3:7, 3] = rows[3, 3]
 
 
 def coloured(mask):
@@ -276,42 +301,6 @@ def test_the_time_is_that_of_a_training_on_these_frames(sequence, tmp_path):
     configs = (PAPER, msgspec.structs.replace(PAPER, training=training))
     once, twice = (check_sequence(tmp_path / "sequence", config).facts["cost"]["minutes"] for config in configs)
     assert twice == pytest.approx(2 * once, rel=1e-3)
-
-
-def test_a_mask_is_unlike_only_where_both_neighbours_agree():
-    """Exact fractions; a tool that comes to stay is no finding, nor is a frame beside one without a mask."""
-    masks = np.ones((6, 10, 20), bool)
-    masks[:, -1, -1] = False  # a mask of one value has no fraction
-    masks[2, :2, :5] = False  # 10 of 200 pixels in one frame alone
-    masks[4:, 5:] = False  # from frame 4 on
-    steps = MaskSteps()
-    for i, mask in enumerate(masks):
-        steps.add(i, mask)
-    assert steps.fractions == {1: 0.0, 2: 0.05, 3: 0.0, 4: 0.0}
-    assert [(f.code, f.frame, "5.0%" in f.what) for f in steps.findings("masks")] == [("unlike-mask", 2, True)]
-    gap = MaskSteps()
-    for i, mask in enumerate([*masks[:3], None, *masks[3:]]):
-        gap.add(i, mask)
-    assert set(gap.fractions) == {1, 5}
-
-
-def test_a_mask_is_compared_with_what_is_usual_in_its_clip():
-    """A thin tool that crosses the picture differs from both neighbours in every frame."""
-    masks = np.ones((12, 10, 100), bool)
-    for i in range(12):
-        masks[i, :, 4 * i : 4 * i + 3] = False  # 3 % each, nowhere twice
-    assert mask_findings(masks, "masks") == []
-    masks[6, :, 60:80] = False
-    assert [f.frame for f in mask_findings(masks, "masks")] == [6]
-
-
-@pytest.mark.data
-def test_the_masks_of_cutting_are_unlike_where_its_stereo_matching_failed():
-    """Frames 73 and 74 and, likewise, 145 and 146; no frame of pulling."""
-    found = check_sequence(data_folder("endonerf_cutting"), PAPER).findings
-    assert [f.frame for f in found if f.code == "unlike-mask"] == [73, 74, 145, 146]
-    found = check_sequence(data_folder("endonerf_pulling"), PAPER).findings
-    assert not [f for f in found if f.code == "unlike-mask"]
 
 
 def test_everything_is_found_in_one_pass(sequence, tmp_path):

@@ -1,11 +1,17 @@
-"""Frames that repeat the one before: found up to coding noise, told from pauses, and never held out beside a twin."""
+"""Frames that repeat another one: found up to coding noise, told from pauses, and never held out beside a twin."""
 
 import numpy as np
 import pytest
 from common_folder import written
 
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.sequences.checks.copies import copied_frames, pattern_of, without_twins
+from endotsr.clips.sequences.checks.copies import (
+    copied_frames,
+    pattern_of,
+    picture_numbers,
+    steps_between,
+    without_twins,
+)
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import PAPER
 from endotsr.errors import InputError
@@ -56,15 +62,27 @@ def test_steady_motion_pauses_and_single_copies_are_no_pattern():
 def test_a_copy_leaves_the_training_beside_its_held_out_twin():
     index = np.arange(12)
     held_out = (index - 1) % 8 == 0
-    copies = index % 2 == 1
+    pictures = index // 2
     names = [f"{i:02d}" for i in index]
-    train, notes = without_twins(index[~held_out], index[held_out], copies, names, "clip")
+    train, notes = without_twins(index[~held_out], index[held_out], pictures, names, "clip")
     assert train.tolist() == [2, 3, 4, 5, 6, 7, 10, 11]  # 1 is a copy of 0, and 9 of 8
     assert "00, 08" in notes[0]
-    same, nothing = without_twins(index[~held_out], index[held_out], copies & False, names, "clip")
+    same, nothing = without_twins(index[~held_out], index[held_out], index, names, "clip")
     assert nothing == [] and same.tolist() == index[~held_out].tolist()
     with pytest.raises(InputError, match="copies of held-out frames"):
-        without_twins(index[::2], index[1::2], copies, names, "clip")
+        without_twins(index[::2], index[1::2], pictures, names, "clip")
+
+
+def test_a_copy_that_returns_later_is_a_twin_too():
+    rng = np.random.default_rng(0)
+    first = [rng.integers(0, 255, (6, 8, 3)).astype(np.int16) for _ in range(5)]
+    joined = [*first, *first]
+    numbers = picture_numbers(joined, copied_frames(steps_between(joined)))
+    assert numbers[:5].tolist() == numbers[5:].tolist() and len(set(numbers.tolist())) == 5
+    paused = [first[0], first[1], first[1], first[0]]
+    assert len(set(picture_numbers(paused, copied_frames(steps_between(paused))).tolist())) == 2
+    other = [first[0], first[0] + np.int16(1)]
+    assert len(set(picture_numbers(other, copied_frames(steps_between(other))).tolist())) == 2
 
 
 def test_a_reader_leaves_out_the_twin(tmp_path):
@@ -73,3 +91,12 @@ def test_a_reader_leaves_out_the_twin(tmp_path):
     found = read_sequence(tmp_path / "clip", PAPER.sequence)
     assert found.test_index.tolist() == [1] and found.train_index.tolist() == [2, 3, 4]
     assert any("held-out frames repeat them: 000000" in note for note in found.notes)
+
+
+def test_a_reader_leaves_out_a_twin_that_returns_later(tmp_path):
+    written(tmp_path / "clip")
+    write_png(tmp_path / "clip/images/000003.png", read_png(tmp_path / "clip/images/000001.png"))
+    found = read_sequence(tmp_path / "clip", PAPER.sequence)
+    assert found.test_index.tolist() == [1] and found.train_index.tolist() == [0, 2, 4]
+    assert any("held-out frames repeat them: 000003" in note for note in found.notes)
+    assert any("returning-frames: frame 3: 1 frame repeats" in note for note in found.notes)

@@ -148,3 +148,17 @@ def test_a_dicom_file_is_named_as_one(name, tmp_path):
         layout_of(tmp_path / name)
     with pytest.raises(InputError, match="it holds 1 DICOM file; export it"):
         layout_of(tmp_path / "study")
+
+
+@pytest.mark.parametrize(("name", "said"), [("a.npz", "frames in arrays are not read; write each as a png picture"),
+                                            ("a.exr", "1 files that end in .exr; convert them to png"),
+                                            ("a.zip", "1 archive of the ending .zip; unpack first")])  # fmt: skip
+def test_arrays_and_archives_are_named_as_such(name, said, tmp_path):
+    """A folder of them had the list of layouts alone."""
+    (tmp_path / "frames").mkdir()
+    (tmp_path / "frames" / name).write_bytes(b"data")
+    with pytest.raises(InputError, match=said):
+        layout_of(tmp_path / "frames")
+    if name == "a.npz":
+        with pytest.raises(InputError, match=said):
+            layout_of(tmp_path / "frames" / name)

@@ -76,6 +76,14 @@ def test_a_right_view_that_stands_still_is_named(shown, steps, tmp_path):
     assert code == "frozen-right-view" and f"repeats its picture in {steps} of {FRAMES - 1} steps" in what
 
 
+@pytest.mark.parametrize(("equal", "words"), [(FRAMES, f"{FRAMES} of {FRAMES} frames, first 000000"),
+                                              (3, f"3 of {FRAMES} frames, first 000000")])  # fmt: skip
+def test_a_right_view_that_is_the_left_one_is_named(equal, words, tmp_path):
+    views = [(left, left if i < equal else right) for i, (left, right) in enumerate(pairs())]
+    ((code, what),) = said(views, tmp_path)
+    assert code == "same-views" and words in what
+
+
 def test_a_pause_of_both_views_and_a_single_repeat_are_no_frozen_view():
     still, once = MOVING.copy(), MOVING.copy()
     still[3:9], once[5] = 0.0, 0.0

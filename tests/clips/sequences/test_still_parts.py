@@ -10,7 +10,7 @@ from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import read_picture
-from endotsr.clips.sequences.checks.still_parts import StillParts
+from endotsr.clips.sequences.checks.still_parts import Edges, StillParts, plain_findings
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate
 
@@ -72,6 +72,23 @@ def test_a_second_picture_and_grey_bars_are_named_with_their_border():
     below = [np.vstack([tissue(i), np.full((40, WIDTH, 3), 90, np.uint8)]) for i in range(FRAMES)]
     ((code, what),) = said(below)
     assert code == "straight-border" and any(f"row {HEIGHT + k}:" in what for k in (-2, -1, 0, 1))
+
+
+def test_a_surround_of_one_colour_is_named_unless_it_is_excluded():
+    rows, columns = np.ogrid[:HEIGHT, :WIDTH]
+    outside = (rows - HEIGHT / 2) ** 2 + (columns - WIDTH / 2) ** 2 > 90**2
+    shown = [np.where(outside[..., None], np.uint8(190), tissue(i)) for i in range(FRAMES)]
+    ((code, what),) = said(shown)
+    assert code == "plain-part" and "grey level 190" in what
+    assert said(shown, [~outside] * FRAMES) == []
+
+
+def test_smooth_parts_of_many_levels_are_no_part_of_one_colour():
+    """As blocks of a compressed picture are."""
+    flat, every = np.zeros((2, 40, 40)), np.ones((40, 40), bool)
+    levels = np.kron(np.arange(100.0).reshape(10, 10), np.ones((4, 4)))
+    assert plain_findings(Edges(levels, flat, every, 1.0), "clip") == []
+    assert plain_findings(Edges(levels // 50 * 50, flat, every, 1.0), "clip") != []
 
 
 @pytest.mark.parametrize("name", ["cutting", "moving-camera"])

@@ -103,8 +103,13 @@ def _array_lines(path: Path) -> list[tuple[str, list[float]]]:
     """The rows of an array (n, 7 | 8 | 12 | 16), (n, 3, 4) or (n, 4, 4), with their place."""
     array = read_npy(path).astype(np.float64)
     rows = array.reshape(len(array), -1) if array.ndim in (2, 3) and len(array) else np.zeros((0, 0))
-    if rows.shape[1] not in COLUMNS or not np.isfinite(rows).all():
+    if rows.shape[1] not in COLUMNS:
         raise InputError(f"{path}: array of shape {array.shape}; {ALLOWED}")
+    if (lost := np.flatnonzero(~np.isfinite(rows).all(axis=1))).size:
+        raise InputError(
+            f"{path}: row {lost[0]}: holds a number that is not finite; such rows: {lost.size} of {len(rows)}; allowed:"
+            " finite numbers; where frames have no pose, a text file with stamps that leaves them out"
+        )
     return [(f"{path}: row {i}", row) for i, row in enumerate(rows.tolist())]
 
 
@@ -112,7 +117,7 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
     """Place and numbers of every line, and the columns that a head line names; a head line may have no mark."""
     found: list[tuple[str, list[float]]] = []
     head: list[str] = []
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+    for number, line in enumerate(_text(path).splitlines(), 1):
         words, where = re.sub(r"[\[\],;]", " ", line).split(), f"{path}: line {number}"
         if not words or words[0].startswith("#"):
             head = _named_columns(line) or head
@@ -128,6 +133,13 @@ def _text_lines(path: Path) -> tuple[list[tuple[str, list[float]]], list[str]]:
             raise InputError(f"{where}: {ALLOWED}{decimal_commas(line)}{_angles(line)}")
         found.append((where, row))
     return found, head
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text(path)
+    except InputError as error:
+        raise InputError(f"{error}; allowed: text in UTF-8, or one array in a file that ends in .npy") from None
 
 
 def _angles(line: str) -> str:

@@ -22,6 +22,7 @@ from endotsr.clips.opencv.picture_marks import ORIENTATION, marks_of, picture_ma
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
+from endotsr.untrusted.first_bytes import true_name
 from endotsr.untrusted.names import counted, plain_line
 from endotsr.untrusted.png import LARGEST_FILE
 
@@ -191,7 +192,7 @@ def _check_start_and_end(data: bytes, ending: str, path: Path) -> str:
     if not data:
         raise InputError(f"{path}: the file is empty")
     if not data.startswith(starts):
-        raise InputError(f"{path}: not a {kind} file by its first bytes")
+        raise InputError(f"{path}: not a {kind} file by its first bytes{true_name(data)}")
     if kind == "JPEG" and JPEG_END not in data[-64:]:  # some cameras append a few bytes
         raise InputError(
             f"{path}: truncated JPEG: the file ends after {counted(len(data), 'byte')}, without its end marker"

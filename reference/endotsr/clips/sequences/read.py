@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.files import hash_files
 from endotsr.clips.opencv.pictures import read_picture
-from endotsr.clips.sequences.checks.copies import copied_frames, steps_between, without_twins
+from endotsr.clips.sequences.checks.copies import copied_frames, picture_numbers, steps_between, without_twins
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts, depth_note, far_limits
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_facts
 from endotsr.clips.sequences.checks.guard import guarded
@@ -210,8 +210,9 @@ def _without_depth_outliers(sequence: Sequence, facts: list[Facts]) -> list[Fact
 
 def _without_twins(sequence: Sequence, facts: list[Facts], clip: Clip) -> Sequence:
     """The sequence without training frames that a held-out frame repeats, with a note. Raises InputError."""
-    copies = copied_frames(steps_between([picture.small for picture, _ in facts]))
-    train, notes = without_twins(sequence.train_index, sequence.test_index, copies, sequence.names, clip.where)
+    small = [picture.small for picture, _ in facts]
+    pictures = picture_numbers(small, copied_frames(steps_between(small)))
+    train, notes = without_twins(sequence.train_index, sequence.test_index, pictures, sequence.names, clip.where)
     sequence.notes.extend(notes)
     return replace(sequence, train_index=train)
 

@@ -1,5 +1,7 @@
 """Checks of poses and calibration: jumps, units, field of view, principal point."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from endotsr.clips.formats.camera import Intrinsics
@@ -11,6 +13,7 @@ from endotsr.method.splatting.camera import Camera, camera_centre, degrees_betwe
 
 JUMP = 20.0  # times the median step
 TURN = 20.0  # degrees between neighbouring frames
+REPEATED = 2  # steps in a row without any change of the pose
 STILL = 1e-4  # of the depth; a shorter camera path is most likely in metres, with depth in millimetres
 FARTHEST_STEP = 2.0  # of the depth; with a larger step, neighbouring frames would not overlap
 WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
@@ -47,7 +50,26 @@ def _step_findings(cameras: list[Camera], centres: FloatArray, where: str) -> li
         angle = degrees_between(cameras[i].rotation, cameras[i - 1].rotation)
         if angle > TURN:
             found.append(finding("pose-turn", where, f"the camera turns by {angle:.0f} degrees", i))
-    return found
+    return found + _repeated_finding(cameras, where)
+
+
+def _repeated_finding(cameras: list[Camera], where: str) -> list[Finding]:
+    """A note on a pose that is equal in every number over several frames, in a path that moves elsewhere."""
+    numbers = [np.column_stack([camera.rotation, camera.translation]).tobytes() for camera in cameras]
+    equal = np.array([a == b for a, b in pairwise(numbers)])
+    if not equal.any() or equal.all():
+        return []
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]])))
+    longest = int(np.diff(ends)[::2].argmax())
+    first, last = int(ends[2 * longest]), int(ends[2 * longest + 1])
+    if last - first < REPEATED:
+        return []
+    identity = bool((cameras[first].rotation == np.eye(3)).all() and not cameras[first].translation.any())
+    what = (
+        f"the pose does not change in {equal.sum()} of {len(equal)} steps; frames {first} to {last} have one"
+        f" pose{', the identity' if identity else ''}"
+    )
+    return [finding("repeated-pose", where, what, first)]
 
 
 def intrinsics_findings(camera: Camera | Intrinsics, where: str, crop: Crop | None = None) -> list[Finding]:

@@ -1,10 +1,12 @@
-"""Frames that repeat the one before: exactly, or in a pattern up to the noise of coding.
+"""Frames that repeat another one: the one before, exactly or in a pattern up to the noise of coding, or an earlier one.
 
 A recorder that stores 15 pictures a second as 30 writes each twice, a conversion from 24 to 30 repeats every fifth.
-After coding, a copy differs a little, and the pattern tells it from a pause of the motion. In: small pictures of the
-frames. Out: the copies, findings, and a split in which no copy of a held-out frame is trained on.
+After coding, a copy differs a little, and the pattern tells it from a pause of the motion. A clip that is joined to
+itself, or played back and forth, shows its pictures again. In: small pictures of the frames. Out: the copies, findings,
+and a split in which no copy of a held-out frame is trained on.
 """
 
+from hashlib import blake2b
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -73,6 +75,47 @@ def copied_frames(steps: FloatArray) -> BoolArray:
     return found
 
 
+def picture_numbers(small: list[np.ndarray], copies: BoolArray) -> IndexArray:
+    """(n,) a number for each picture that the clip shows: frames with one number are copies of each other.
+
+    copies   (n,) from `copied_frames`
+
+    A frame that is equal to an earlier one in every value, as pictures without loss are, has its number too.
+    """
+    numbers, first = np.cumsum(~copies), dict[bytes, int]()
+    for i, picture in enumerate(small):
+        number = first.setdefault(_digest(picture), int(numbers[i]))
+        if number != numbers[i]:
+            numbers[numbers == numbers[i]] = number
+    return numbers
+
+
+def _digest(picture: np.ndarray) -> bytes:
+    """Equal for equal pictures, in place of their copies in memory."""
+    return blake2b(repr(picture.shape).encode() + picture.tobytes(), digest_size=16).digest()
+
+
+def return_finding(
+    small: list[np.ndarray], steps: FloatArray, names: list[str], readable: BoolArray, where: str
+) -> list[Finding]:
+    """A warning on frames that repeat an earlier one, but not the one before.
+
+    steps      from `steps_between`
+    readable   frames that are neither black nor white
+    """
+    first, pairs = dict[bytes, int](), []
+    for i, picture in enumerate(small):
+        earlier = first.setdefault(_digest(picture), i)
+        if readable[i] and earlier < i and (steps[earlier:i] >= SAME).any():
+            pairs.append((i, earlier))
+    if not pairs:
+        return []
+    frame, earlier = pairs[0]
+    many = "1 frame repeats" if len(pairs) == 1 else f"{len(pairs)} of {len(names)} frames repeat"
+    what = f"{many} an earlier one, after other pictures; the first is {names[frame]}, which repeats {names[earlier]}"
+    return [finding("returning-frames", where, what, frame)]
+
+
 def copy_findings(steps: FloatArray, names: list[str], readable: BoolArray, where: str) -> list[Finding]:
     """One warning on a pattern of copies, or one on every frame that repeats the one before exactly.
 
@@ -95,16 +138,15 @@ def copy_findings(steps: FloatArray, names: list[str], readable: BoolArray, wher
 
 
 def without_twins(
-    train: IndexArray, test: IndexArray, copies: BoolArray, names: list[str], where: object
+    train: IndexArray, test: IndexArray, pictures: IndexArray, names: list[str], where: object
 ) -> tuple[IndexArray, list[str]]:
     """The training frames of which no held-out frame is a copy or the original, and a note.
 
-    copies   (n,) from `copied_frames`
+    pictures   (n,) from `picture_numbers`
 
     Raises:  InputError if fewer than two training frames remain.
     """
-    picture = np.cumsum(~copies)  # frames with one number show one picture
-    twins = np.isin(picture[train], picture[test])
+    twins = np.isin(pictures[train], pictures[test])
     if not twins.any():
         return train, []
     kept = train[~twins]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from endotsr.clips.formats.files import frame_numbers, shortened
 from endotsr.clips.formats.picture_fields import colours_differ
 from endotsr.clips.sequences.checks.clock_names import clock_findings
-from endotsr.clips.sequences.checks.copies import SAME, copy_findings, steps_between
+from endotsr.clips.sequences.checks.colours import colour_findings
+from endotsr.clips.sequences.checks.copies import SAME, copy_findings, return_finding, steps_between
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
@@ -75,11 +76,13 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     steps = steps_between([fact.small for fact in facts])
     names = [fact.name for fact in facts]
     found += copy_findings(steps, names, readable, where)
+    found += return_finding([fact.small for fact in facts], steps, names, readable, where)
     found += exchanged_findings([fact.small for fact in facts], steps, names, readable, where)
     for i in range(1, len(facts)):
         if readable[i - 1] and readable[i] and not 1 / JUMP < means[i] / means[i - 1] < JUMP:
             what = f"brightness changes by {means[i] / means[i - 1]:.2f} times"
             found.append(finding("exposure-jump", where, what, i))
+    found += colour_findings([fact.small for fact in facts], readable, where)
     found += _of_clip(facts, means, where)
     grey = [fact.small.mean(axis=2) for fact in facts]
     found += cut_findings(grey, names, readable, where) + halves_finding(grey, where)

@@ -63,11 +63,21 @@ KINDS: dict[str, Kind] = {
     "repeated-frames": Kind("warning", "the motion stops and jumps, and training leaves out every frame that a held-out"
                             " frame repeats",
                             "prepare the clip again with the --frames that are named"),
+    "returning-frames": Kind("warning", "time goes on where the picture goes back, as in a clip that is joined to"
+                             " itself or played back and forth; training leaves out every frame that a held-out frame"
+                             " repeats",
+                             "prepare each picture once: endotsr prepare --frames"),
     "exchanged-frames": Kind("warning", "the motion goes back and forth there, and a held-out frame stands between"
                              " frames of other times",
                              "give the pictures the numbers of their times, with masks and depth of the same frames"),
     "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
                           "fit exposures (model.exposure = true), or cut the clip with --frames"),
+    "colour-jump": Kind("warning", "another light, white balance or kind of picture begins or ends there, or something"
+                        " grey covers the view, and training fits one colour to the tissue",
+                        f"cut the clip there: endotsr prepare --frames; or {LEAVE_OUT}; none needed where masks exclude"
+                        " what covers the view"),
+    "plain-frame": Kind("warning", "a part that was not decoded, or was painted over, becomes tissue at its time",
+                        f"decode or export it again; or {LEAVE_OUT}"),
     "another-scene": Kind("warning", "training fits one scene, and the parts before and after a cut are unrelated",
                           "cut the clip there: endotsr prepare --frames; or train it with --windows auto"),
     "two-views": Kind("warning", "a stereo pair in one picture is not one view",
@@ -77,9 +87,13 @@ KINDS: dict[str, Kind] = {
     "straight-border": Kind("warning", "two pictures in one, bars that are not black and the display of a console are"
                             " not one view of one scene",
                             "cut the picture out: endotsr prepare --crop; or exclude the rest: --unite-masks"),
+    "plain-part": Kind("warning", "a surround or panel of one colour is no tissue, and training fits it as such",
+                       "exclude it: endotsr prepare --unite-masks FILE with a mask of it; or cut it off with --crop"),
     "burnt-in": Kind("warning", "training fits it as tissue that travels with the camera",
                      "exclude it: endotsr prepare --unite-masks FILE with a mask of it; or cut a row of text off with"
                      " --crop"),
+    "same-views": Kind("warning", "equal views have no parallax, and a depth of them is no measurement",
+                       "export the right view again"),
     "frozen-right-view": Kind("warning", "depth from such a pair joins two moments",
                               "record or export the right view again, or leave these frames out: endotsr prepare"
                               " --drop"),
@@ -118,6 +132,8 @@ KINDS: dict[str, Kind] = {
                             "give each mask the number of its picture"),
     "flipped-masks": Kind("warning", "the masks hide tissue and show the instrument",
                           "store their first row at the top and their first column at the left, like the picture"),
+    "turned-masks": Kind("warning", "one part of the masks hides the tissue and shows the instrument",
+                         "invert the masks of one part, so that all have one polarity"),
     "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
                         " held-out frame there is measured on pixels that training hardly sees",
                         f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
@@ -183,6 +199,8 @@ KINDS: dict[str, Kind] = {
                           "state it in millimetres: prepare --baseline, or T of a calibration; or with the unit of"
                           " sequence.toml"),
     "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", f"check this pose, or {LEAVE_OUT}"),
+    "repeated-pose": Kind("note", "a tracker that loses the scope may repeat its last pose, or write the identity",
+                          "none needed if the scope rests there; else leave these frames out: endotsr prepare --drop"),
     "pose-turn": Kind("warning", "such a turn between neighbouring frames is most likely a wrong pose",
                       "check axes and direction of the trajectory"),
     "pose-unit": Kind("warning", "poses and depth may be in different units, such as metres and millimetres",

@@ -1,7 +1,8 @@
 """Checks of the masks against their neighbours in time.
 
 In: the masks one after another. Out: findings. A mask that follows the depth excludes what the stereo matching did not
-find; where the matching fails in a frame, its mask differs from those before and after.
+find; where the matching fails in a frame, its mask differs from those before and after. Masks of two programs may have
+two polarities.
 """
 
 import numpy as np
@@ -12,6 +13,41 @@ from endotsr.method.kernels.arrays import BoolArray
 
 UNLIKE = 0.01  # of the pixels: a mask that differs from both neighbours; 0.006 at most on a clip with a fast instrument
 USUAL = 4.0  # the same as a multiple of the median of the clip
+TURNED, BOTH = 0.8, 0.5  # of the pixels that differ from the mask before: of all, and each of tissue and excluded ones
+
+
+class MaskTurns:
+    """The frames at which the polarity of the masks changes, from one pass over them in time order."""
+
+    def __init__(self) -> None:
+        self.frames: list[int] = []
+        self._last, self._count = np.zeros((0, 0), bool), 0
+
+    def add(self, mask: BoolArray | None) -> None:
+        """The mask of the next frame, (H, W), True = tissue; None where there is none."""
+        mask = np.zeros((0, 0), bool) if mask is None else mask
+        before = self._last
+        if mask.shape == before.shape and before.any() and not before.all():
+            turned = mask != before
+            if turned.mean() > TURNED and min(turned[before].mean(), turned[~before].mean()) > BOTH:
+                self.frames.append(self._count)
+        self._last, self._count = mask, self._count + 1
+
+    @property
+    def beside(self) -> set[int]:
+        """Frames that differ from one neighbour by their polarity, and not from both."""
+        both = {i for i in self.frames if i + 1 in self.frames}
+        return {i + k for i in self.frames for k in (-1, 0)} - both
+
+    def findings(self, where: str) -> list[Finding]:
+        """A warning on masks of two polarities, if each has two masks or more."""
+        ends = [*self.frames, self._count]
+        other = sum(b - a for a, b in zip(ends[::2], ends[1::2]))
+        fewer = min(other, self._count - other)
+        if fewer < 2:
+            return []
+        what = f"{fewer} of {self._count} masks have another polarity than the rest; here it changes for the first time"
+        return [finding("turned-masks", where, what, ends[0])]
 
 
 class MaskSteps:
@@ -24,12 +60,13 @@ class MaskSteps:
 
     def __init__(self) -> None:
         self.fractions: dict[int, float] = {}  # by frame
-        self._order = MaskOrder()
+        self._order, self._turns = MaskOrder(), MaskTurns()
         self._last: tuple[BoolArray | None, BoolArray | None] = (None, None)
 
     def add(self, frame: int, mask: BoolArray | None) -> None:
         """The mask of a frame, (H, W), True = tissue; stored until the second next one."""
         self._order.add(mask)
+        self._turns.add(mask)
         before, middle = self._last
         if before is not None and middle is not None and mask is not None:
             if before.shape == middle.shape == mask.shape and all(0 < m.mean() < 1 for m in (before, middle, mask)):
@@ -40,9 +77,9 @@ class MaskSteps:
         """A warning for every frame whose mask differs from both neighbours unusually much, or is exchanged."""
         usual = float(np.median(list(self.fractions.values()) or [0.0]))
         unlike = {i: fraction for i, fraction in self.fractions.items() if fraction > max(UNLIKE, USUAL * usual)}
-        what = "its mask differs from both neighbours in {:.1%} of the pixels"
-        found = [finding("unlike-mask", where, what.format(fraction), i) for i, fraction in unlike.items()]
-        return found + self._order.findings(where)
+        what, beside = "its mask differs from both neighbours in {:.1%} of the pixels", self._turns.beside
+        found = [finding("unlike-mask", where, what.format(part), i) for i, part in unlike.items() if i not in beside]
+        return self._turns.findings(where) + found + self._order.findings(where)
 
 
 def mask_findings(masks: BoolArray, where: str) -> list[Finding]:

@@ -1,8 +1,9 @@
 """Whether the two views of a stereo clip are rectified and of one moment, for `check` and `depth`.
 
-In: the pairs of a clip. Out: findings. The steps of both views from frame to frame show a right view that stands still.
-Features that both views share show the rows: in a rectified pair, a point lies in the same row of both. A right view
-that is late shows a point where it was some frames before, and its rows differ by the motion in between.
+In: the pairs of a clip. Out: findings. A right view that is the left one has no parallax. The steps of both views from
+frame to frame show a right view that stands still. Features that both views share show the rows: in a rectified pair, a
+point lies in the same row of both. A right view that is late shows a point where it was some frames before, and its
+rows differ by the motion in between.
 """
 
 from pathlib import Path
@@ -69,7 +70,8 @@ class PairViews:
             return []
         where, names = str(files[0].parent), [file.name for file in files]
         frozen = frozen_finding(steps_between(self.small[0]), steps_between(self.small[1]), names, where)
-        return frozen or late_finding(self.rows, where) + row_finding(self.rows, where)
+        still = frozen or same_finding(*self.small, names, where)
+        return still or late_finding(self.rows, where) + row_finding(self.rows, where)
 
 
 def pair_findings(clip: Clip) -> list[Finding]:
@@ -83,6 +85,16 @@ def pair_findings(clip: Clip) -> list[Finding]:
     except InputError:
         return []  # `depth` names the file; training reads no right picture
     return views.findings(clip.right)
+
+
+def same_finding(left: list[NDArray], right: list[NDArray], names: list[str], where: str) -> list[Finding]:
+    """A warning on right pictures that are the left ones: their small pictures differ by less than any noise."""
+    equal = np.array([np.abs(b - a).mean() < SAME and np.ptp(a) > 0 for a, b in zip(left, right)])
+    if not equal.any():
+        return []
+    first = int(equal.argmax())
+    what = f"the right picture is the left one in {equal.sum()} of {counted(len(names), 'frame')}, first {names[first]}"
+    return [finding("same-views", where, what, first)]
 
 
 def frozen_finding(left: FloatArray, right: FloatArray, names: list[str], where: str) -> list[Finding]:

@@ -57,7 +57,10 @@ def layouts() -> tuple[Layout, ...]:
 
 
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
-OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd")
+OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd",
+                  ".exr", ".hdr", ".pnm", ".pbm")  # fmt: skip
+ARRAYS = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".pkl", ".bag")
+AS_PICTURES = "frames in arrays are not read; write each as a png picture"
 JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
 DICOM_ENDINGS = (".dcm", ".dicom", "")  # recorders also write names without an ending
 EXPORT_DICOM = "export it as a video or as PNG pictures before, for example with the program that shows it"
@@ -99,6 +102,8 @@ def _held(path: Path) -> str:
         ending = path.suffix.lower()
         if is_dicom(path):
             return f": a DICOM file; {EXPORT_DICOM}"
+        if ending in ARRAYS:
+            return f": {AS_PICTURES}"
         said = ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
         return ": an archive; unpack it first" if ending in ARCHIVES else said
     dicom = sum(is_dicom(file) for file in path.iterdir() if file.suffix.lower() in DICOM_ENDINGS)
@@ -108,6 +113,10 @@ def _held(path: Path) -> str:
     ending, count = endings.most_common(1)[0] if endings else ("", 0)
     if ending in OTHER_PICTURES:
         return f": it holds {count} files that end in {ending}; convert them to png"
+    if ending in ARRAYS:
+        return f": it holds {counted(count, 'file')} of the ending {ending}; {AS_PICTURES}"
+    if ending in ARCHIVES:
+        return f": it holds {counted(count, 'archive')} of the ending {ending}; unpack first"
     if ending in JPEG_NAMES:
         return f": it holds {count} files that end in {ending}; let their names end in .jpg"
     videos = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
