@@ -53,8 +53,10 @@ KINDS: dict[str, Kind] = {
                           "inspect the pictures: a frozen video, or one picture under many names"),
     "black-frame": Kind("warning", "a black frame teaches the model a black scene at its time", LEAVE_OUT),
     "white-frame": Kind("warning", "a white frame teaches the model a white scene at its time", LEAVE_OUT),
-    "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does",
-                                "prepare the video itself, or deinterlace it before exporting pictures"),
+    "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does, or two"
+                                " views, as 3-D video does that has them in turn by rows",
+                                "prepare the video itself, or deinterlace it before exporting pictures; of 3-D video,"
+                                " export each view"),
     "dark-border": Kind("warning", "training fits black tissue there",
                         "crop the clip (endotsr prepare --crop), or exclude the border (--border exclude)"),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
