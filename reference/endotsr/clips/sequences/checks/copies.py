@@ -82,7 +82,8 @@ def picture_numbers(small: list[np.ndarray], copies: BoolArray) -> IndexArray:
 
     A frame that is equal to an earlier one in every value, as pictures without loss are, has its number too.
     """
-    numbers, first = np.cumsum(~copies), dict[bytes, int]()
+    numbers: IndexArray = np.cumsum(~copies, dtype=np.intp)
+    first = dict[bytes, int]()
     for i, picture in enumerate(small):
         number = first.setdefault(_digest(picture), int(numbers[i]))
         if number != numbers[i]:
