@@ -2,12 +2,14 @@
 
 import importlib
 import json
+from pathlib import Path
 
 import pytest
 
 from endotsr.errors import InputError
 from endotsr.port.judge.certificate import read_certificate
 
+ROOT = Path(__file__).parents[2]
 made = importlib.import_module("pages.ports.certified")
 
 
@@ -22,3 +24,10 @@ def test_a_certificate_with_another_claim_is_refused(tmp_path):
     file.write_text(json.dumps({**content, "level": content["level"] - 1}), encoding="utf-8")
     with pytest.raises(InputError, match="claim"):
         read_certificate(file)
+
+
+def test_the_guide_names_every_training_case():
+    guide = (ROOT / "docs" / "guides" / "port.md").read_text(encoding="utf-8")
+    part = guide[guide.index("## 6. Training") : guide.index("## 7.")]
+    cases = [folder.name for folder in (ROOT / "golden" / "cases" / "training").iterdir() if folder.is_dir()]
+    assert len(cases) > 1 and [case for case in cases if f"{case}`" not in part] == []
