@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 QUIET_SECONDS = 30.0  # between lines if standard error is no terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the postfix contains the time left
-FORECAST_AFTER = 60  # iterations of this process; a coarse start is first checked after 50
+FORECAST_AFTER = 60  # iterations of this process, or more until their speed is known; a coarse start is checked at 50
 LEAST_SECONDS = 3.0  # of the initial motion and of the evaluation, to tell a speed; shorter ones mostly load code
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR: every tenth iteration)
 
@@ -42,6 +42,7 @@ class Progress:
         self._plan, self._page = plan, page
         self._total, self._done = plan.config.training.iterations, 0
         self._training: TrainingState | None = None
+        self._forecast_said = False
         self._said = self._ended = time.monotonic()
         self._means: dict[str, float] = {}
         self.time_left = TimeLeft(plan)
@@ -83,7 +84,8 @@ class Progress:
         self._ended, self._done = now, self._done + 1
         if self._page is not None:
             self._page.update(entry, lambda: self._left(standing))
-        if self._done == FORECAST_AFTER and (forecast := self._forecast(standing)):
+        if not self._forecast_said and self._done >= FORECAST_AFTER and (forecast := self._forecast(standing)):
+            self._forecast_said = True
             self.say(forecast)
         if self._bar is not None:
             self._bar.update(1)

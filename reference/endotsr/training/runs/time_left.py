@@ -6,7 +6,7 @@ frames is no part of the time of an iteration: it is counted separately, and end
 
 import statistics
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from endotsr.clips.sequences.checks.duration import (
@@ -32,6 +32,7 @@ SPIKE = 4.0  # medians; longer iterations are left out, such as those that compi
 # threads on two cores, a parallel loop waits for the one that shares a core. Used below LEAST_QUIET quiet iterations.
 SLOWED = 1.6
 LEAST_QUIET = 8
+PATIENCE = 30.0  # seconds of iterations for which these are awaited; until then the time left is unknown
 QUIET_AFTER, QUIET_BEFORE = 1, 8  # iterations of the distance to the last finished target, and to the next one
 PIXELS_OF_FULL = 4  # times those of a frame of a coarse start
 # Weight of the time expected of a gap, in gaps. The first ones are no measure: after the coarse start of `quick` on
@@ -57,6 +58,7 @@ class TimeLeft:
         self._timed: deque[Timed] = deque(maxlen=most)
         self._coarse, self._making = False, NOTHING_MADE
         self._expected: float | None = None  # seconds of a gap, by those of the size before
+        self._seconds = 0.0  # of all iterations
 
     def add(self, standing: Standing, seconds: float, making: Making) -> None:
         """An iteration took this time, with the work on targets since the previous one.
@@ -71,15 +73,19 @@ class TimeLeft:
         waited, beside = making.waited - before.waited, making.beside - before.beside
         progress = standing.iteration / self._plan.config.training.iterations
         work = iteration_work(standing.gaussians, self._seen(standing.coarse), progress, self._plan.vectors)
+        self._seconds += seconds
         self._timed.append(Timed(max(seconds - waited, 0.0), float(work), waited, beside))
 
     @property
     def unit(self) -> float | None:
-        """Seconds per unit of work; None = too few iterations."""
+        """Seconds per unit of work; None = too few iterations, or too few without the second thread up to now."""
+        beside = any(one.beside for one in self._timed)
+        if beside and self._seconds < PATIENCE and len(quiet(self._timed)) < LEAST_QUIET:
+            return None
         return unit_seconds(self._timed, SLOWED / self._plan.threads)
 
     def seconds(self, standing: Standing) -> float | None:
-        """Seconds from here to the end of the iterations; None = too few iterations."""
+        """Seconds from here to the end of the iterations; None = the speed is unknown yet."""
         unit = self.unit
         if unit is None:
             return None
@@ -123,8 +129,9 @@ def unit_seconds(timed: Iterable[Timed], slowed: float) -> float | None:
     return max((sum(one.seconds for one in kept) - lost) / sum(one.work for one in kept), min(each) / 2)
 
 
-def quiet(timed: Sequence[Timed]) -> list[Timed]:
+def quiet(timed: Iterable[Timed]) -> list[Timed]:
     """The iterations during which the second thread rests: no target is finished in them, just before or soon after."""
-    made = [k for k, one in enumerate(timed) if one.beside or one.waited]
+    known = list(timed)
+    made = [k for k, one in enumerate(known) if one.beside or one.waited]
     near = {k for at in made for k in range(at - QUIET_BEFORE, at + QUIET_AFTER + 1)}
-    return [one for k, one in enumerate(timed) if k not in near]
+    return [one for k, one in enumerate(known) if k not in near]
