@@ -13,10 +13,10 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
-from endotsr.untrusted.first_bytes import true_name
+from endotsr.untrusted.first_bytes import FIRST_BYTES, true_name
 from endotsr.untrusted.names import plain_line
 
-SIGNATURE = b"\x89PNG\r\n\x1a\n"
+(SIGNATURE,) = FIRST_BYTES["PNG"]
 LARGEST_FILE = 1 << 28  # bytes: 256 MiB
 MOST_EXTRA = 64  # bytes after the compressed pixels; some programs leave a few
 CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type

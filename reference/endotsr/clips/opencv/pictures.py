@@ -22,7 +22,7 @@ from endotsr.clips.opencv.picture_marks import ORIENTATION, marks_of, picture_ma
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
-from endotsr.untrusted.first_bytes import true_name
+from endotsr.untrusted.first_bytes import FIRST_BYTES, true_name
 from endotsr.untrusted.names import counted, plain_line
 from endotsr.untrusted.png import LARGEST_FILE
 
@@ -30,12 +30,9 @@ JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")
 PICTURE_ENDINGS = (".png", *JPEG_ENDINGS, *TIFF_ENDINGS, ".webp", ".bmp")  # of colour pictures and masks
 JPEG_END = b"\xff\xd9"
-STARTS = {  # extension -> file type, and its first bytes
-    **dict.fromkeys(JPEG_ENDINGS, ("JPEG", (b"\xff\xd8\xff",))),
-    **dict.fromkeys(TIFF_ENDINGS, ("TIFF", (b"II*\0", b"MM\0*"))),
-    ".webp": ("WebP", (b"RIFF",)),
-    ".bmp": ("BMP", (b"BM",)),
-}
+KINDS = {  # extension -> file type
+    **dict.fromkeys(JPEG_ENDINGS, "JPEG"), **dict.fromkeys(TIFF_ENDINGS, "TIFF"), ".webp": "WebP", ".bmp": "BMP"
+}  # fmt: skip
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_BITS, TIFF_PHOTOMETRIC, TIFF_CHANNELS, TIFF_FORMAT = 256, 257, 258, 262, 277, 339  # tags
 FLOATING_POINT = 3  # of TIFF_FORMAT
@@ -56,7 +53,7 @@ def read_picture(path: Path) -> Array:
         pixels = decode_png(data, path)
         _check_turn(marks_of(data).get("Orientation") or 1, path)
         return pixels
-    if ending not in STARTS:
+    if ending not in KINDS:
         raise InputError(f"{path}: no picture by its name; allowed: {', '.join(PICTURE_ENDINGS)}")
     data = read_bytes(Path(path), LARGEST_FILE)
     kind = _check_start_and_end(data, ending, path)
@@ -188,10 +185,10 @@ def _webp_size(data: bytes) -> tuple[int, int]:
 
 def _check_start_and_end(data: bytes, ending: str, path: Path) -> str:
     """The file type by its extension, confirmed by its first bytes."""
-    kind, starts = STARTS[ending]
+    kind = KINDS[ending]
     if not data:
         raise InputError(f"{path}: the file is empty")
-    if not data.startswith(starts):
+    if not data.startswith(FIRST_BYTES[kind]):
         raise InputError(f"{path}: not a {kind} file by its first bytes{true_name(data)}")
     if kind == "JPEG" and JPEG_END not in data[-64:]:  # some cameras append a few bytes
         raise InputError(
