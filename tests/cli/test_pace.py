@@ -40,7 +40,8 @@ def test_the_ends_are_the_presets():
 @pytest.mark.parametrize("minutes", [1.0, 3.0, 10.0, 40.0])
 def test_the_planned_time_is_the_wish(still, minutes):
     config = paced_for(minutes, still, SHARP, unit=0.12, threads=1)
-    planned = 0.12 * work_left(config, still.width * still.height, at_start(config), vector_factor())
+    pixels = still.width * still.height
+    planned = 0.12 * work_left(config, pixels, at_start(config, pixels), vector_factor())
     gaps, times, size = 8, 12, 64 * 48 / (640 * 512)  # of training frames; two gaps have a frame between
     assert np.diff(still.train_index).tolist() == [2, 1, 1, 1, 1, 1, 1, 2]
     sizes = 1.25 if config.training.coarse_start else 1.0
@@ -84,12 +85,18 @@ def test_a_wish_in_minutes_begins_from_sharp_however_it_is_written(words):
     assert base_settings([])[0].preset == "paper"
 
 
-def test_the_line_on_minutes_is_of_this_clip_and_of_the_points_that_it_starts_with(still, monkeypatch):
-    """The shortest trainings start with more points than density control may reach, and lose none of them."""
+@pytest.mark.parametrize("side", [96, 48])
+def test_the_line_on_minutes_is_of_this_clip_and_of_the_points_that_it_starts_with(side, monkeypatch):
+    """The shortest trainings start with more points than density control may reach, and lose none of them.
+
+    A frame with fewer pixels than points gives one point per pixel.
+    """
+    clip = simulate(SimulatorSettings(frames=11, width=64, height=side)).sequence
     monkeypatch.setattr("endotsr.method.kernels.vectors.REGISTER", 64)  # bytes, of a processor with AVX-512
     monkeypatch.setattr("endotsr.training.fitting.compile_ahead.compile_ahead", lambda *_: False)
     monkeypatch.setattr(pace, "seconds_of_unit", lambda *_: 0.1)
-    config, line = config_of_minutes(SimpleNamespace(minutes=0.13), still, SHARP, 1)
-    points = config.initialisation.first_frame_points + config.initialisation.other_frame_points
-    assert config.density.maximum < points and line.endswith(f" iterations, {points} Gaussians")
-    assert "an iteration of 60 000 Gaussians takes 65 ms" in line, "and 100 ms at 640x512"
+    config, line = config_of_minutes(SimpleNamespace(minutes=0.13), clip, SHARP, 1)
+    asked, most = config.initialisation, config.density.maximum
+    points = min(asked.first_frame_points, 64 * side) + asked.other_frame_points
+    assert (most < points) == (side == 96) and line.endswith(f" iterations, {max(most, points)} Gaussians")
+    assert "an iteration of 60 000 Gaussians takes 65 ms" in line or side == 96, "and 100 ms at 640x512"

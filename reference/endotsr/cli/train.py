@@ -213,10 +213,12 @@ def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Confi
     compile_ahead(config, print)
     unit = seconds_of_unit(sequence, config)
     found = paced_for(options.minutes, sequence, config, unit, threads)
-    late = unit * float(iteration_work(GAUSSIANS, sequence.width * sequence.height, 1.0, vector_factor()))
+    pixels = sequence.width * sequence.height
+    late = unit * float(iteration_work(GAUSSIANS, pixels, 1.0, vector_factor()))
+    gaussians = max(found.density.maximum, at_start(found, pixels).gaussians)
     return found, (
         f"minutes: {options.minutes:g}; an iteration of 60 000 Gaussians takes {1e3 * late:.0f} ms: "
-        f"{found.training.iterations} iterations, {max(found.density.maximum, at_start(found).gaussians)} Gaussians"
+        f"{found.training.iterations} iterations, {gaussians} Gaussians"
     )
 
 

@@ -119,7 +119,7 @@ HOSTILE = {
     "unknown key of a shape": (content(never=[square(colour="red")]), "unknown field `colour`"),
     "NaN": (json.dumps(content()).replace("20", "NaN"), "NaN is no JSON number"),
     "infinity": (json.dumps(content()).replace("20", "1e999"), "beyond the largest number"),
-    "huge coordinate": (content(never=[square(points=[[1e6, 0]])]), "never[0].points[0][0]: expected `float` <= 32768"),
+    "huge coordinate": (content(never=[square(points=[[1e6, 0]])]), "never[0].points[0][0]: expected `float` <= 16383"),
     "huge radius": (content(never=[square(tool="brush", radius=1e9)]), "never[0].radius"),
     "negative radius": (content(never=[square(radius=-1)]), "never[0].radius"),
     "no points": (content(never=[square(points=[])]), "never[0].points"),

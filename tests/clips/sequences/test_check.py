@@ -16,7 +16,7 @@ from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.cost import estimated_cost
-from endotsr.clips.sequences.checks.duration import Standing, expected_frames, work_left
+from endotsr.clips.sequences.checks.duration import Standing, at_start, expected_frames, gaussians_at_end, work_left
 from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME
@@ -404,6 +404,14 @@ def test_a_budget_decides_gaussians_and_minutes():
     assert (wide.gaussians, narrow.gaussians) == (60_000, 22_000)
     assert wide.minutes > 1.2 * narrow.minutes
     assert wide.total_bytes - narrow.total_bytes == pytest.approx(8.7e3 * 38_000)
+
+
+def test_a_small_picture_gives_a_point_per_pixel():
+    """Of 35 000 and 5000 requested points; the growth by the threshold starts from them."""
+    assert at_start(PAPER).gaussians == at_start(PAPER, 640 * 512).gaussians == 40_000
+    assert at_start(PAPER, 160 * 128).gaussians == 160 * 128 + 5000
+    large, small = gaussians_at_end(PAPER, 640 * 512), gaussians_at_end(PAPER, 160 * 128)
+    assert small / large == pytest.approx(25_480 / 40_000, rel=1e-4)
 
 
 def test_the_work_that_is_left_adds_up():

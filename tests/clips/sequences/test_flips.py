@@ -10,7 +10,7 @@ from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.checks.flips import FLIPS, shading_finding, shading_fit, stereo_finding
+from endotsr.clips.sequences.checks.flips import FLIPS, DepthTurns, shading_finding, shading_fit, stereo_finding
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate
@@ -46,6 +46,31 @@ def test_each_flip_is_named_and_the_right_depth_is_not():
     for name, axes in FLIPS.items():
         (what,) = said(pictures, [np.flip(plane, axes) for plane in depth])
         assert what.startswith(f"over 3 frames the depth fits the light {name} (")
+
+
+def turned(planes):
+    turns = DepthTurns()
+    for i, plane in enumerate(planes):
+        turns.add(i, None if plane is None else np.asarray(plane, np.float32))
+    return [(found.frame, found.what) for found in turns.findings("depth")]
+
+
+@pytest.mark.parametrize(
+    ("frames", "named"), [((4,), "1 frame"), ((0,), "1 frame"), ((9,), "1 frame"), ((6, 7, 8, 9), "4 frames")]
+)
+def test_frames_of_another_orientation_than_most_are_named(frames, named):
+    for name, axes in FLIPS.items():
+        planes = [np.flip(relief(i), axes) if i in frames else relief(i) for i in range(10)]
+        ((frame, what),) = turned(planes)
+        listed = ", ".join(map(str, frames))
+        assert frame == frames[0]
+        assert what == f"the depth of {named} is {name} in comparison with its neighbours: {listed}"
+
+
+def test_depth_of_one_orientation_a_board_and_frames_without_depth_are_not_named():
+    planes = [relief(i) for i in range(8)]
+    assert turned(planes) == turned([*planes[:3], None, np.zeros_like(planes[0]), *planes[3:]]) == []
+    assert turned([np.full((HEIGHT, WIDTH), 50.0)] * 4) == turned([]) == []
 
 
 def test_an_inverse_depth_a_board_and_a_few_pixels_are_no_flips():

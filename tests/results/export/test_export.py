@@ -108,7 +108,12 @@ def test_numbers_beyond_half_precision_stay_finite(tmp_path):
         ),
         ("a.splat", Times(), Content(), "this is the name of a .splat file; allowed: FILE.ply"),
         ("a.obj", Times(), Content("mesh"), "this is the name of a .obj file; allowed: FILE.ply"),
-        ("a.gltf", Times(), Content("mesh"), "FILE.npz (a slim model), or a name without an ending"),
+        (
+            "a.gltf",
+            Times(),
+            Content("mesh"),
+            "FILE.html (a page), or a name without an ending",
+        ),
         ("no/a.ply", Times(), Content(), "cannot be written"),
     ],
 )

@@ -152,7 +152,7 @@ class Progress:
             return ""
         evaluation = estimated_seconds(self._plan, unit).evaluation
         then = f", then {duration(evaluation)} of evaluation" if evaluation else ""
-        count = expected_gaussians(self._plan.config, standing, np.array([self._total]))[0]
+        count = expected_gaussians(self._plan.config, standing, np.array([self._total]), self._plan.pixels)[0]
         return f"forecast: {left} of training left{then}; about {count:.0f} Gaussians at the end"
 
 

@@ -48,7 +48,10 @@ def time_order(files: list[Path]) -> list[int]:
         return sorted(range(len(files)), key=lambda i: files[i])
     if len(set(numbers)) < len(numbers):
         repeated = _first_repeated(files, numbers)
-        raise InputError(f"{files[0].parent}: two files carry the same frame number, for example {repeated}")
+        raise InputError(
+            f"{files[0].parent}: two files carry the same frame number, for example {repeated}; move one of each pair"
+            " elsewhere, or give every frame a number of its own"
+        )
     return sorted(range(len(files)), key=lambda i: numbers[i])
 
 

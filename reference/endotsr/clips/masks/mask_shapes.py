@@ -16,7 +16,7 @@ from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.untrusted.sections import Section
 
 MOST_POINTS = 5000  # of a shape; a freehand outline around a large picture has about 1000
-LARGEST = 1 << 15  # px, of a coordinate or radius: the longest side of a picture that a page shows
+LARGEST = (1 << 14) - 1  # px, of a coordinate or radius: the longest side of a WebP picture, which a page shows
 TOLERANCE = 1.0  # px between the outline of a mask and its polygon
 LEAST_AREA = 20.0  # px: a smaller region of a mask becomes no polygon
 Coordinate = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]

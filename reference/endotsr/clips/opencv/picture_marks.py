@@ -14,11 +14,12 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.first_bytes import FIRST_BYTES, kind_of
 from endotsr.untrusted.png import LARGEST_FILE
 
 MOST_FIELDS = 4096
 LARGEST_PROFILE = 1 << 22  # bytes, unpacked
-PNG_START, EXIF_START, MPF_START, ICC_START = b"\x89PNG\r\n\x1a\n", b"Exif\0\0", b"MPF\0", b"ICC_PROFILE\0"
+EXIF_START, MPF_START, ICC_START = b"Exif\0\0", b"MPF\0", b"ICC_PROFILE\0"
 ADOBE_START = b"Adobe"
 ORIENTATION, EXIF_IFD, COLOUR_SPACE = 0x0112, 0x8769, 0xA001  # EXIF tags; orientation 1 = shown as it is stored
 OTHER_SPACES = (2, 65535)  # Adobe RGB; uncalibrated, as cameras state it for Adobe RGB
@@ -41,16 +42,7 @@ def picture_marks(path: Path) -> dict[str, Any]:
 def marks_of(data: bytes) -> dict[str, Any]:
     """As `picture_marks`, from the content of the file."""
     try:
-        if data.startswith(PNG_START):
-            return _png(data)
-        if data.startswith(b"\xff\xd8"):
-            return _jpeg(data)
-        if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
-            return _webp(data)
-        if data[:4] in (b"II*\0", b"MM\0*"):
-            return _tags(data)
-        if data[:2] == b"BM":
-            return _bitmap(data)
+        return READERS[kind](data) if (kind := kind_of(data)) else {}
     except (struct.error, zlib.error, ValueError, IndexError, KeyError, OverflowError):
         pass  # the reader of the pixels reports the fault
     return {}
@@ -85,7 +77,7 @@ def _png(data: bytes) -> dict[str, Any]:
 
 def _chunks(data: bytes) -> Iterator[tuple[str, bytes]]:
     """Kind and content of the chunks of a PNG."""
-    start = len(PNG_START)
+    start = len(FIRST_BYTES["PNG"][0])
     for _ in range(MOST_FIELDS):
         length = int.from_bytes(data[start : start + 4])
         kind = data[start + 4 : start + 8]
@@ -199,3 +191,6 @@ def _tags(data: bytes) -> dict[str, Any]:
     if "ICCProfile" in found:
         found["ICCProfile"] = not _is_srgb(bytes(found["ICCProfile"]))
     return found
+
+
+READERS = {"PNG": _png, "JPEG": _jpeg, "TIFF": _tags, "WebP": _webp, "BMP": _bitmap}

@@ -21,7 +21,7 @@ FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
 ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # extension of a file; `run.2` and `scale_0.5` are folder names
 WRITTEN = (
     "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.glb (animated points), FILE.npz (a slim"
-    " model), or a name without an ending (a folder of .ply files)"
+    " model), FILE.html (a page), or a name without an ending (a folder of .ply files)"
 )
 
 

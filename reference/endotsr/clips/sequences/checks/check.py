@@ -30,7 +30,14 @@ from endotsr.clips.sequences.checks.depth_pair import DepthPairs
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps, scale_finding
 from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
 from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
-from endotsr.clips.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
+from endotsr.clips.sequences.checks.flips import (
+    DepthTurns,
+    Fit,
+    agreed_disparity,
+    shading_finding,
+    shading_fit,
+    stereo_finding,
+)
 from endotsr.clips.sequences.checks.frames import (
     FrameFacts,
     frame_facts,
@@ -41,6 +48,7 @@ from endotsr.clips.sequences.checks.frames import (
     time_findings,
 )
 from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
+from endotsr.clips.sequences.checks.late import LateParts
 from endotsr.clips.sequences.checks.masks import MaskSteps
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.specks import Specks
@@ -92,7 +100,7 @@ class _Pass:
         self.findings: list[Finding] = []
         self.frames: list[FrameFacts] = []
         self.masks, self.specks = MaskSteps(), Specks()
-        self.view = FieldOfView()
+        self.view, self.late = FieldOfView(), LateParts()
         self.still = StillParts(count)
         self.depth: list[DepthFacts] = []
         self.steps = DepthSteps(count)
@@ -101,6 +109,7 @@ class _Pass:
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
         self.light: list[float] = []  # rank correlation of brightness with depth, for the sampled frames
+        self.turns = DepthTurns()
         self.shading: list[Fit] = []  # for the sampled frames where it can be determined
 
     def tried(self, make: Callable[[], T], code: str, where: object, frame: int | None = None) -> T | None:
@@ -146,11 +155,14 @@ def check_sequence(path: Path, config: Config, speed: Speed = ASSUMED_SPEED) -> 
     if clip.masks and clip.masks.files:
         run.findings += run.masks.findings(str(clip.masks.files[0].parent))
         run.findings += run.specks.findings(str(clip.masks.files[0].parent))
+        priors = clip.depth.files[0].parent if clip.depth and clip.depth.files else clip.where
+        run.findings += run.late.findings(str(clip.masks.files[0].parent), str(priors))
     if run.depth and clip.depth:
         where, near = str(clip.depth.files[0].parent), config.raster.near
         run.findings += depth_findings(run.depth, where, clip.arbitrary, near, clip.depth.assumed)
         run.findings += scale_finding(run.steps.found, where)
         run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
+        run.findings += run.turns.findings(where)
     run.findings += run.views.findings(clip.right) + run.against.findings()
     run.findings += baseline_findings(clip.baseline if clip.right else None, clip.arbitrary, str(clip.stated_in))
     if run.samples:
@@ -230,6 +242,8 @@ def _read_frames(clip: Clip, run: _Pass) -> Size | None:
         run.still.add(i, picture, tissue)
         found = _depth(clip, run, depth[i], i, size, tissue)
         run.steps.add(i, picture, found, tissue)
+        run.late.add(picture, tissue, found)
+        run.turns.add(i, found)
         run.of_split.add(i, tissue, found)
         if i in sampled:
             if found is not None:

@@ -35,7 +35,8 @@ def estimated_cost(frames: Frames, width: int, height: int, config: Config, spee
     """The cost of a training with these settings, of fixed length, on frames of this size, read at `sequence.scale`."""
     count, scale, between = frames.total, config.sequence.scale, config.training.bridge_fraction > 0
     limit, read = memory_limit(config.sequence.memory), count * width * height * PIXEL_BYTES
-    pixels, gaussians = width * height * scale**2, gaussians_at_end(config)
+    pixels = width * height * scale**2
+    gaussians = gaussians_at_end(config, pixels)
     in_file = read > limit / 2
     kept = min(count * pixels * TARGET_BYTES, limit / 4)
     kept += min(count * pixels * BETWEEN_BYTES, limit / 4) if between else 0.0

@@ -15,6 +15,7 @@ The constants of the other parts are in units of one thread at 640x512 pixels. T
 clips together with the unit itself, as processor time of one thread. Nothing is timed here.
 """
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -80,9 +81,13 @@ class Standing(NamedTuple):
     coarse_until: int = 0  # and later ones, to this iteration; 0: to `density.until`
 
 
-def at_start(config: Config) -> Standing:
-    """Progress before the first iteration, with the number of points that the initialisation requests at most."""
-    points = config.initialisation.first_frame_points + config.initialisation.other_frame_points
+def at_start(config: Config, pixels: float = inf) -> Standing:
+    """Progress before the first iteration, with the largest number of points that the initialisation can draw.
+
+    pixels   of a frame of full size: the first frame gives a point per pixel at most
+    """
+    asked = config.initialisation
+    points = round(min(asked.first_frame_points, pixels)) + asked.other_frame_points
     return Standing(0, points, config.training.coarse_start)
 
 
@@ -100,10 +105,10 @@ def iteration_work(
     return (constant + of_pixels * pixels / PIXELS + of_gaussians * gaussians / GAUSSIANS) * early
 
 
-def gaussians_at_end(config: Config) -> int:
-    """The budget of Gaussians, or the initial number times the growth expected from the gradients."""
+def gaussians_at_end(config: Config, pixels: float = inf) -> int:
+    """The budget of Gaussians, or the initial number (`at_start`) times the growth expected from the gradients."""
     density = config.density
-    expected = round(growth_by_threshold(config) * at_start(config).gaussians)
+    expected = round(growth_by_threshold(config) * at_start(config, pixels).gaussians)
     return density.maximum if density.growth == "budget" else min(expected, density.maximum)
 
 
@@ -123,7 +128,7 @@ def work_left(config: Config, pixels: int, at: Standing, vectors: float = 1.0, u
     """
     later = np.arange(at.iteration + 1, (until or config.training.iterations) + 1)
     seen = np.where(at.coarse & (later <= max(coarse_end(config, at), 1)), pixels / 4, pixels)
-    counts = expected_gaussians(config, at, later)
+    counts = expected_gaussians(config, at, later, pixels)
     return float(np.sum(iteration_work(counts, seen, later / config.training.iterations, vectors)))
 
 
@@ -134,17 +139,19 @@ def calibration_work(config: Config, pixels: int, at: Standing, vectors: float =
     return work_left(config, pixels, at._replace(coarse=False), vectors, config.training.residual_activation)
 
 
-def expected_gaussians(config: Config, at: Standing, later: NDArray[np.integer]) -> NDArray[np.floating]:
-    """Expected number of Gaussians at later iterations, without pruning.
+def expected_gaussians(
+    config: Config, at: Standing, later: NDArray[np.integer], pixels: float = inf
+) -> NDArray[np.floating]:
+    """Expected number of Gaussians at later iterations, without pruning; pixels as in `at_start`.
 
     A budget is approached linearly between `density.start` and `density.until`. By the threshold, the number grows with
     the square root of the time between them, up to `density.maximum`: on EndoNeRF cutting from 36 900 to 160 100
     without that limit, within 5 % of this curve.
     """
-    density, initial = config.density, at_start(config).gaussians
+    density, initial = config.density, at_start(config, pixels).gaussians
     last = max(density.until, density.start + 1)
     place, places = (np.clip((i - density.start) / (last - density.start), 0.0, 1.0) for i in (at.iteration, later))
-    budget, goal = density.growth == "budget", max(gaussians_at_end(config), at.gaussians)
+    budget, goal = density.growth == "budget", max(gaussians_at_end(config, pixels), at.gaussians)
     if not budget:
         place, places = np.sqrt(place), np.sqrt(places)
         uncapped = initial * growth_by_threshold(config)
@@ -267,7 +274,7 @@ def estimated_seconds(plan: TimedCommand, unit: float = SECONDS, at: Standing | 
     at      progress of a training that is resumed; None: a new one
     """
     config, frames, size = plan.config, plan.frames, plan.pixels / PIXELS
-    alone, at = plan.alone(unit), at_start(config) if at is None else at
+    alone, at = plan.alone(unit), at_start(config, plan.pixels) if at is None else at
     sizes = 1.25 if config.training.coarse_start else 1.0
     visits = visited(config, frames.gaps, config.training.iterations - at.iteration)
     targets = sizes * gap_units(frames) * frames.gaps * visits
@@ -285,7 +292,7 @@ def start_units(plan: TimedCommand) -> float:
     """Units of the initial motion; 0 without tracked motion."""
     config = plan.config
     tracks = config.initialisation.motion != "none" and config.model.spectral_motion
-    points = TRACKED_POINTS * at_start(config).gaussians
+    points = TRACKED_POINTS * at_start(config, plan.pixels).gaussians
     return plan.pixels / PIXELS * (TRACKED + points) * tracks * plan.frames.training
 
 
@@ -296,7 +303,7 @@ def evaluation_units(plan: TimedCommand) -> float:
     pictures = plan.frames.held_out * METHODS * (MEASURED + PERCEIVED * plan.perceived)
     pictures *= TOGETHER if plan.threads > 1 else 1.0
     pictures += MEASURED * plan.frames.training / EVERY_TRAINING_FRAME + COMPARED * plan.frames.compared
-    return PAGES * gaussians_at_end(plan.config) + plan.pixels / PIXELS * pictures
+    return PAGES * gaussians_at_end(plan.config, plan.pixels) + plan.pixels / PIXELS * pictures
 
 
 def gap_units(frames: Frames) -> float:

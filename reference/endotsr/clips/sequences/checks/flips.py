@@ -2,7 +2,8 @@
 
 In: the picture, depth and tissue of sampled frames, and the disparity of a stereo pair, if there is one. Out: findings.
 The light is on the scope: brightness decreases with depth, and the gradients of brightness and depth oppose each other.
-They do so only in the correct orientation of the depth.
+They do so only in the correct orientation of the depth. Where single frames have another orientation, their depth
+resembles that of the frame before after a flip, and not as stored.
 """
 
 from typing import NamedTuple
@@ -10,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.method.kernels.arrays import Array
+from endotsr.untrusted.names import counted
 
 FLIPS = {"upside down": (0,), "mirrored": (1,), "turned by half a turn": (0, 1)}  # axes of a plane (H, W)
 CELLS = 48  # along the shorter side of a picture; cell means are compared
@@ -21,6 +24,7 @@ LEAST, GAIN = 0.3, 0.2  # of the shading fit; right clips have 0.55 to 0.69 as s
 FITS, BETTER = 0.8, 0.1  # correlation with a stereo pair, and gain; right clips have 0.90 to 0.98
 INVERTED = -0.5
 NARROW = 128  # px
+SAME, TURNED = 0.8, 0.3  # correlation of a flipped depth with that of the frame before, and gain over it as stored
 
 
 class Fit(NamedTuple):
@@ -84,6 +88,47 @@ def shading_finding(fits: list[Fit], where: str) -> list[Finding]:
         return []
     what = f"over {len(fits)} frames the depth fits the light {flip} ({value:.2f}; as stored {usual.stored:.2f})"
     return [finding("flipped-depth", where, what)]
+
+
+class DepthTurns:
+    """The frames at which the orientation of the depth changes, from one pass over it in time order."""
+
+    def __init__(self) -> None:
+        self._turns: list[tuple[int, str]] = []  # frame and flip
+        self._last: Array | None = None  # cells of the frame before, or of the last one with depth
+        self._count = 0
+
+    def add(self, frame: int, depth: NDArray[np.float32] | None) -> None:
+        """The depth of a frame, (H, W), 0 = none; None where there is none."""
+        cells = None if depth is None or not depth.any() else _cells(depth, depth > 0)
+        if cells is not None:
+            if self._last is not None and self._last.shape == cells.shape:
+                fits = {flip: _alike(np.flip(cells, axes), self._last) for flip, axes in FLIPS.items()}
+                flip = max(fits, key=lambda name: fits[name])
+                if fits[flip] > SAME and fits[flip] - _alike(cells, self._last) > TURNED:
+                    self._turns.append((frame, flip))
+            self._last = cells
+        self._count = frame + 1
+
+    def findings(self, where: str) -> list[Finding]:
+        """A warning on the frames whose depth has another orientation than most."""
+        ends = [*(frame for frame, _ in self._turns), self._count]
+        turned = [i for a, b in zip(ends[::2], ends[1::2]) for i in range(a, b)]
+        if 2 * len(turned) > self._count:
+            turned = sorted(set(range(self._count)) - set(turned))
+        if not turned:
+            return []
+        flip, first = self._turns[0][1], turned[0]
+        what = f"the depth of {counted(len(turned), 'frame')} is {flip} in comparison with its neighbours"
+        return [finding("flipped-depth", where, f"{what}: {shortened([str(i) for i in turned])}", first)]
+
+
+def _alike(one: Array, other: Array) -> float:
+    """The correlation of cells where both have depth; 0 for too few."""
+    both = np.isfinite(one) & np.isfinite(other)
+    if both.sum() < FEWEST or min(np.ptp(one[both]), np.ptp(other[both])) == 0:
+        return 0.0
+    return float(np.corrcoef(one[both], other[both])[0, 1])
 
 
 def agreed_disparity(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32] | None:

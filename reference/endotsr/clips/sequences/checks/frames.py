@@ -50,8 +50,13 @@ def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
 
 def small_picture(picture: NDArray[np.uint8]) -> NDArray[np.int16]:
     """Every eighth pixel (h, w, 3) of a picture (H, W, 3); of one below 64 pixels, every second or each."""
-    step = max(1, min(SMALL, min(picture.shape[:2]) // 8))
+    step = sampling_step(picture)
     return picture[::step, ::step].astype(np.int16)
+
+
+def sampling_step(picture: NDArray[np.uint8]) -> int:
+    """Pixels between the rows and columns of a small picture."""
+    return max(1, min(SMALL, min(picture.shape[:2]) // 8))
 
 
 def _comb(picture: NDArray[np.uint8]) -> float:

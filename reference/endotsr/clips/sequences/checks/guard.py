@@ -16,6 +16,7 @@ from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usu
 from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_finding
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
+from endotsr.clips.sequences.checks.late import loaded_late_findings
 from endotsr.clips.sequences.checks.masks import mask_findings
 from endotsr.clips.sequences.checks.split_tissue import loaded_split_findings
 from endotsr.clips.sequences.checks.still_parts import loaded_still_findings
@@ -45,6 +46,7 @@ def guarded(
     found += loaded_still_findings(sequence.images, sequence.masks, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
+        found += loaded_late_findings(sequence, str(clip.masks.files[0].parent), str(clip.depth.files[0].parent))
     found += loaded_split_findings(sequence, folder)
     priors = str(clip.depth.files[0].parent)
     found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)

@@ -82,6 +82,9 @@ KINDS: dict[str, Kind] = {
                         f"decode or export it again; or {LEAVE_OUT}"),
     "another-scene": Kind("warning", "training fits one scene, and the parts before and after a cut are unrelated",
                           "cut the clip there: endotsr prepare --frames; or train it with --windows auto"),
+    "zoom-jump": Kind("warning", "the focal length changes there, by a digital zoom or another size of the picture, and"
+                      " training has one camera",
+                      "cut the clip there: endotsr prepare --frames; the calibration holds for one of the parts"),
     "two-views": Kind("warning", "a stereo pair in one picture is not one view",
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
     "alternating-views": Kind("warning", "two alternating cameras or kinds of light are not one scene",
@@ -136,6 +139,8 @@ KINDS: dict[str, Kind] = {
                           "store their first row at the top and their first column at the left, like the picture"),
     "turned-masks": Kind("warning", "one part of the masks hides the tissue and shows the instrument",
                          "invert the masks of one part, so that all have one polarity"),
+    "late-masks": Kind("warning", "the masks show the instrument and hide tissue along the path of the instrument",
+                       "give each mask the number of its picture"),
     "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
                         " held-out frame there is measured on pixels that training hardly sees",
                         f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
@@ -187,6 +192,8 @@ KINDS: dict[str, Kind] = {
     "depth-against-pair": Kind("warning", "one of them is wrong: the depth, the baseline or the focal length",
                                "state the unit of the depth: prepare --depth-unit and --depth-scale; export depth along"
                                " the optical axis, without an offset; or endotsr depth CLIP --replace"),
+    "late-depth": Kind("warning", "the tissue that moves gets the depth of another moment",
+                       "give each file of depth the number of its picture"),
     "flipped-depth": Kind("warning", "the depth does not match the tissue in the picture",
                           "store its first row at the top and its first column at the left, like the picture"),
     # cameras

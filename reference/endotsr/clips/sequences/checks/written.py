@@ -9,6 +9,7 @@ from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
 from endotsr.clips.sequences.checks.exchanged import MaskOrder
 from endotsr.clips.sequences.checks.guard import notes_of
+from endotsr.clips.sequences.checks.late import LateParts
 from endotsr.clips.sequences.checks.masks import MaskTurns
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.still_parts import StillParts
@@ -27,7 +28,7 @@ class WrittenFrames:
         self.masks, self.view, self.medians = MaskEvidence(), FieldOfView(), []
         self.still, self.frames = StillParts(count), 0
         self.blended: list[float] = []
-        self.order, self.turns = MaskOrder(), MaskTurns()
+        self.order, self.turns, self.late = MaskOrder(), MaskTurns(), LateParts()
 
     def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
         """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
@@ -36,6 +37,7 @@ class WrittenFrames:
         self.frames += 1
         self.order.add(tissue)
         self.turns.add(tissue)
+        self.late.add(picture, tissue, depth)
         if tissue is not None:
             self.masks.add(picture, tissue, depth)
         if depth is not None and depth.any():
@@ -53,6 +55,7 @@ class WrittenFrames:
             against = self.masks.flip_findings(where) or self.masks.findings(where, excluded)
             notes += notes_of(against) or [self.masks.note(excluded)]
             notes += notes_of(self.turns.findings(where) + self.order.findings(where))
+            notes += notes_of(self.late.findings(where, where))
             notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
         notes += notes_of(self.still.findings(where) + rim_finding(self.blended, where))
         return notes + self._depth_notes(clip)

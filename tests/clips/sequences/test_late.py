@@ -1,0 +1,102 @@
+"""Masks, depth and right views of other moments than their pictures are named, and those of one moment are not."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from data_folder import data_folder
+from endotsr.clips.sequences.checks.check import check_sequence
+from endotsr.clips.sequences.checks.late import FARTHEST, FEWEST, LateParts, loaded_late_findings
+from endotsr.clips.sequences.checks.stereo import late_steps_finding
+from endotsr.clips.simulator.scenes import named_scene
+from endotsr.clips.simulator.simulate import simulate
+from endotsr.config import PAPER
+
+HEIGHT, WIDTH, FRAMES = 64, 96, 40
+
+
+def moment(t):
+    """Grey instrument that swings over red tissue: picture, mask, depth with holes under the mask."""
+    x = np.arange(WIDTH)
+    tissue = np.broadcast_to(np.abs(x - (WIDTH / 2 + 30 * np.sin(t / 4))) > 8, (HEIGHT, WIDTH))
+    noise = np.random.default_rng(t + 99).integers(-20, 20, (HEIGHT, WIDTH, 1))
+    picture = np.where(tissue[..., None], [180, 70, 60], [120, 120, 125]) + noise
+    return picture.astype(np.uint8), tissue, np.where(tissue, 50.0, 0.0).astype(np.float32)
+
+
+def found(masks=0, depth=0, frames=FRAMES, holes=True):
+    """Findings where masks and depth are late by these numbers of frames."""
+    parts = LateParts()
+    for t in range(frames):
+        prior = moment(t - depth)[2] if holes else np.full((HEIGHT, WIDTH), 50, np.float32)
+        parts.add(moment(t)[0], moment(t - masks)[1], prior)
+    return [(f.code, f.where, f.what) for f in parts.findings("masks", "depth")]
+
+
+def test_what_is_of_one_moment_has_no_finding():
+    assert found() == found(holes=False) == []
+
+
+@pytest.mark.parametrize(("late", "words"), [(3, "3 frames late"), (-3, "3 frames early"), (6, "6 frames late")])
+def test_late_and_early_masks_are_named(late, words):
+    ((code, where, what),) = found(masks=late, holes=False)
+    assert (code, where) == ("late-masks", "masks") and f"about {words}" in what
+    assert found(masks=late, frames=2 * FARTHEST + FEWEST - 1) == []
+
+
+@pytest.mark.parametrize(("late", "words"), [(1, "1 frame late"), (-4, "4 frames early")])
+def test_holes_of_another_frame_are_named(late, words):
+    ((code, where, what),) = found(depth=late)
+    assert (code, where) == ("late-depth", "depth") and f"be {words}: its holes" in what and "0.0% if" in what
+
+
+def test_a_still_mask_colours_without_difference_and_frames_without_masks_have_none():
+    picture, tissue, depth = moment(0)
+    still, alike, without = LateParts(), LateParts(), LateParts()
+    for t in range(FRAMES):
+        still.add(moment(t)[0], tissue, depth)
+        alike.add(np.full_like(picture, 90), moment(t - 3)[1], None)
+        without.add(picture, None if t == 2 else moment(t - 3)[1], None)
+    assert still.findings("m", "d") == alike.findings("m", "d") == without.findings("m", "d") == []
+
+
+@pytest.mark.parametrize("name", ["everything", "pulling"])
+def test_a_simulated_clip_has_no_finding_and_its_late_masks_have_one(name):
+    settings = msgspec.structs.replace(named_scene(name), frames=48, width=160, height=128)
+    clip = simulate(settings).sequence
+    assert loaded_late_findings(clip, "masks", "depth") == []
+    if name == "everything":  # the instrument of the other scene stays
+        late = LateParts()
+        for picture, tissue, depth in zip(clip.images[5:], clip.masks[:-5], clip.depth[5:]):
+            late.add(picture.transpose(1, 2, 0), tissue, depth)
+        assert [f.code for f in late.findings("masks", "depth")] == ["late-masks"]
+
+
+@pytest.mark.parametrize("lag", [0, 1, 3, -5])
+def test_steps_of_a_right_view_tell_its_moment(lag):
+    """Fast and slow motion, with a little noise in both views; a shift of one frame is within what cameras do."""
+    speed = np.exp(np.convolve(np.random.default_rng(3).normal(size=80), np.ones(4) / 2, "valid"))
+    noise = np.random.default_rng(4).uniform(0.95, 1.05, (2, 60))
+    left, right = speed[8:68] * noise[0], speed[8 - lag : 68 - lag] * noise[1]
+    said = [(f.code, f.what.split(":")[0]) for f in late_steps_finding(left, right, "right")]
+    word = "late" if lag > 0 else "early"
+    assert said == ([("late-right-view", f"the right view is about {abs(lag)} frames {word}")] if abs(lag) > 1 else [])
+    assert late_steps_finding(left[:23], right[:23], "right") == []
+    assert late_steps_finding(np.ones(60), right, "right") == late_steps_finding(left, np.zeros(60), "right") == []
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting"])
+def test_the_recorded_clips_have_no_finding_and_have_one_with_late_files(name, tmp_path):
+    given = data_folder(name)
+    files = {part: sorted((given / part).iterdir()) for part in ("images", "masks", "depth")}
+    for moved, code in ((None, None), ("masks", "late-masks"), ("depth", "late-depth")):
+        folder = tmp_path / f"{moved}"
+        for part, known in files.items():
+            (folder / part).mkdir(parents=True)
+            for i in range(40):
+                shift = 5 if part == moved else 0
+                (folder / part / f"{i:06d}.png").symlink_to(known[i + 5 - shift])
+        np.save(folder / "poses_bounds.npy", np.load(given / "poses_bounds.npy")[:40])
+        codes = {f.code for f in check_sequence(folder, PAPER).findings}
+        assert codes & {"late-masks", "late-depth"} == ({code} if code else set()), moved
