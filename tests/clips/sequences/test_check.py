@@ -136,6 +136,7 @@ WRONG = {
     "one colour": (lambda p: each(p, "images", lambda x: x * 0 + np.uint8(90)), "no-picture", "refusal", 0),
     "frozen": (lambda p: [copied(p, 0, i) for i in range(1, FRAMES)], "constant-clip", "refusal", 0),
     "woven of two moments": (lambda p: each(p, "images", combed), "interlaced-pictures", "warning", None),
+    "woven by columns": (lambda p: each(p, "images", combed_across), "interlaced-pictures", "warning", None),
     "overexposed": (lambda p: each(p, "images", half_white, [3]), "clipped-frame", "warning", 3),
     "exposure jump": (lambda p: each(p, "images", exposure, range(4, FRAMES)), "exposure-jump", "warning", 4),
     "metres cut to 8 bits": (lambda p: each(p, "depth", metres), "metres-cut", "refusal", None),
@@ -190,6 +191,11 @@ def without(depth):
 
 def combed(image):
     image[1::2] = np.roll(image[1::2], 6, 1)
+    return image
+
+
+def combed_across(image):
+    image[:, 1::2] = np.roll(image[:, 1::2], 6, 0)
     return image
 
 

@@ -40,12 +40,14 @@ class FrameFacts(NamedTuple):
     small: NDArray[np.int16]  # (h, w, 3) every eighth pixel
     clipped: float  # fraction at full white
     comb: float  # difference of neighbouring rows relative to rows two apart
+    comb_across: float = 0.0  # the same of columns
 
 
 def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
     """The facts on a picture (H, W, 3)."""
     small = small_picture(picture)
-    return FrameFacts(name, small, float((small == 255).all(axis=2).mean()), _comb(picture))
+    clipped = float((small == 255).all(axis=2).mean())
+    return FrameFacts(name, small, clipped, _comb(picture), _comb(picture.transpose(1, 0, 2)))
 
 
 def small_picture(picture: NDArray[np.uint8]) -> NDArray[np.int16]:
@@ -92,14 +94,21 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     grey = [fact.small.mean(axis=2) for fact in facts]
     found += cut_findings(grey, names, readable, where) + halves_finding(grey, where)
     found += alternating_finding(grey, where) + _blue_finding(facts, where)
-    woven = [fact.comb for fact in facts if fact.comb > WOVEN]  # of film as video, two of five pictures
-    if woven and len(woven) >= PART * len(facts):
-        some = "" if 2 * len(woven) > len(facts) else f" in {len(woven)} of {len(facts)} frames"
-        what = f"neighbouring rows differ {np.median(woven):.2f} times as much as rows two apart{some}"
-        found.append(finding("interlaced-pictures", where, what))
+    found += _woven_finding([fact.comb for fact in facts], "rows", where)
+    found += _woven_finding([fact.comb_across for fact in facts], "columns", where)
     if facts and all((fact.small == fact.small[:, :, :1]).all() for fact in facts):
         found.append(finding("grey-pictures", where, "every picture is grey"))
     return found
+
+
+def _woven_finding(combs: list[float], lines: str, where: str) -> list[Finding]:
+    """A warning on pictures that combine two; lines: their rows, or their columns."""
+    woven = [comb for comb in combs if comb > WOVEN]  # of film as video, two of five pictures
+    if not woven or len(woven) < PART * len(combs):
+        return []
+    some = "" if 2 * len(woven) > len(combs) else f" in {len(woven)} of {len(combs)} frames"
+    what = f"neighbouring {lines} differ {np.median(woven):.2f} times as much as {lines} two apart{some}"
+    return [finding("interlaced-pictures", where, what)]
 
 
 def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -> list[Finding]:

@@ -54,7 +54,7 @@ KINDS: dict[str, Kind] = {
     "black-frame": Kind("warning", "a black frame teaches the model a black scene at its time", LEAVE_OUT),
     "white-frame": Kind("warning", "a white frame teaches the model a white scene at its time", LEAVE_OUT),
     "interlaced-pictures": Kind("warning", "each picture seems to combine two moments, as interlaced video does, or two"
-                                " views, as 3-D video does that has them in turn by rows",
+                                " views, as 3-D video does that has them in turn by rows or columns",
                                 "prepare the video itself, or deinterlace it before exporting pictures; of 3-D video,"
                                 " export each view"),
     "dark-border": Kind("warning", "training fits black tissue there",
