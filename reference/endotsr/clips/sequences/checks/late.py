@@ -48,7 +48,8 @@ class LateParts:
         self._open = self._open and tissue is not None and usual == small.shape[:2] and len(self._colours) < LONGEST
         if not self._open or tissue is None:
             return
-        self._colours.append(np.ravel_multi_index(tuple(np.moveaxis(small // (256 // LEVELS), 2, 0)), (LEVELS,) * 3))
+        levels = (small // (256 // LEVELS)).astype(np.intp)
+        self._colours.append(levels @ np.array([LEVELS**2, LEVELS, 1]))
         self._tissue.append(tissue[::step, ::step])
         if depth is not None:
             self._known.append(depth[::step, ::step] > 0)

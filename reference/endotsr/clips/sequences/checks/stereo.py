@@ -73,9 +73,10 @@ class PairViews:
         if len(self.small[0]) < max(2, self.count):
             return []
         where, names = str(files[0].parent), [file.name for file in files]
-        frozen = frozen_finding(steps_between(self.small[0]), steps_between(self.small[1]), names, where)
+        left, right = (steps_between(small) for small in self.small)
+        frozen = frozen_finding(left, right, names, where)
         still = frozen or same_finding(*self.small, names, where)
-        late = late_finding(self.rows, where) or late_steps_finding(*map(steps_between, self.small), where)
+        late = late_finding(self.rows, where) or late_steps_finding(left, right, where)
         return still or late + row_finding(self.rows, where)
 
 
