@@ -64,6 +64,7 @@ def gains(record: str, split: str, with_: str, without: str) -> list[float]:
 def test_what_gains_in_every_seed():
     for found in (
         gains("ablation_simulated_paper", "every_eighth", "A+S+L", "A+S"),
+        gains("ablation_simulated_paper", "every_eighth", "L", "base"),
         gains("ablation_pulling_half", "every_second", "A+S+L", "base"),
         gains("ablation_pulling_half_blocks", "blocks 2", "A+S+L", "base"),
         gains("ablation_pulling_half_fixed", "every_eighth", "A+S+L fixed", "A+S fixed"),

@@ -6,6 +6,7 @@ Every number comes from a record; a clip that is not measured is named as such.
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ import numpy as np
 
 from endotsr.clips.simulator import SimulatorSettings
 from endotsr.config import PAPER
-from endotsr.studies.sweeps.ablation import COMPARISONS
-from pages.claims.estimates import Estimate, contrast, runs_of
+from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS
+from pages.claims.estimates import Estimate, averaged, contrast, runs_of
 from pages.claims.rules import LEAST_PAIRS, increment_verdict, seeds_of
 from pages.claims.verdicts import CLIPS, FULL, ROUNDED, STEPS, WHOLE
 from pages.full_size.sweeps import FOLDER, rows_of
@@ -27,6 +28,7 @@ from pages.store.tables import noted
 PREDICTIONS = ("two_neighbours", "flow_interpolation", "two_neighbours_tissue", "flow_interpolation_tissue")
 NAMES = ("the blend", "flow", "the tissue-only blend", "the tissue-only flow")  # of the predictions, in their order
 FIXED_GAIN = next(one for one in COMPARISONS if one.claim == "A and L added to S, fixed count")
+STEP_OF_A = next(one for one in COMPARISONS if (one.with_, one.without) == tuple(STEPS["A"]))
 METHOD, WITHOUT_A = "`paper`", "`paper` without A"
 Record = Any  # content of a file of docs/results
 
@@ -63,7 +65,9 @@ def components(known: Mapping[str, Record]) -> str:
     measured = {clip: step for clip, step in steps.items() if step is not None}
     if not measured:
         return text
-    return f"{text} The step of A is {_by_clip(measured)} (published +0.29 dB, mean of both clips)."
+    both = f", {averaged([*measured.values()]).mean:+.2f} dB in their mean" if len(measured) == len(CLIPS) else ""
+    published = STEP_OF_A.published[BOTH]["psnr_full"]
+    return f"{text} The step of A is {_by_clip(measured)}{both} (published {published:+.2f} dB, mean of both clips)."
 
 
 def at_fixed_count(known: Mapping[str, Record]) -> str:
@@ -87,7 +91,11 @@ def _decided(gain: Estimate, least: float, most: float) -> str:
     if gain.paired is None:
         return verdict
     low, high = gain.paired
-    return f"95 % interval over the seeds {low:+.2f} to {high:+.2f} dB; {verdict}"
+    text = f"95 % interval over the seeds {low:+.2f} to {high:+.2f} dB; {verdict}"
+    if gain.common is None or (other := increment_verdict(least, gain.common, len(gain.values), most)) == verdict:
+        return text
+    low, high = gain.common
+    return f"{text}; with the spread pooled over all configurations {low:+.2f} to {high:+.2f} dB, {other}"
 
 
 def _by_clip(gains: Mapping[str, Estimate]) -> str:
@@ -118,9 +126,10 @@ def reached(known: Mapping[str, Record]) -> str:
 
 
 def _stands(limits: tuple[float, float], published: float) -> str:
-    """The published level against the interval of the reproduced one."""
-    inside = "is exceeded" if limits[0] > published else "lies in the interval"
-    return "is not reached" if limits[1] < published else inside
+    """The published level, which stands for all values that round to it, against the interval of the reproduced one."""
+    half = ROUNDED["psnr_full"]
+    inside = "is exceeded" if limits[0] > published + half else "lies in the interval"
+    return "is not reached" if limits[1] < published - half else inside
 
 
 def with_other_weights(rows: list[Record]) -> str:
@@ -159,8 +168,8 @@ def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
     head = ["EndoNeRF", "published", "here", "its base", "blend", "flow", "blend, tissue only", "flow, tissue only"]
     about = (
         "PSNR of the whole image in dB, every eighth frame held out. ± is a 95 % interval over the seeds. Blend is the"
-        " mean of the two neighbouring frames; like the method, *tissue only* reads no excluded pixel."
-        " *Level with* means within the interval over the seeds."
+        " mean of the two neighbouring frames. *Tissue only* reads no excluded pixel; the losses of the method read no"
+        " excluded colour. *Level with* means within the interval over the seeds, which does not cover other frames."
     )
     return noted(head, rows, about + black(folder))
 
@@ -225,9 +234,17 @@ def splits(found: Mapping[str, Record | None], half: list[Record | None]) -> str
     if not groups:
         return ""
     measured = f"{len(groups)} combinations of clip, size and held-out frames measured"
-    short = [rows[0]["iterations"] for rows in groups.values() if rows[0]["iterations"] < PAPER.training.iterations]
-    at_half = f", {len(short)} of them at half size with {min(short)} iterations" if short else ""
-    return f"The mean of the full method is below the blend in {below} of the {measured}{at_half}."
+    firsts = [rows[0] for rows in groups.values()]
+    short = Counter(
+        (row["width"], row["height"], row["iterations"])
+        for row in firsts
+        if row["iterations"] < PAPER.training.iterations
+    )
+    shorter = "".join(
+        f", {count} of them at {width}x{height} with {iterations} iterations"
+        for (width, height, iterations), count in sorted(short.items())
+    )
+    return f"The mean of the full method is below the blend in {below} of the {measured}{shorter}."
 
 
 def truth(found: Record) -> str:

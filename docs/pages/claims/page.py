@@ -104,15 +104,15 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
         "verdicts_both": claims_verdicts.verdicts_of_both(found),
         "cutting_without": without_73(found["cutting"]),
         "ours": claims_protocols.ours(found, half, found["pulling_pairs"]),
-        "visits": claims_protocols.visits(),
-        "answer": claims_answer.answer(folder, found_clips(found), half, gain),
+        "visits": claims_protocols.visits(half),
+        "answer": claims_answer.answer(folder, found_clips(found), [*half, found["pulling_pairs"]], gain),
         "spread": " ".join(claims_power.common_spread(found[clip], clip) for clip in claims_verdicts.CLIPS),
         "right_eye": claims_protocols.right_eye(found["pulling_pairs"]),
-        "power": claims_power.sentences(found["pulling"]),
+        "power": claims_power.sentences(found["pulling"], "EndoNeRF pulling"),
         **{name: claims_parts.tables(record) for name, record in found.items()},
         "cutting": (PICTURE if found["cutting"] else "") + claims_parts.tables(found["cutting"]),
         "protocols": claims_parts.protocols(
-            [found["pulling"], found["cutting"], *half], [*runs, *read_runs(folder, CUTTING)]
+            [found["pulling"], found["cutting"], *half, found["pulling_pairs"]], [*runs, *read_runs(folder, CUTTING)]
         ),
         "cost": claims_parts.cost(found["pulling"], runs),
         "divided": claims_parts.divided(loaded(cost) if cost.exists() else None),

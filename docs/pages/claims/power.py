@@ -71,8 +71,8 @@ def kind_of(claim: str) -> str:
     return AT_FIXED if FIXED in claim.replace(",", "") else FREE
 
 
-def sentences(found: Record | None) -> str:
-    """The smallest difference that the seeds resolve, and the seeds needed for the published gains."""
+def sentences(found: Record | None, clip: str) -> str:
+    """The smallest difference that the seeds of a clip resolve, and the seeds needed for the published gains."""
     if found is None or not found["increments"]:
         return "Not measured yet."
     pairs = max(row["pairs"] for row in found["increments"])
@@ -87,9 +87,9 @@ def sentences(found: Record | None) -> str:
         for claim, clip, gain in gains
     )
     return (
-        f"**Power.** {pairs} seeds distinguish a true difference from 0 with a probability of {100 * POWER:.0f} % "
-        f'if it is at least {seen}. A smaller one is most likely "not decided", whether it exists or not. The '
-        f"published gains would need this many seeds: {needed}."
+        f"**Power.** With the spread of {clip}, {pairs} seeds distinguish a true difference from 0 with a probability "
+        f'of {100 * POWER:.0f} % if it is {seen}, and a smaller one less often: "not decided" does not mean that '
+        f"there is none. With this spread and this probability the published gains need this many seeds: {needed}."
     )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.sequences.splits import split_frames
+from endotsr.config import PAPER
 from endotsr.results.report.tables import markdown
 from endotsr.studies.sweeps.ablation import COMPARISONS, FIXED, NO_PRIOR, Contrast, paired
 from endotsr.studies.sweeps.execute import FINISHED
@@ -90,16 +91,19 @@ def _motion_row(found: Record | None, clip: str) -> list[str]:
     return [*claim, verdict, f"{mean:+.2f} dB", between(limits, "{:+.2f} dB"), "-"]
 
 
-def visits() -> str:
+def visits(half: list[Record | None]) -> str:
     """Training frames and visits of a frame, for every split of the trainings at half size."""
-    length, full = 1750, 6000
-    shown = []
+    lengths = {row["split"]: row["iterations"] for found in half if found is not None for row in found["rows"]}
+    shown: dict[int, list[str]] = {}
     for split, of, label in (("every_second", 0, "every second frame"), ("blocks", 2, "blocks of 2"),
                              ("end", 8, "the end"), ("every_eighth", 0, "every eighth frame")):  # fmt: skip
-        trained = len(split_frames(FRAMES, split, of)[0])
-        shown.append(f"{length / trained:.0f} visits to each of {trained} frames with {label} held out")
-    published = full / len(split_frames(FRAMES, "every_eighth", 0)[0])
-    return f"{length} iterations make {'; '.join(shown)}. A full run makes {published:.0f} visits to each frame."
+        trained, length = len(split_frames(FRAMES, split, of)[0]), lengths.get(f"{split} {of}" if of else split)
+        if length is not None:
+            made = f"{length / trained:.0f} visits to each of {trained} frames with {label} held out"
+            shown.setdefault(length, []).append(made)
+    full = PAPER.training.iterations / len(split_frames(FRAMES, "every_eighth", 0)[0])
+    parts = [f"{length} iterations make {'; '.join(texts)}." for length, texts in shown.items()]
+    return " ".join([*parts, f"A full run makes {full:.0f} visits to each frame."])
 
 
 def protocol_rows(half: list[Record | None], pairs: Record | None) -> list[list[str]]:

@@ -6,6 +6,7 @@
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -138,7 +139,8 @@ def _row(claim: list[str], estimate: Estimate | None, metric: Metric, verdict: A
 
 def _level_row(found: Record, clip: str, key: str, of: str, unit: float) -> list[str]:
     metric, published = METRICS[key], PUBLISHED[clip][of]
-    claim = [f"Level: {metric.label}", FULL, f"{published:g}{' dB' if 'dB' in metric.form else ''}"]
+    digits = round(-math.log10(unit))  # as printed: 0.980, not 0.98
+    claim = [f"Level: {metric.label}", FULL, f"{published:.{digits}f}{' dB' if 'dB' in metric.form else ''}"]
     values = list(runs_of(found, FULL, key).values())
     if not values:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]
