@@ -396,7 +396,8 @@ assert all(report.passed for report in reports)
 # 1. A clip has $n$ frames at $t=k/n$, of which none is held out. For which $n$ is the sine of 16 cycles dead? Which
 #    atoms of other frequencies can be dead for $n\ge20$?
 # 2. Write `dictionary_forward` and `dictionary_reverse` with the folding above, and let the golden cases judge them:
-#    `--only dictionary` ({doc}`index`). The formula as printed fails the case `quarter_turns`.
+#    `--only dictionary` ({doc}`index`). The tolerance of the cases is relative to the largest atom, and the formula as
+#    printed passes them too. To see that the folding works, assert the exact 0 at $t=\tfrac{5}{32}$, as above.
 # 3. The cell below answers this one. The dictionary has 16 atoms. In a clip of 24 frames with three held out there are
 #    21 training stamps, more than there are atoms. Are all 16 atoms linearly independent over these stamps? Are they
 #    independent over the stamps of 32 frames with none held out? Estimate the rank of the normalised dictionary in

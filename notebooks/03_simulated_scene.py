@@ -228,7 +228,7 @@ plt.show()
 # $h_0=(rgb-\frac12)/Y_{00}$ with $Y_{00}=1/\sqrt{4\pi}$. The colours of a frame are its 8-bit values divided by 255.
 #
 # **(3.4) Size.** All three semi-axes are the root mean square distance to the three nearest other points, so
-# near neighbours overlap. Two points may coincide; the floor keeps the logarithm finite:
+# near neighbours overlap. Points may coincide; if all three distances are 0, the floor keeps the logarithm finite:
 # $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. With fewer than four points the mean is over the others that exist, and a
 # single point has the floor. A sphere needs no rotation, and the quaternion starts at $(1,0,0,0)$.
 #
@@ -298,8 +298,9 @@ assert colour.min() >= 0 and colour.max() <= 1 and not np.any(start.fdm_weight)
 # %% [markdown]
 # ## The reverse pass
 #
-# Initialisation is not differentiated. Back-projection and projection use the same rule for pixel centres, as the cell
-# above asserts. The projection check exercises this rule.
+# Initialisation is not differentiated. Back-projection and projection use the same rule for pixel centres, as the cells
+# above assert. The half pixel of this rule is a constant and drops out of the derivatives. The pair to check is that of
+# the projection, whose inverse (3.1) and (3.2) are.
 
 # %%
 with one_thread():
