@@ -159,6 +159,9 @@ for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
         frames = np.arange(63) / 63
         assert int((np.interp(frames, fine, highest) < 1e-3).sum()) == 16
         panel.text(0.01, 1.06, "red: no basis above 0.001 (16 of 63 frames)", fontsize=9)
+alike = np.sqrt((halves["quartic"] / halves["gaussian"]) ** 2 * (0.01**2 + 1e-4) - 1e-4)
+of_gaussian = definition.bell(centres, alike, fine[:, None], "gaussian")[2].max(axis=1)
+assert of_gaussian.min() > 0.01, "a gaussian of the same half-width leaves no gap"
 learned = rng.normal(0, 1, (10, B, 1))
 curve = [
     deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1), 0.06), t)[0][
@@ -246,7 +249,8 @@ for basis in ("quartic", "gaussian"):
 
 # %% [markdown]
 # Two things follow. While all weights are 0, the gradients with respect to centre and width are exactly 0, so of the three
-# only the weights change in the first step. A width of exactly 0 has the gradient 0, and one that starts at 0 never changes.
+# only the weights change in the first step. A width of exactly 0 has the gradient 0, whatever the loss, and one that starts
+# at 0 never changes: Adam leaves a parameter in place as long as all its gradients are 0 ({doc}`13_optimiser_and_density`).
 
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)
@@ -256,6 +260,9 @@ assert (
     and not np.any(still.d_fdm_centre)
     and not np.any(still.d_fdm_width)
 )
+for basis in ("quartic", "gaussian"):
+    _, saved = deformation_forward(w, theta, 0 * sigma, 0.4, basis)
+    assert not np.any(deformation_reverse(g_psi, saved).d_fdm_width)
 
 # %% [markdown]
 # ## The gradient check

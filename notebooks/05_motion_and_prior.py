@@ -118,7 +118,8 @@ assert [round(at_distance[k], 2) for k in (1, 2, 3)] == [0.52, 0.14, 0.03]
 # frequencies, and $\lambda_{\mathrm{msp}}$ sets its size.
 #
 # **(5.4) The mean.** The sum runs over 3 directions, $2F$ atoms and $N$ Gaussians, which are $6NF$ terms. Density
-# control changes the number of Gaussians. Division by $6NF$ makes the penalty independent of this number.
+# control changes the number of Gaussians. Division by $6NF$ makes the penalty a mean, which copies of all Gaussians leave
+# unchanged. The gradient of a single coefficient has the factor $1/N$.
 #
 # $$
 # \begin{aligned}
@@ -158,6 +159,8 @@ print("rho:", " ".join(f"{value:.3g}" for value in rho))
 penalty, saved_penalty = matern_penalty_forward(C, rho)
 text, _ = definition_of_prior.matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, text, rtol=1e-13)
+copies = matern_penalty_forward(np.tile(C, 2), rho)[0]
+np.testing.assert_allclose(copies, penalty, rtol=1e-13)  # (5.4)
 
 # %% [markdown]
 # **The implied covariance differs.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies do
@@ -228,9 +231,9 @@ assert np.ptp(difference - normalised(turned(C, theta), 0.5) + normalised(C, 0.5
 # 17 stamps for 16 coefficients. With almost as many unknowns as observations, many series fit the stamps about equally
 # well and differ between them. The Fourier series is fitted twice: by least squares alone, and with
 # $\lambda_{\mathrm{msp}}\,\mathcal L_{\mathrm{msp}}$ added. In each case the minimum of a quadratic is the solution of
-# one linear system, whose matrix is built from the reverse pass below. The left panel shows both paths, the middle
-# panel the energy of their coefficients, and the right panel the weights for several values of $\ell$. Where will the
-# two fits differ more, at the stamps or between them?
+# one linear system; the reverse pass below gives the part of its matrix that belongs to the penalty. The left panel
+# shows both paths, the middle panel the energy of their coefficients, and the right panel the weights for several values
+# of $\ell$. Where will the two fits differ more, at the stamps or between them?
 
 # %% tags=["hide-input"]
 stamps = np.delete(np.arange(20), np.arange(1, 20, 8)) / 20
@@ -264,7 +267,10 @@ print(
 assert error(held) < 0.6 * error(free)
 misses = lambda c: np.sqrt(np.mean((Phi @ c - seen) ** 2))
 print(f"error at the stamps: {misses(free):.3f} without the prior, {misses(held):.3f} with it")
-assert misses(held) < 1.2 * misses(free), "equal at the stamps, different between them"
+assert misses(held) < 1.2 * misses(free), "about equal at the stamps"
+apart = [np.sqrt(np.mean((some @ (free - held)) ** 2)) for some in (Phi, Phi_fine)]
+print(f"distance of the two fits: {apart[0]:.2f} at the stamps, {apart[1]:.2f} over all times")
+assert apart[1] > 2 * apart[0], "they differ between the stamps"
 
 figure, axes = plt.subplots(1, 3, figsize=(10.1, 3.1), layout="constrained")
 axes[0].plot(fine, path(fine), color="0.5", lw=4, label="true path")
@@ -358,6 +364,7 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # entries, would accept a wrong weight of a low frequency. This check is relative and treats each atom separately.
 
 # %%
+np.testing.assert_allclose(rho[[0, -1]] / (3 * 30_000 * F), [4e-11, 1e-5], rtol=0.05)
 with one_thread():
     reports = [
         check_pair(all_pairs()[name], pair_stream(name, 0))
@@ -392,4 +399,5 @@ wiggle = np.zeros(2 * F)
 wiggle[F - 1] = 0.5
 print(f"drift {cost(drift):.1e}, wiggle {cost(wiggle):.1e}")
 assert cost(drift) < 1e-4 * cost(wiggle)
+assert (np.diff(np.hypot(drift[:F], drift[F:])[:4]) < 0).all(), "the lowest has the largest"
 assert np.std(Phi_all @ drift - np.arange(63) / 63 + 0.5) < 0.05 * np.std(np.arange(63) / 63)

@@ -218,7 +218,7 @@ for panel, (title, centre, axes_length) in zip(axes, scenes):
     whitened = np.linalg.solve(np.linalg.cholesky([[a, b], [b, c]]), apart)
     inside = np.mean((whitened**2).sum(axis=0) < 4)
     print(f"{title}: {inside:.2f} of the points inside")
-    assert (abs(inside - (1 - np.exp(-2))) < 0.02) == title.startswith("small")
+    assert abs(inside - 0.86) < 0.02 if title.startswith("small") else 0.8 < inside < 0.85
     panel.plot(*outline, color="tab:blue", label="EWA, two standard deviations")
     panel.plot(*flat.mean2d, "r+", ms=10)
     panel.set(title=title, xlim=(0, 64), ylim=(48, 0), aspect="equal")
@@ -253,6 +253,9 @@ for name, colour in zip(errors, ("tab:red", "tab:green")):
 axes[2].set(title="relative error of det, float32", xlabel="length of a needle [px]")
 axes[2].legend()
 plt.show()
+
+# %% [markdown]
+# Fewer: 0.83 instead of 0.86. The expansion lacks the curvature of the projection over the depth of the second Gaussian.
 
 # %% [markdown]
 # ## The reverse pass, line by line

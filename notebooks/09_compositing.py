@@ -277,6 +277,7 @@ removed = (reached["paper"] > 0) & (reached["legacy"] == 0)
 largest = reached["paper"][removed].max()
 print(f"legacy removes {removed.sum()} pixels of the ellipse, alpha at most {largest:.4f}")
 assert 0 < removed.sum() < 20 and 1 / 255 <= largest < 2 / 255
+assert np.nonzero(removed)[0].min() == np.nonzero(reached["paper"])[0].max(), "at the bottom"
 
 # %% [markdown]
 # ## The reverse pass, line by line
@@ -501,8 +502,8 @@ np.testing.assert_allclose(
 # ## The gradient check
 #
 # A finite difference is taken only between two points at which the discrete decisions (order, contributors, clamp) are
-# the same. The pair `composite_blocks` is the fast path of training, which runs front to back and computes the same
-# gradients.
+# the same. The pair `composite_blocks` is the fast path of training. Its reverse pass runs front to back and divides by
+# $1-\alpha_k$, which the clamp of `paper` keeps at 0.01 or above. It computes the same gradients to rounding.
 
 # %%
 with one_thread():
@@ -542,6 +543,12 @@ grads = kernel_reverse(one, EXACT, white, zero, zero, width=1, height=1)
 np.testing.assert_allclose(grads["colour"].sum(axis=0), np.array([0.3, 0.7, 0.0]) * 7)
 # A logit of 700 is flat: (1 - o) = 0.
 np.testing.assert_allclose(grads["logit"], [0.3 * 0.7 * (1 - 2), 0, 0], atol=1e-14)
+# The gradient of the opacity itself is g_logit / (o (1 - o)). Here o is just below 1.
+o = 1 / (1 + np.exp(-16.0))
+almost = one | {"logit": np.array([np.log(0.3 / 0.7), 16.0, 0.0])}
+g_logit = kernel_reverse(almost, EXACT, white, zero, zero, width=1, height=1)["logit"]
+behind = 0.5 * 4 + 0.5 * background @ [1, 2, 4]  # of the third and the background
+np.testing.assert_allclose(g_logit[1] / (o * (1 - o)), 0.7 * (2 - behind), rtol=1e-5)
 with np.errstate(invalid="ignore"):
     T_2 = np.float64(0.0) / (1 - 0.5)
     assert np.isnan(T_2 / np.float64(1 - 1.0))

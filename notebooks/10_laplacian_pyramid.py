@@ -359,14 +359,17 @@ assert all(report.passed for report in reports)
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. On the diagonal, an even pixel is read by more coarse samples of band 1 than an odd
 # one: it costs 49 values, an odd one 25. In bands 2 and 3 the parity does not decide: the even
-# pixels 64 and 66 cost 49 and 81 values of each. There the position modulo 4 and modulo 8
-# counts.
+# pixels 64 and 66 cost 49 and 81 values of each. In band 2 the position modulo 4 decides, and in
+# band 3 the position modulo 8.
 costs = {}
-for at in range(64, 73):
+for at in range(64, 81):
     hole = np.ones((161, 161), bool)
     hole[at, at] = False
     costs[at] = [int(np.count_nonzero(~valid)) for valid in support_masks(hole).bands]
     print(f"pixel {at}: {costs[at]}")
 assert {at % 2: cost[0] for at, cost in costs.items()} == {0: 49, 1: 25}, "band 1: the parity"
 assert costs[64] == [49, 49, 49] and costs[65] == [25, 49, 49] and costs[66] == [49, 81, 81]
-assert costs[64] == costs[72], "the period is 8"
+for band, period in ((0, 2), (1, 4), (2, 8)):
+    course = [cost[band] for cost in costs.values()]
+    assert course[period:] == course[:-period], "the period"
+    assert course[period // 2 :] != course[: -period // 2], "no shorter one"

@@ -198,7 +198,8 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # that the detector of Canny ({doc}`/references`) finds in the rendered depth. It is the detector of `cv2.Canny`, with
 # Sobel filters of size 3, the gradient size $|g_x|+|g_y|$ and the thresholds 20 and 200. The depth is first clipped to 0
 # to 255 and rounded down to whole scene units. The detector has no closed formula, and the definition takes $E$ as an
-# argument. The two total variations keep depth and colour flat under the instrument, where nothing is observed.
+# argument. The two total variations keep depth and colour flat under the instrument, where nothing is observed. At the
+# border of the mask $\bar x$ steps to 0. This step is part of the total variation: a constant image has one too.
 #
 # $$
 # \begin{aligned}
@@ -295,6 +296,11 @@ smooth_text, smooth_text_saved = smoothness_definition.smoothness_forward(
     step, I_hat, M, E, 30.0
 )
 np.testing.assert_allclose(L_smooth, smooth_text, rtol=1e-12)
+border = sum(np.count_nonzero(np.diff(M, axis=axis)) for axis in (0, 1))
+flat, dark = np.full(M.shape, 50.0), 0 * I_hat
+np.testing.assert_allclose(
+    smoothness_forward(flat, dark, M, np.zeros_like(M), 1.0)[0], 50 * border / (H * W)
+)
 
 # %% [markdown]
 # ## Figure: why SSIM is used in addition to L1

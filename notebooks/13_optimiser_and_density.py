@@ -73,8 +73,8 @@ rng = np.random.default_rng(12)
 # array.
 #
 # **(13.1) Two averages.** Unrolled from $m=0$, the recursion is $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$. This
-# is an average of the gradients in which old ones fade. In the same way $v_k$ is an average of $g_j^2$; with $\beta_2$
-# old ones fade more slowly, by the factor $0.1/0.001$. A first moment below the smallest normal float32 number,
+# is an average of the gradients in which old ones fade. In the same way $v_k$ is an average of $g_j^2$. With $\beta_2$
+# old ones take $\ln0.9/\ln0.999\approx105$ times as many steps to fade. A first moment below the smallest normal float32 number,
 # $1.18\cdot10^{-38}$, is set to 0: it moves a parameter by less than $2\cdot10^{-22}\,\eta$, and arithmetic with such
 # numbers can be slow.
 #

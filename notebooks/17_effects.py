@@ -157,7 +157,8 @@ for inspection in (too_short, found["beating"]):
     print(f"{inspection.clip.frames} frames: rates {rates}, S {'kept' if kept else 'off'}")
 assert not too_short.lines and too_short.verdicts["motion"].kind == "irregular"
 assert [round(line.cycles) for line in found["beating"].lines] == [5]
-assert apply_plan(make_plan(found["beating"], PAPER), PAPER)[0].model.spectral_motion
+for inspection, kept in ((too_short, False), (found["beating"], True)):
+    assert apply_plan(make_plan(inspection, PAPER), PAPER)[0].model.spectral_motion == kept
 
 
 def lines_of(frames, cycles):

@@ -260,8 +260,8 @@ for one, other in zip(compose(true[1], inverse(moved)), expected):
 # ## The pose, found
 #
 # The next cell takes Gauss-Newton steps from the rows (22.5), beginning without motion. A Gauss-Newton step solves the
-# least-squares problem of the linearised residuals. Points whose residual is large get the weight 0. Here the motion is a
-# few pixels, and the finest level alone suffices; `endotsr poses` begins with the flow of the pictures.
+# least-squares problem of the linearised residuals. Points whose residual is large get the weight 0. Here no point moves
+# by more than eight pixels, and the finest level alone suffices; `endotsr poses` begins with the flow of the pictures.
 
 
 # %%
@@ -291,6 +291,10 @@ print(
     sep="\n  ",
 )
 assert courses[-1][1] < 0.1
+x, y, z = relative.rotation @ points + relative.translation[:, None]
+across = camera.fx * (x / z - points[0] / points[2])
+down = camera.fy * (y / z - points[1] / points[2])
+assert 4 < np.hypot(across, down).max() < 8
 
 # %% [markdown]
 # ## Two motions with one picture
@@ -321,7 +325,6 @@ for k in range(breathing.sequence.count):
     turn = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
     camera_to_tissue = CameraPose(turn, now.mean(1) - turn @ rest.mean(1))
     shifts.append(-camera_to_tissue.rotation.T @ camera_to_tissue.translation)
-    own = now - (turn @ rest + camera_to_tissue.translation[:, None])
 figure, axis = plt.subplots(figsize=(8, 3), layout="constrained")
 axis.plot(shifts)
 axis.set(xlabel="frame", ylabel="apparent position of the scope, mm")
