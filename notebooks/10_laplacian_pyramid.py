@@ -359,8 +359,8 @@ assert all(report.passed for report in reports)
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. On the diagonal, an even pixel is read by more coarse samples of band 1 than an odd
 # one: it costs 49 values, an odd one 25. In bands 2 and 3 the parity does not decide: the even
-# pixels 64 and 66 cost 49 and 81 values of each. In band 2 the position modulo 4 decides, and in
-# band 3 the position modulo 8.
+# pixels 64 and 66 cost 49 and 81 values of each. In band 2 the position modulo 4 decides, and
+# in band 3 the position modulo 8.
 costs = {}
 for at in range(64, 81):
     hole = np.ones((161, 161), bool)
