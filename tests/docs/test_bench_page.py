@@ -5,7 +5,7 @@ import json
 import pytest
 from pages.bench import page as bench
 from pages.bench import start as bench_start
-from pages.bench.parts import MAIN
+from pages.bench.parts import MAIN, targets
 from pages.store.marks import write_marked
 
 from endotsr.errors import InputError
@@ -29,6 +29,29 @@ def test_target_that_is_missed_says_so(found):
     line = next(line for line in text.splitlines() if "cold start" in line)
     assert "99 s" in line and "**not met**" in line
     assert "not measured" in next(line for line in text.splitlines() if "6000" in line)
+
+
+def test_every_whole_run_with_two_threads_stands_among_the_targets(found):
+    """Not the fastest alone: a machine on which the target is missed says so."""
+    run = {"threads": 2, "seconds": 636.0, "machine": {"processor": "slow"}}
+    runs = {
+        "pulling_paper_seed0": run,
+        "pulling_paper_seed1": run | {"seconds": 401.0, "machine": {"processor": "fast"}},
+        "pulling_paper_seed2": run | {"threads": 1},
+        "pulling_sharp_seed0": run,
+    }
+    made = targets(found["stages"], found["scaling"], found["peers"], found["start"], runs)
+    lines = [line for line in made.splitlines() if "6000 iterations" in line]
+    assert lines == [
+        "| run of 6000 iterations, `pulling_paper_seed0.json`, slow | 10.6 min | at most 10 min | **not met** |",
+        "| run of 6000 iterations, `pulling_paper_seed1.json`, fast | 6.68 min | at most 10 min | met |",
+    ]
+
+
+def test_every_table_of_times_names_its_machine_and_day(found):
+    made = bench.fragments(found, {})
+    for name in ("cases", "scaling", "start", "machine", "peers"):
+        assert "AMD EPYC" in made[name] and "2026-11-25" in made[name], name
 
 
 def test_a_mark_without_a_meaning_and_a_missing_result_are_named(found, tmp_path):
@@ -71,5 +94,6 @@ def test_what_the_page_says_of_float64_by_stage(found):
             ratio = {stage: pair[1][stage]["median_ms"] / pair[0][stage]["median_ms"] for stage in pair[0]}
             assert 1.9 < ratio["blend forward"] < 2.1
             assert ratio["binning"] < min(ratio["blend forward"], ratio["blend reverse"])
+            assert (ratio["Adam"] < ratio["blend forward"]) if threads == 1 else True
             largest = {stage: max(value, largest.get(stage, 0)) for stage, value in ratio.items()}
     assert set(sorted(largest, key=lambda stage: largest[stage])[-2:]) == {"Fourier", "Adam"}

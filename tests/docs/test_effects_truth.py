@@ -42,6 +42,15 @@ def test_without_the_prior_or_s_one_number_of_paper_changes_by_more_than_its_int
     assert changed == [("light", "`paper` without S", "depth_mm")]
 
 
+def test_rows_of_equal_settings_are_named_and_others_are_not():
+    """A reader of two equal rows learns that the settings are equal; different rows say nothing of it."""
+    record = read_json(RESULTS / "effects_truth.json", "effects measure truth")
+    assert "the settings of `demo` are those of `sharp` at this length" in table(record)
+    other = [row | {"psnr": row["psnr"] + 1} for row in record["scenes"]["light"]["`demo`"]]
+    scenes = record["scenes"] | {"light": record["scenes"]["light"] | {"`demo`": other}}
+    assert "those of `sharp`" not in table(record | {"scenes": scenes})
+
+
 def test_true_courses_are_those_of_the_pictures(scene, run):
     """The pixel at a piece of tissue shows its light, but for the place within the pixel and the rounding."""
     true, modelled = light_courses(run, scene)

@@ -25,6 +25,7 @@ from pages.store import figures
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, RUNS, Program
 from pages.store.published import PUBLISHED
+from pages.store.tables import days
 
 PICTURE = RESULTS / "minutes.svg"
 METRICS = {"psnr_full": ("PSNR full, dB", "{:.2f}"), "ssim_full": ("SSIM", "{:.4f}"), "lpips": ("LPIPS", "{:.4f}")}
@@ -106,12 +107,12 @@ def table(result: dict[str, Any]) -> str:
 
 
 def about(result: dict[str, Any]) -> str:
-    """Clip, processor and the last day."""
+    """Clip, processor and days."""
     runs = [run for rows in result["rows"].values() for run in rows]
     clip = result["clip"]
     return (
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, held out: every eighth frame; "
-        f"{', '.join(sorted({run['processor'] for run in runs}))}; {max(run['date'] for run in runs)}. "
+        f"{', '.join(sorted({run['processor'] for run in runs}))}; {days(runs)}. "
         "LPIPS has its input in [0, 1]; the paper does not state the range of its own."
     )
 

@@ -3,14 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from endotsr.config import PAPER
 from endotsr.errors import InputError
 from endotsr.results.report.tables import markdown, memory
 from endotsr.studies.bench.clock import REST
 from pages.bench import peers as bench_peers
+from pages.bench.scaling import BASE
+from pages.store.tables import noted, where, where_with_cores
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case of the targets
-WHOLE = "pulling_paper_seed1"  # the recorded run with a target time
+WHOLE = "pulling_paper_"  # the recorded runs with a target time, on the threads of `MAIN`
 
 
 class Target(NamedTuple):
@@ -44,20 +47,26 @@ def machine(stages: Result) -> str:
 
 
 def targets(stages: Result, scaling: Result, peers: Result, start: Result, runs: Mapping[str, Result]) -> str:
-    """Each target with the measured value."""
+    """Each target with the measured value: of a whole run, every recorded one with the threads of the main case."""
     case = main_case(stages)
     double = find(stages["cases"], MAIN | {"precision": "float64"})
     single_ms = case["iteration"]["median_ms"]
     largest = scaling["axes"]["gaussians"]
     ratios = [c["ratio"] for c in peers["cases"] if c["precision"] == "float32"]
-    whole = runs.get(WHOLE)
-    whole_minutes = whole["seconds"] / 60 if whole else None
+    whole = {
+        f"`{name}.json`, {run['machine']['processor']}": run["seconds"] / 60
+        for name, run in runs.items()
+        if name.startswith(WHOLE) and run["threads"] == MAIN["threads"]
+    }
     found = [
         Target("splat, forward and reverse", case["splat"]["median_ms"], 60, None, "ms"),
         Target("full iteration, all losses", single_ms, 100, None, "ms"),
         Target("float64 against float32, iteration", double["iteration"]["median_ms"] / single_ms, 1.8, None, "times"),
         Target("gsplat's torch reference against splat", min(ratios, default=None), None, 50, "times"),
-        Target(f"run of 6000 iterations, `{WHOLE}.json`", whole_minutes, 10, None, "min"),
+        *(
+            Target(f"run of {PAPER.training.iterations} iterations{of}", minutes, 10, None, "min")
+            for of, minutes in ({f", {name}": value for name, value in whole.items()} or {"": None}).items()
+        ),
         Target("cold start to the first iteration", start["cold"]["first iteration"], 25, None, "s"),
         Target("warm start to the first iteration", start["warm"]["first iteration"], 3, None, "s"),
         Target(
@@ -149,7 +158,8 @@ def cases(found: Result) -> str:
             ]
         )  # fmt: skip
     head = ["Gaussians", "precision", "threads", "iteration, ms", "times float32", "splat, ms", "blended pairs, M"]
-    return markdown([*head, "blend forward, ns a pair", "blend reverse, ns a pair", "peak memory"], rows)
+    head += ["blend forward, ns a pair", "blend reverse, ns a pair", "peak memory"]
+    return noted(head, rows, f"{where(found)}.")
 
 
 def scaling(found: Result) -> str:
@@ -170,6 +180,7 @@ def scaling(found: Result) -> str:
         markdown(["along", "range", "exponents over the upper decade"], rows),
         f"The steepest of them is {steepest[0]:.2f} ({steepest[1]} along {steepest[2]}).",
         _memory(found["memory"], largest),
+        f"{BASE.threads} threads; {where(found)}.",
     ]
     return "\n\n".join(lines)
 
@@ -211,7 +222,8 @@ def peers(found: Result) -> str:
 def start(found: Result) -> str:
     """Cold start, and the median of the warm ones, by moment."""
     rows = [[moment, f"{found['cold'][moment]:.1f}", f"{found['warm'][moment]:.1f}"] for moment in found["cold"]]
-    return markdown(["seconds from the call to", "cold", "warm"], rows)
+    about = f"One cold start; medians of {found['warm_repeats']} warm ones. {where_with_cores(found)}."
+    return noted(["seconds from the call to", "cold", "warm"], rows, about)
 
 
 def runs(found: Mapping[str, Result]) -> str:

@@ -51,6 +51,7 @@ FIGURES: dict[str, Figure | Setting | Formula] = {
     "paper.tissue": Figure(PAPER, "held_out.mean.psnr_tissue", "{:.2f}"),
     "blend.full.pulling": Figure("interpolation.json", f"{ALONE}.two_neighbours.psnr_full", "{:.2f}"),
     "blend.full.cutting": Figure("interpolation.json", f"{CUTTING}.two_neighbours.psnr_full", "{:.2f}"),
+    "flow_tissue.pulling": Figure("interpolation.json", f"{ALONE}.flow_interpolation_tissue.psnr_tissue", "{:.2f}"),
     "flow.cutting": Figure("interpolation.json", f"{CUTTING}.flow_interpolation.psnr_tissue", "{:.2f}"),
     "blend.cutting": Figure("interpolation.json", f"{CUTTING}.two_neighbours.psnr_tissue", "{:.2f}"),
     "flow_tissue.cutting": Figure("interpolation.json", f"{CUTTING}.flow_interpolation_tissue.psnr_tissue", "{:.2f}"),

@@ -21,7 +21,7 @@ from pages.full_size.interpolation import TISSUE_ONLY
 from pages.full_size.text import LABELS, PREDICTIONS, mean_psnr
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, Program
-from pages.store.tables import noted
+from pages.store.tables import days, noted
 
 Columns = tuple[tuple[str, str, float, int], ...]
 MEASURED: Columns = (
@@ -61,7 +61,7 @@ def table(columns: Columns = MEASURED) -> str:
     clip = found["clip"]
     about = (
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, every eighth held out; "
-        f"{' or '.join(map(str, threads))} threads of {', '.join(machines)}, {max(run['date'] for run in runs)}. The "
+        f"{' or '.join(map(str, threads))} threads of {', '.join(machines)}, {days(runs)}. The "
         "time is that of the iterations on one machine; another one of this name took longer."
     )
     return noted(("Preset", "Training, minutes", *(head for head, *_ in columns), "Seeds"), cells, about)
@@ -84,11 +84,11 @@ def whole() -> str:
         ]
         for row in shown
     ]
-    sizes, days = sorted({row["size"] for row in rows}), sorted({row["date"] for row in rows})
+    sizes = sorted({row["size"] for row in rows})
     about = (
         "Time of the whole command, from reading the clip to its report, with LPIPS; kernels are compiled once on a "
         "machine. "
-        f"Frames of {', '.join(sizes)}; {days[0]} to {days[-1]}."
+        f"Frames of {', '.join(sizes)}; {days(rows)}."
     )
     return noted(("Preset", "Clip", "Minutes", "Measured on", "With compilation"), cells, about)
 

@@ -11,6 +11,7 @@ error.
 import math
 import re
 import sys
+from decimal import ROUND_HALF_UP, Decimal
 from typing import Any, NamedTuple
 
 from pages.claims.estimates import runs_of
@@ -186,11 +187,16 @@ def verdict_on(clip: str, start: str) -> str:
 def by_name() -> str:
     """Printed values of systems by name, the highest mean first; what a paper does not give is a dash."""
     cell = lambda value: "-" if math.isnan(value) else f"{value:.2f}"
-    printed = lambda row: cell(mean(row)) if math.isnan(row.mean) else str(row.mean)
+    printed = lambda row: halved(row.pulling, row.cutting) if math.isnan(row.mean) else str(row.mean)
     mean = lambda row: (row.pulling + row.cutting) / 2 if math.isnan(row.mean) else row.mean
     rows = sorted(BY_NAME, key=lambda row: -mean(row))
     heads = ("System", "Pulling, dB", "Cutting, dB", "Mean, dB", "Printed in (arXiv)")
     return markdown(heads, [[r.system, cell(r.pulling), cell(r.cutting), printed(r), r.source] for r in rows])
+
+
+def halved(first: float, second: float) -> str:
+    """The mean of two values with two decimals, a half rounded up, as in decimal numbers."""
+    return str(((Decimal(f"{first:.2f}") + Decimal(f"{second:.2f}")) / 2).quantize(Decimal("0.01"), ROUND_HALF_UP))
 
 
 def systems() -> str:

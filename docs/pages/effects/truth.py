@@ -147,7 +147,15 @@ def table(result: dict[str, Any]) -> str:
         f"tissue moves by {moved['motion_scene_units']:.2f} mm ({moved['motion_pixels']:.2f} px), and its light "
         f"changes by {moved['light_grey']:.1f} grey levels, because it moves under the lamp."
     )
+    note += " All runs begin with as many points as `demo` and have its threshold of growth"
+    same = [name for name in light if name != "`sharp`" and _same(result, name, "`sharp`")]
+    note += f", with which the settings of {' and '.join(same)} are those of `sharp` at this length." if same else "."
     return f"{first}\n\n{second}\n\n{note}\n\n{gains(result)}"
+
+
+def _same(result: dict[str, Any], first: str, second: str) -> bool:
+    """Whether two variants have the same numbers in every scene."""
+    return all(scene[first] == scene.get(second) for scene in result["scenes"].values())
 
 
 def gains(result: dict[str, Any]) -> str:

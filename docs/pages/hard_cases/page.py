@@ -51,7 +51,7 @@ def gallery(record: dict[str, Any]) -> str:
     """The gallery as Markdown, and where it was made."""
     lines, computer = [], record["machine"]
     about = (
-        f"Made by `python docs/make.py hard_cases` on {record['made'][:10]}, {computer['processor']} "
+        f"Made by `python docs/make.py hard_cases measure` on {record['made'][:10]}, {computer['processor']} "
         f"({computer['cores']} cores), {', '.join(f'{name} {v}' for name, v in record['versions'].items())}."
     )
     for row in map(numbers, record["cases"]):

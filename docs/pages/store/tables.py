@@ -24,6 +24,12 @@ def means(runs: Sequence[Mapping[str, Any]], columns: Columns) -> list[str]:
     return [shown([run[key] for run in runs if run.get(key) is not None], digits) for key, digits in columns]
 
 
+def days(runs: Iterable[Mapping[str, Any]]) -> str:
+    """The first and the last day of several measurements."""
+    found = sorted({run["date"][:10] for run in runs})
+    return found[0] if len(found) == 1 else f"{found[0]} to {found[-1]}"
+
+
 def where(record: Mapping[str, Any]) -> str:
     """Processor and day of a measurement."""
     return f"{record['machine']['processor']}, {record['date'][:10]}"

@@ -18,7 +18,7 @@ from pages.tradeoff.text import (
     training_rows,
 )
 
-TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
+TRAINING_COLUMNS = ("Training", "PSNR full, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
 
 
 def fragments(

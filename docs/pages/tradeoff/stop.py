@@ -44,8 +44,8 @@ def sentences(result: dict[str, Any]) -> str:
     first, _, last = (f"{rendered:g}" for rendered in RENDERED)
     scene = f"{SCENE['width']}x{SCENE['height']}, {SCENE['frames']} frames, {ITERATIONS} iterations of `demo`, one seed"
     return (
-        f"On a small simulated scene ({scene}; {where(result)}), a model that was "
-        f"trained with a stop of {TRAINED[0]:g} has {tight[last]:.2f} dB when it is rendered with {last}, and "
+        f"On a small simulated scene ({scene}; {where(result)}), a model that was trained with a stop of "
+        f"{TRAINED[0]:g} has {tight[last]:.2f} dB on held-out tissue when it is rendered with {last}, and "
         f"{tight[first]:.2f} dB with {first}. One that was trained with {TRAINED[1]:g} has {loose[last]:.2f} dB and "
         f"{loose[first]:.2f} dB. Of its loss, {tight[last] - loose[last]:.1f} dB are in the trained Gaussians and "
         f"{loose[last] - loose[first]:.1f} dB in the render."
