@@ -18,7 +18,7 @@
 # the tissue behind an instrument and the times between two frames.
 #
 # The task is ambiguous. A pixel becomes brighter when the light grows stronger, and also when a brighter piece of
-# tissue moves there. A single picture cannot distinguish these causes. The paper therefore uses separate components:
+# tissue moves there. A single picture cannot distinguish these causes. The paper uses separate components:
 #
 # - **A**, appearance: a bounded change of colour over time ({doc}`02_colour_residual`).
 # - **S**, spectral motion: a translation over time with a smoothness prior ({doc}`05_motion_and_prior`).
@@ -191,10 +191,11 @@ runs = {
 # %% [markdown]
 # ## The numbers
 #
-# *Training* and *held out* are the mean PSNR over tissue of the training frames and of the held-out frames, in dB; a higher
-# value is better. *Trajectory error* is the mean distance between the motion of the model and the true motion, in pixels;
-# the last column is the error of a model that stands still. Before you read on, write down a prediction for each clip: which
-# component gains on the training frames, and does it gain on the held-out frames as well?
+# *Training* and *held out* are the mean PSNR over tissue ({eq}`eq-m1` in {doc}`14_full_sequence`) of the training frames
+# and of the held-out frames, in dB; a higher value is better. *Trajectory error* is the mean distance between the motion
+# of the model and the true motion, in pixels; the last column is the error of a model that stands still. Before you read
+# on, write down a prediction for each clip: which component gains on the training frames, and does it gain on the
+# held-out frames as well?
 
 # %%
 scores = {}

@@ -220,6 +220,10 @@ x = np.linspace(8, 10.5, 2501)
 rounded = 1 - np.tanh(x).astype(np.float32) ** 2  # tanh correctly rounded to float32
 assert np.all((rounded == 0) == (x > 13 * np.log(2))), "(2.4): 0 from 13 ln 2 on"
 assert np.abs(rounded[x > 8.9] * np.cosh(x[x > 8.9]) ** 2 - 1).max() > 0.5, "no digit is right"
+units = np.linspace(range(1, 9), range(2, 10), 101)  # x from 1 to 2, from 2 to 3, ...
+left = (1 - np.tanh(units).astype(np.float32) ** 2) * np.cosh(units) ** 2
+lost = np.log10(np.abs(left - 1).max(axis=0))
+assert (np.diff(lost) > 0.5).all(), "(2.4): digit by digit"
 
 saturated = appearance_reverse(
     g_h, appearance_forward(1e3 * A, phi_bar, beta)[1]

@@ -13,8 +13,8 @@
 # %% [markdown]
 # # 5. The translation residual and its Matérn prior (component S)
 #
-# Breathing and heartbeat move tissue periodically. Component S therefore adds a Fourier series to the path of each
-# Gaussian. With sixteen free coefficients per axis, such a series can also produce implausible motion between the
+# Breathing and heartbeat move tissue periodically. Component S therefore adds sinusoids of time to the path of each
+# Gaussian. With sixteen free coefficients per axis, their sum can also produce implausible motion between the
 # frames. A Matérn-5/2 prior therefore penalises fast motion.
 #
 # | Symbol | Meaning | Shape in the code |
@@ -228,8 +228,8 @@ assert np.ptp(difference - normalised(turned(C, theta), 0.5) + normalised(C, 0.5
 # ## Figure: the effect of the penalty on a trajectory
 #
 # A point moves on a smooth path. It is observed with a little noise in the training frames of a short clip, which give
-# 17 stamps for 16 coefficients. With almost as many unknowns as observations, many series fit the stamps about equally
-# well and differ between them. The Fourier series is fitted twice: by least squares alone, and with
+# 17 stamps for 16 coefficients. With almost as many unknowns as observations, many sums fit the stamps about equally
+# well and differ between them. The sum of sinusoids is fitted twice: by least squares alone, and with
 # $\lambda_{\mathrm{msp}}\,\mathcal L_{\mathrm{msp}}$ added. In each case the minimum of a quadratic is the solution of
 # one linear system; the reverse pass below gives the part of its matrix that belongs to the penalty. The left panel
 # shows both paths, the middle panel the energy of their coefficients, and the right panel the weights for several values

@@ -353,7 +353,7 @@ plt.show()
 
 # %% [markdown]
 # The brighter picture has the highest SSIM, nearly 1. The SSIM of the render is about that of noise with the same L1. Its
-# map has bright spots where a highlight and two fine vessels are missing.
+# map has bright spots where a part of the highlight and two fine vessels are missing.
 
 # %% [markdown]
 # ## The reverse passes, line by line

@@ -551,6 +551,16 @@ np.testing.assert_array_equal(source, [*survivors, *to_clone, *to_split, *to_spl
 for name in ("quaternion", "opacity_logit", "harmonics"):
     of_parent = getattr(gaussians, name)[..., source]
     np.testing.assert_array_equal(getattr(after.gaussians, name), of_parent, name)
+of_time = ("fdm_weight", "fdm_centre", "fdm_width")
+of_time += ("appearance_coefficients", "motion_coefficients")
+numbers = np.random.default_rng(13).normal(size=(10, 4, N))
+rows = (10, 10, 10, 3, 3)
+moving = gaussians._replace(**{name: k * numbers[:k] for name, k in zip(of_time, rows)})
+grown = densify(moving, statistics, rule, np.random.default_rng(5), extent).gaussians
+for name in of_time:
+    np.testing.assert_array_equal(
+        getattr(grown, name), getattr(moving, name)[..., source], name
+    )
 clones = slice(stay, stay + len(to_clone))
 np.testing.assert_array_equal(
     after.gaussians.log_scale[:, clones], gaussians.log_scale[:, to_clone]

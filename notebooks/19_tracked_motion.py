@@ -188,7 +188,7 @@ for part in ("residual", "log_scale", "quaternion", "opacity_logit"):
 # points of frame 0 are followed through its training frames. The left panel shows every second path in the picture,
 # drawn at the last training frame. The middle panel shows the error of the positions, for
 # points that are followed and for points that are carried. The right panel shows the path of one point that is lost
-# and found again, the one with the median error. Step (19.5) looks for a pixel of the same depth, not for the same
+# and found again, the one with the median of the errors over all times. Step (19.5) looks for a pixel of the same depth, not for the same
 # piece of tissue, so it can be wrong. The lines below the figure say how far the found points are from the tissue
 # where they began.
 

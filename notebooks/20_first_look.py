@@ -51,8 +51,8 @@ rng = np.random.default_rng(20)
 #
 # The published rule clones or splits every Gaussian whose mean screen gradient reaches a threshold ({eq}`eq-b11`,
 # derived in {doc}`13_optimiser_and_density`). The number of new Gaussians therefore depends on everything that scales a
-# gradient: the weights of the losses, the size of the frames, the exposure. With a budget the number is given, and the
-# new Gaussians are made where the gradients are largest.
+# gradient, such as the weights of the losses and the contrast of the frames; with the unit of (13.6) it should depend
+# little on their size. With a budget the number is given, and the new Gaussians are made where the gradients are largest.
 #
 # **(20.1) Equal steps.** Let $N$ be the number of Gaussians left after pruning, $M$ the budget, and $r$ the number of
 # densifications from the current one to the last. The current one adds $\lceil\max(0,M-N)/r\rceil$ Gaussians, at the

@@ -46,8 +46,8 @@ from endotsr.training.runs.folder import open_run
 # ## Two windows
 #
 # The recording has 56 frames with breathing, a beat and highlights. Two windows of 32 frames share frames 24 to 31.
-# The pair is trained twice. In the first case both windows start cold. In the second case the later window starts
-# warm, with 40 %<!--=window.warm--> of the iterations.
+# The pair is trained twice. In the first case both windows start *cold*, from points of their own frames. In the second
+# case the later window starts *warm*, from the Gaussians of the earlier one, with 40 %<!--=window.warm--> of the iterations.
 
 # %%
 folder = Path(tempfile.mkdtemp())
@@ -159,9 +159,10 @@ assert values[2] > max(values[:2])
 # %% [markdown]
 # ## Interactive figure: the length of the overlap
 #
-# Two windows differ by 6 levels, and their errors are of equal size. Before you move a slider: by (21.2), what is the
-# largest step with an overlap of 12 frames? How many more windows does the recording need? And what is left of the
-# gain in the middle, (21.3), if the errors of the two windows are equal?
+# A recording of 2000 frames has windows of 60. Two windows differ by 6 levels, and their errors are of equal size. Before
+# you move a slider: by (21.2), what is the largest step with an overlap of 12 frames? How many more windows does the
+# recording need than without an overlap? And what is left of the gain in the middle, (21.3), if the errors of the two
+# windows are equal?
 #
 # <div class="widget" data-widget="seam">The figure is live in the built book.</div>
 
