@@ -136,6 +136,7 @@ def prepare_options(folder: Path) -> dict[str, list[str]]:
         "source-rate": ["50"], "orientation": ["stored"], "scale": ["0.5"], "gaps": ["drop"],
         "border": ["keep"], "pictures": ["jpg"], "also": ["nerfstudio"], "layout": ["auto"],
         "model": ["sparse/0"], "right": [str(folder / "right.mkv")], "right-late": ["-1"],
+        "masks-late": ["1"],
     }  # fmt: skip
     return {name: [f"--{name}", *words] for name, words in values.items()}
 

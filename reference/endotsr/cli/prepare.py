@@ -74,6 +74,8 @@ class PrepareOptions:
     """unit of the positions (--trajectory, TUM, EuRoC and StereoMIS: m, EndoNeRF: mm, nerfstudio: arbitrary)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one per frame, one file for all frames, a video, or an array"""
+    masks_late: Annotated[int, Option("N")] = 0
+    """frames of the source by which the masks are late, negative: early; each picture gets the mask of its moment"""
     excluded_value: ExcludedValue = "white"
     """excluded value of these masks; white = from half of full white on, nonzero = the numbers of objects"""
     pairing: Pairing = "auto"
@@ -130,8 +132,8 @@ def run(words: list[str]) -> int:
 
     _check_options(options, words)
     settings = PrepareSettings(
-        options.frames, options.drop, options.rate, options.right_late, options.scale, options.gaps, options.border,
-        options.pictures, options.points,
+        options.frames, options.drop, options.rate, options.right_late, options.masks_late, options.scale,
+        options.gaps, options.border, options.pictures, options.points,
     )  # fmt: skip
     clip = describe(options.source, _stated(options))
     _refuse_two_baselines(options, clip.calibration is not None)

@@ -14,7 +14,15 @@ from made_videos import CAMERA, UNEVEN, files, picture, pictures, write
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics, StereoCalibration
 from endotsr.clips.opencv import read_png, write_png
-from endotsr.clips.prepare.editing import chosen_frames, cropped, paired_by_time, thinned, with_partner, without
+from endotsr.clips.prepare.editing import (
+    chosen_frames,
+    cropped,
+    masks_by_time,
+    paired_by_time,
+    thinned,
+    with_partner,
+    without,
+)
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair
 from endotsr.clips.sequences.layouts import describe
@@ -319,7 +327,7 @@ def test_a_right_view_that_lags_is_paired_by_moment(late, wanted):
     """Every picture that is needed is decoded once, in the order of the recording."""
     clip, read = stereo()
     notes: list[str] = []
-    kept = with_partner(clip, list(wanted), late, notes)
+    kept = with_partner(clip, list(wanted), late, "a right picture", notes)
     assert kept == [i for i in wanted if i + late in range(20)]
     found = [(int(pair.left[0, 0, 0]), int(pair.right[0, 0, 0])) for pair in paired_by_time(clip, late).pictures(kept)]
     assert found == [(i, 100 + i + late) for i in kept]
@@ -338,3 +346,28 @@ def test_a_lag_needs_right_pictures_and_a_longer_clip():
         paired_by_time(recording(), 20)
     with pytest.raises(InputError, match="no right pictures"):
         next(paired_by_time(recording(), 1).pictures([3]))
+
+
+@pytest.mark.parametrize("late", [1, -2])
+def test_masks_that_lag_are_given_to_the_pictures_of_their_moment(late, tmp_path, capsys):
+    written(tmp_path / "clip")
+    words = ["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), "--masks-late", str(late)]
+    assert main(words) == 0
+    kept = [i for i in range(FRAMES) if 0 <= i + late < FRAMES]
+    assert len(list((tmp_path / "o" / "masks").iterdir())) == len(kept)
+    for k, i in enumerate(kept):
+        for part, frame in (("images", i), ("masks", i + late), ("depth", i)):
+            made, given = (tmp_path / name / part / f"{n:06d}.png" for name, n in (("o", k), ("clip", frame)))
+            np.testing.assert_array_equal(read_png(made) > 0, read_png(given) > 0)
+    said = capsys.readouterr().out
+    side = "1 frame late" if late > 0 else "2 frames early"
+    assert f"masks taken as {side}: frame i has mask i {late:+d}" in said
+    assert f"{FRAMES - len(kept)} frame{'s' * (late < 0)} without a mask of their moment omitted" in said
+
+
+def test_a_lag_of_masks_needs_masks_and_a_longer_clip():
+    masks = Masks(lambda i: np.full((2, 2), i % 2 == 0))
+    with pytest.raises(InputError, match="--masks-late -20: allowed: -19 to 19 for 20 frames"):
+        masks_by_time(recording(masks=masks), -20)
+    with pytest.raises(InputError, match="no masks; --masks-late is allowed for a clip with masks alone"):
+        masks_by_time(recording(), 1)

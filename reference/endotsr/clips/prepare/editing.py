@@ -207,10 +207,7 @@ def paired_by_time(clip: Clip, late: int) -> Clip:
     Edges:   a frame whose partner is outside the clip has no pictures; `with_partner` omits it.
     Raises:  InputError for a lag as long as the clip. A clip without right pictures is refused when one is read.
     """
-    if abs(late) >= clip.count:
-        raise InputError(
-            f"--right-late {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {counted(clip.count, 'frame')}"
-        )
+    _refuse_long_lag(clip, late, "--right-late")
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         left: dict[int, Picture] = {}  # of wanted frames whose partner is still to come, and the other way round
@@ -229,16 +226,44 @@ def paired_by_time(clip: Clip, late: int) -> Clip:
                 yield PicturePair(left.pop(turn), right.pop(turn))
                 turn = next(waiting, None)
 
-    way = "late" if late > 0 else "early"
-    note = f"right view taken as {counted(abs(late), 'frame')} {way}: frame i is paired with right picture i {late:+d}"
+    note = f"right view taken as {_lag(late)}: frame i is paired with right picture i {late:+d}"
     return replace(clip, pictures=pictures, right=[], notes=[*clip.notes, note])
 
 
-def with_partner(clip: Clip, frames: list[int], late: int, notes: list[str]) -> list[int]:
-    """The frames whose right picture, that of frame i + late, is in the clip. The others are noted."""
+def masks_by_time(clip: Clip, late: int) -> Clip:
+    """The clip with the mask i + late for frame i, for masks that lag; `late` as in `paired_by_time`.
+
+    Edges:   a frame whose mask is outside the clip has none; `with_partner` omits it.
+    Raises:  InputError for a clip without masks, and for a lag as long as the clip.
+    """
+    masks = clip.masks
+    if masks is None:
+        raise InputError(f"{clip.where}: no masks; --masks-late is allowed for a clip with masks alone")
+    _refuse_long_lag(clip, late, "--masks-late")
+    read = lambda i: masks(i + late) if 0 <= i + late < clip.count else None
+    note = f"masks taken as {_lag(late)}: frame i has mask i {late:+d}"
+    return replace(clip, masks=replace(masks, read=read, files=[], levels=None), notes=[*clip.notes, note])
+
+
+def _refuse_long_lag(clip: Clip, late: int, option: str) -> None:
+    if abs(late) >= clip.count:
+        raise InputError(
+            f"{option} {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {counted(clip.count, 'frame')}"
+        )
+
+
+def _lag(late: int) -> str:
+    return f"{counted(abs(late), 'frame')} {'late' if late > 0 else 'early'}"
+
+
+def with_partner(clip: Clip, frames: list[int], late: int, what: str, notes: list[str]) -> list[int]:
+    """The frames whose partner, that of frame i + late, is in the clip. The others are noted.
+
+    what   the partner in words: `a right picture` or `a mask`
+    """
     kept = [i for i in frames if 0 <= i + late < clip.count]
     if len(kept) < len(frames):
-        notes.append(f"{counted(len(frames) - len(kept), 'frame')} without a right picture of their moment omitted")
+        notes.append(f"{counted(len(frames) - len(kept), 'frame')} without {what} of their moment omitted")
     return kept
 
 

@@ -20,6 +20,7 @@ from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.prepare.editing import (
     chosen_frames,
+    masks_by_time,
     paired_by_time,
     thinned,
     with_partner,
@@ -73,6 +74,7 @@ class PrepareSettings:
     drop: str = ""  # frames to omit, in the same syntax
     rate: float | None = None  # frames per second to keep
     right_late: int = 0  # frames of the source by which the right view is late; negative: early
+    masks_late: int = 0  # the same of the masks
     scale: float = 1.0
     gaps: Gaps = "refuse"  # frames without mask or pose where others have one
     border: Border = "auto"  # outside of the field of view; auto: excluded if the clip has no masks
@@ -96,9 +98,13 @@ def prepare(
     """
     if settings.right_late:
         clip = paired_by_time(clip, settings.right_late)
+    if settings.masks_late:
+        clip = masks_by_time(clip, settings.masks_late)
     notes = [*clip.notes, *(part.paired for part in (clip.masks, clip.depth) if part is not None and part.paired)]
     frames = without(chosen_frames(settings.frames, clip), settings.drop, clip)
-    chosen = thinned(clip, with_partner(clip, frames, settings.right_late, notes), settings.rate, notes)
+    frames = with_partner(clip, frames, settings.right_late, "a right picture", notes)
+    frames = with_partner(clip, frames, settings.masks_late, "a mask", notes)
+    chosen = thinned(clip, frames, settings.rate, notes)
     chosen, poses = _poses_and_masks(clip, chosen, settings.gaps, notes)
     refuse_no_lengths(clip, chosen)
     if not chosen:

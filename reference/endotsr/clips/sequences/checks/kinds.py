@@ -140,7 +140,8 @@ KINDS: dict[str, Kind] = {
     "turned-masks": Kind("warning", "one part of the masks hides the tissue and shows the instrument",
                          "invert the masks of one part, so that all have one polarity"),
     "late-masks": Kind("warning", "the masks show the instrument and hide tissue along the path of the instrument",
-                       "give each mask the number of its picture"),
+                       "move them: endotsr prepare --masks-late N, -N for early masks; or give each mask the number of"
+                       " its picture"),
     "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
                         " held-out frame there is measured on pixels that training hardly sees",
                         f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
