@@ -158,7 +158,9 @@ def main(names: list[str]) -> int:
     """Print what survived; the exit status is the number of modules, or of signs of the sample, with survivors."""
     if names[:1] == ["--sample"]:
         return print_sample(int(names[1]))
-    bad = 0
+    bad, known = 0, [module.removeprefix("endotsr.") for module in modules()]
+    if unknown := [name for name in names if name not in known]:
+        sys.exit(f"no module: {', '.join(unknown)}; use one of: {', '.join(known)}")
     for module in modules():
         if names and module.removeprefix("endotsr.") not in names:
             continue

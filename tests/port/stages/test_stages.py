@@ -143,6 +143,17 @@ def test_the_check_of_the_objective_has_every_weight():
     assert not missing, f"add to CHECKED in reference/endotsr/port/stages/scene.py: {sorted(missing)}"
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_term_of_the_checked_objective_is_0(seed):
+    """The gradient check does not see a term that is 0 in its scene, as one above a threshold may be."""
+    (variant,) = STAGES["objective"].variants
+    inputs = variant.inputs(np.random.default_rng(seed)) | variant.fixed(np.dtype(np.float64))
+    _, saved = STAGES["objective"].forward(inputs, variant.settings)
+    terms = STAGES["objective"].extra(inputs, variant.settings, saved)
+    values = {name: abs(float(value)) for name, value in terms.items() if name.startswith("term_")}
+    assert len(values) >= 6 and {name for name, value in values.items() if value < 1e-6} == set()
+
+
 def test_blocks_of_some_inputs_and_the_others_whole():
     blocks = split_blocks({"x": {"x first": slice(0, 1), "x rest": slice(1, None)}})
     found = blocks({"x": np.zeros(3), "y": np.zeros(2)})
