@@ -108,8 +108,10 @@ def opening(result: dict[str, Any], found: list[Row]) -> list[str]:
     seen = sum(any(c >= 0 for c in codes) for _, codes in result["defects"].values())
     first = (
         f"The tests detect {percent(shares['any'], len(real))} of {len(real)} deliberate errors in the numerical "
-        f"modules, and {seen} of {known} mistakes that ports or published programs have made. "
+        f"modules, and {seen} of {known} mistakes that a port could make. "
         + ("None survives." if not alive else f"{alive} survive and are listed below.")
+        + f" {len(found) - len(real)} more changes are judged equivalent and are not counted (measured "
+        f"{result['run']['finished'][:10]})."
     )
     alone = ", ".join(
         f"{s} {percent(shares[s], len(real))}" for s in sorted(result["suites"], key=lambda s: -shares[s])
@@ -153,8 +155,8 @@ def method(result: dict[str, Any], found: list[Row]) -> list[str]:
             "Every function of the numerical modules is changed in one place at a time: another operator, a dropped "
             "term or statement, another constant, a shifted index, a flipped comparison, sign or branch, sine for "
             "cosine, smallest for largest. Five suites test each wrong version (mutant). A suite detects a mutant when "
-            "one of its checks fails, raises or does not end. A mutant that computes the same results is equivalent: "
-            "no test can detect it, and it is not counted."
+            "one of its checks fails, raises or does not end. A mutant that no check detects is counted as a survivor, "
+            "unless the list of equivalent mutants has a reason why its results are the same."
         ),
         "",
         *(line for text in SUITES for line in wrapped(text, "  ")),
@@ -196,7 +198,7 @@ def page(result: dict[str, Any]) -> str:
         "",
         "## Named defects",
         "",
-        "Each is a mistake that ports or published programs have made, put into the source on purpose.",
+        "Each is a mistake that a port could make, put into the source on purpose.",
         "",
         *defects(result),
         "",
@@ -213,8 +215,11 @@ def page(result: dict[str, Any]) -> str:
         *method(result, found),
         "## Equivalent mutants",
         "",
-        f"These {len(found) - len(counted(found))} mutants compute the same results, or differ only in values on which "
-        "no result depends.",
+        *wrapped(
+            f"These {len(found) - len(counted(found))} mutants are judged, one by one, to compute the same results, or "
+            "to differ only in values on which no result depends. The reason names the few of which this is known for "
+            "the tested inputs alone."
+        ),
         "",
     ]
     tested = {r.name for r in found if r.equivalent}

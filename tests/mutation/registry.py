@@ -1,4 +1,4 @@
-"""The named defects: mistakes that ports and published codes have made, each as a change of the source."""
+"""The named defects: mistakes that a port could make, each as a change of the source."""
 
 from collections.abc import Callable
 from typing import NamedTuple
