@@ -3,10 +3,12 @@
 import json
 
 import pytest
+from pages.bench import minutes
 from pages.claims import page as claims
 from pages.claims.answer import _decided, _stands, splits, with_other_weights
 from pages.claims.estimates import Estimate, contrast
 from pages.claims.verdicts import CLIPS
+from pages.full_size import record
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +51,21 @@ def test_a_published_level_of_the_answer_is_known_to_its_last_digit():
 def test_a_published_level_is_shown_with_the_digits_of_the_paper(made):
     for name, ssim in (("pulling", "0.967"), ("cutting", "0.980")):
         assert f"| Level: SSIM | A+S+L | {ssim} |" in made[f"verdicts_{name}"]
+        assert f" | {ssim} | " in next(
+            row for row in record.every_clip().splitlines() if f"published, EndoNeRF {name}" in row
+        )
+    assert next(row for row in minutes.table(minutes.PROGRAM.read()).splitlines() if "published" in row).endswith(
+        "| 39.34 | 0.967 | 0.035 |"
+    )
 
 
 def test_what_the_page_says_of_the_prior():
     """Every interval of PSNR has 0 and exceeds 0.01 dB; what is resolved in SSIM and LPIPS is below a thousandth."""
     for name in CLIPS:
-        record = json.loads((claims.RESULTS / claims.FILES[name]).read_text(encoding="utf-8"))
+        found_runs = json.loads((claims.RESULTS / claims.FILES[name]).read_text(encoding="utf-8"))
         for terms in ({"S": 1, "S without prior": -1}, {"S fixed": 1, "S without prior fixed": -1}):
             for metric in ("psnr_full", "ssim_tissue", "lpips", "lpips_symmetric"):
-                if (found := contrast(record, terms, metric)) is None:
+                if (found := contrast(found_runs, terms, metric)) is None:
                     continue
                 low, high = found.paired
                 if metric == "psnr_full":

@@ -7,7 +7,7 @@ import pytest
 from pages.store import program
 from pages.tradeoff import page as tradeoff
 from pages.tradeoff.parts import fragments, promise, scatter_of_equal, time_sentence
-from pages.tradeoff.text import advice
+from pages.tradeoff.text import advice, error_over_cutoff, float32_floor
 
 from endotsr.studies.tradeoff.text import levels
 
@@ -54,6 +54,20 @@ def test_each_advice_is_held_against_what_it_promises(result):
     assert "not below the sensor noise |" in row_of(result, 1.01 * noise, 0.99)
     failed = row_of(result, 0.4, 1.01)
     assert "| does not hold: the 8-bit setting is off by more than one level: take float32" in failed
+
+
+@pytest.mark.parametrize("scene", ["tradeoff", "tradeoff_biker", "tradeoff_cutting_sharp", "tradeoff_guitar"])
+def test_the_table_of_scenes_has_the_extremes_of_all_that_was_measured(scene):
+    """The floor of float32 over every setting, and the error over the cutoff without the error of a stop."""
+    found = json.loads((tradeoff.RESULTS / f"{scene}.json").read_text(encoding="utf-8"))
+    floor = float32_floor(found)
+    assert all(p["error"]["max"] >= floor for p in found["points"] if p["setting"]["precision"] == "float32")
+    dial = next(dial["points"] for dial in found["dials"] if dial["name"] == "cutoff")
+    by_name = {p["name"]: p for p in found["points"]}
+    for name in dial.values():
+        raster = by_name[name]["setting"]["raster"]
+        assert raster["transmittance_stop"] == 0 and raster["jacobian_clamp"] == 0
+        assert by_name[name]["error"]["max"] <= error_over_cutoff(found) * raster["alpha_cutoff"] * (1 + 1e-12)
 
 
 def test_pictures_that_differ_by_less_than_a_step_are_off_by_at_most_one_level():

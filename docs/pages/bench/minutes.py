@@ -24,11 +24,12 @@ from pages.full_size.text import LABELS
 from pages.store import figures
 from pages.store.commands import loaded
 from pages.store.program import RESULTS, RUNS, Program
-from pages.store.published import PUBLISHED
+from pages.store.published import PUBLISHED, as_printed
 from pages.store.tables import days
 
 PICTURE = RESULTS / "minutes.svg"
 METRICS = {"psnr_full": ("PSNR full, dB", "{:.2f}"), "ssim_full": ("SSIM", "{:.4f}"), "lpips": ("LPIPS", "{:.4f}")}
+PUBLISHED_ROW = "as published"
 LEVELS = {"two_neighbours": "blend", "flow_interpolation": "flow"}  # drawn baselines
 
 
@@ -82,7 +83,7 @@ def baselines(result: dict[str, Any]) -> dict[str, Any]:
 def levels(result: dict[str, Any]) -> dict[str, Any]:
     """Levels without a training: the baselines, and the numbers published for this clip."""
     published = next((row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]), None)
-    return baselines(result) | ({"as published": published} if published else {})
+    return baselines(result) | ({PUBLISHED_ROW: published} if published else {})
 
 
 def label(name: str) -> str:
@@ -102,7 +103,11 @@ def table(result: dict[str, Any]) -> str:
         for name, row in ordered(result).items()
     ]  # fmt: skip
     for name, row in levels(result).items():
-        rows.append([name, *["-"] * 5, *(form.format(row[key]) for key, (_, form) in METRICS.items())])
+        of = [
+            as_printed(key, row[key]) if name == PUBLISHED_ROW else form.format(row[key])
+            for key, (_, form) in METRICS.items()
+        ]
+        rows.append([name, *["-"] * 5, *of])
     return markdown(headings, rows)
 
 

@@ -6,7 +6,6 @@
 # A record of a page is complete, or the KeyError says what it lacks.
 # pyright: reportTypedDictNotRequiredAccess=false
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -22,7 +21,7 @@ from pages.claims.rules import (
     unless_few,
 )
 from pages.store.intervals import Interval, student
-from pages.store.published import MATCHED_LPIPS, MATCHED_PSNR, PRIOR, PUBLISHED
+from pages.store.published import MATCHED_LPIPS, MATCHED_PSNR, PRIOR, PUBLISHED, as_printed
 
 NOT_YET = "Not measured yet."
 FULL = "A+S+L"
@@ -139,8 +138,7 @@ def _row(claim: list[str], estimate: Estimate | None, metric: Metric, verdict: A
 
 def _level_row(found: Record, clip: str, key: str, of: str, unit: float) -> list[str]:
     metric, published = METRICS[key], PUBLISHED[clip][of]
-    digits = round(-math.log10(unit))  # as printed: 0.980, not 0.98
-    claim = [f"Level: {metric.label}", FULL, f"{published:.{digits}f}{' dB' if 'dB' in metric.form else ''}"]
+    claim = [f"Level: {metric.label}", FULL, f"{as_printed(of, published)}{' dB' if 'dB' in metric.form else ''}"]
     values = list(runs_of(found, FULL, key).values())
     if not values:
         return [*claim, NOT_YET, "-", "-", "-", "-", "-"]

@@ -20,12 +20,15 @@ from pages.full_size.interpolation import LEFT_OUT, frames_text, tissue_only
 from pages.store.commands import loaded
 from pages.store.intervals import interval
 from pages.store.program import RESULTS, RUN, Program
-from pages.store.published import PUBLISHED
+from pages.store.published import PUBLISHED, as_printed
 
 EVERY_EIGHTH = "every eighth frame"
 CLIPS = ("pulling", "cutting")
 PLANNED = {"pulling": {"paper": 3, "sharp": 3}, "cutting": {"paper": 5, "quick": 3, "sharp": 3}}  # seeds of a preset
-MORE = "[All runs, with blocks of frames held out, machine and times](docs/results/README.md). ± is a 95 % interval."
+MORE = (
+    "[All runs, with blocks of frames held out, machine and times](docs/results/README.md). ± is a 95 % interval over "
+    "the seeds."
+)
 RANGE = "The paper does not state the input range of its LPIPS, so the published value stands in both columns."
 COLUMNS = (
     ("psnr_full", "PSNR full, dB", "{:.2f}"),
@@ -115,6 +118,8 @@ def cell(values: list[dict], key: str, form: str) -> str:
     numbers = [row[key] for row in values if row.get(key) is not None]
     if not numbers:
         return "-"
+    if "label" in values[0]:  # a published row
+        return as_printed(key, numbers[0])
     mean, half = interval(numbers)
     return form.format(mean) + (f" ± {form.format(half)}" if len(numbers) > 1 else "")
 

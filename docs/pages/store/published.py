@@ -22,6 +22,7 @@ PUBLISHED: dict[str, LabelledMeans] = {  # whole image, every eighth frame held 
         "lpips": 0.019,
     },
 }
+DIGITS = {"psnr_full": 2, "ssim_full": 3, "lpips": 3, "lpips_symmetric": 3}  # after the point, as printed
 MEANS_ON_TISSUE: dict[str, tuple[float, float, float]] = {  # its table of components: PSNR, SSIM, LPIPS, both clips
     "base": (38.08, 0.9537, 0.0309),
     "S": (38.12, 0.9540, 0.0302),
@@ -32,6 +33,11 @@ MATCHED_PSNR = (0.31, 0.66)  # dB over SurgicalGS with matched input: smallest a
 MATCHED_LPIPS = (-0.0096, -0.0035)
 PRIOR = (0.005, -0.002)  # dB, the change by the Matérn prior at a fixed representation and count, one seed each
 SURGICALGS = 38.03  # dB, whole image, pulling
+
+
+def as_printed(key: str, value: float) -> str:
+    """A published value with the digits of the paper."""
+    return f"{value:.{DIGITS[key]}f}"
 
 
 class Printed(NamedTuple):

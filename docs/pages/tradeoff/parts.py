@@ -144,7 +144,7 @@ def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
         "Gaussians",
         "`paper`: RMS",
         "`paper`: largest",
-        "error over cutoff, at most",
+        "error over cutoff without a stop, at most",
         "smallest error of float32",
         "8-bit setting: largest",
         "its visits",

@@ -34,9 +34,9 @@ def advice(result: dict[str, Any]) -> list[str]:
         )
     if result["joint"]:
         sentences.append(
-            f"For a largest error below {levels(float32_floor(result))} use float64. Its error is here at most "
-            f"{error_over_cutoff(result):.1f} times the cutoff. `exact` serves as the reference and is too slow for "
-            "other work."
+            f"For a largest error below {levels(float32_floor(result))} use float64. Without a stop its error is here "
+            f"at most {error_over_cutoff(result):.1f} times the cutoff. `exact` serves as the reference and is too "
+            "slow for other work."
         )
     return sentences
 
@@ -51,19 +51,19 @@ def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def error_over_cutoff(result: dict[str, Any]) -> float:
-    """Largest error over the cutoff, in float64, where the cutoff limits the error: at the tightest stop, below it."""
-    rasters = [(p["error"]["max"], p["setting"]["raster"]) for p in _joint(result, "float64")]
-    ratios = [
-        error / raster["alpha_cutoff"]
-        for error, raster in rasters
-        if raster["transmittance_stop"] <= 1e-6 and raster["alpha_cutoff"] > raster["transmittance_stop"]
-    ]
-    return max(ratios, default=float("nan"))
+    """Largest error over the cutoff in float64 without a stop, over the measured values of the cutoff alone.
+
+    With a stop the smaller cutoffs would be charged with the error of the stop.
+    """
+    names = {name for dial in result["dials"] if dial["name"] == "cutoff" for name in dial["points"].values()}
+    points = [point for point in result["points"] if point["name"] in names]
+    return max((p["error"]["max"] / p["setting"]["raster"]["alpha_cutoff"] for p in points), default=float("nan"))
 
 
 def float32_floor(result: dict[str, Any]) -> float:
-    """The smallest largest error of the sweep in float32."""
-    return min((p["error"]["max"] for p in _joint(result, "float32")), default=float("nan"))
+    """The smallest largest error of all measured settings in float32."""
+    errors = (p["error"]["max"] for p in result["points"] if p["setting"]["precision"] == "float32")
+    return min(errors, default=float("nan"))
 
 
 DIAL_COLUMNS = ("Dial", "Value", "frame", "with reverse", "work", "largest error", "worst gradient block")
@@ -135,14 +135,15 @@ def summary(result: dict[str, Any]) -> list[str]:
     if "float64" in ends:
         chance = abs(ends["float64"][1] - ends["base"][1])
         lines.append(
-            "Noise: each run has one seed. `float64` differs from `base` only by rounding and ends "
+            "Noise: each run has one seed and was timed once. `float64` differs from `base` only by rounding and ends "
             f"{chance:.2f} dB from it. Read nothing into smaller differences."
         )
     for name, (seconds, psnr) in ends.items():
         better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
         if better:
             lines.append(
-                f"*{name}* is slower than the following, and worse by more than this difference: {', '.join(better)}."
+                f"*{name}* took longer than the following, and is worse by more than this difference: "
+                f"{', '.join(better)}."
             )
     return lines
 

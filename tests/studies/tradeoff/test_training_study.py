@@ -138,7 +138,7 @@ def test_a_training_is_beaten_only_beyond_chance():
     }
     chance, beaten = summary(result)
     assert "ends 0.50 dB from it" in chance
-    assert beaten == "*slow* is slower than the following, and worse by more than this difference: base."
+    assert beaten == "*slow* took longer than the following, and is worse by more than this difference: base."
     del result["configurations"][0]
     assert summary(result) == []
 
