@@ -1,12 +1,14 @@
 """The answer of the claims and the sentences beside it: none says more than its records, whatever they hold."""
 
 import json
+import re
 
 import pytest
 from pages.bench import minutes
 from pages.claims import page as claims
 from pages.claims.answer import _decided, _stands, splits, with_other_weights
 from pages.claims.estimates import Estimate, contrast
+from pages.claims.rules import LEAST_PAIRS
 from pages.claims.verdicts import CLIPS
 from pages.full_size import record
 
@@ -77,6 +79,8 @@ def test_what_the_page_says_of_the_prior():
 def test_the_sentence_of_the_power_names_its_clip(made):
     said = made["power"]
     assert "spread of EndoNeRF pulling, 3 seeds" in said and "most likely" not in said
+    needed = [int(count) for count in re.findall(r" dB: (\d+)", said)]
+    assert len(needed) == 5 and min(needed) == LEAST_PAIRS == 3, "with fewer there is no verdict"
 
 
 def test_the_answer_names_the_level_with_other_weights_of_ssim():

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.results.report.tables import markdown
 from pages.store.commands import loaded
 from pages.store.intervals import blocks, paired
 from pages.store.program import RESULTS, Program
@@ -101,7 +100,10 @@ def psnr() -> str:
 
 def lpips() -> str:
     """LPIPS, one row for each length of the gap."""
-    return markdown((f"{MISSING}, LPIPS", *NAMES.values(), "`sharp`"), [row_of_lpips(gap) for gap in GAPS])
+    about = (
+        "LPIPS with its input in [0, 1], mean over the held-out frames; clip, frames and seeds as in the table of PSNR."
+    )
+    return noted((f"{MISSING}, LPIPS", *NAMES.values(), "`sharp`"), [row_of_lpips(gap) for gap in GAPS], about)
 
 
 PROGRAM = Program(__name__, ("../README.md", "interpolation.md"), {"psnr": psnr, "lpips": lpips}, room="gaps")

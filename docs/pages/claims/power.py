@@ -11,6 +11,7 @@ import numpy as np
 
 from endotsr.studies.sweeps.ablation import BOTH, COMPARISONS, FIXED
 from pages.claims.estimates import spread as variance
+from pages.claims.rules import LEAST_PAIRS
 
 POWER, LEVEL = 0.8, 0.05
 NAMES = {"ssim_tissue": "SSIM of tissue", "lpips": "LPIPS"}
@@ -83,13 +84,15 @@ def sentences(found: Record | None, clip: str) -> str:
     )
     gains = [(c.claim, clip, of["psnr_full"]) for c in COMPARISONS for clip, of in c.published.items()]
     needed = ", ".join(
-        f"{claim}{'' if clip == BOTH else f' ({clip})'} {gain:+.2f} dB: {pairs_needed(gain / spreads[kind_of(claim)])}"
+        f"{claim}{'' if clip == BOTH else f' ({clip})'} {gain:+.2f} dB: "
+        f"{max(LEAST_PAIRS, pairs_needed(gain / spreads[kind_of(claim)]))}"
         for claim, clip, gain in gains
     )
     return (
         f"**Power.** With the spread of {clip}, {pairs} seeds distinguish a true difference from 0 with a probability "
         f'of {100 * POWER:.0f} % if it is {seen}, and a smaller one less often: "not decided" does not mean that '
-        f"there is none. With this spread and this probability the published gains need this many seeds: {needed}."
+        f"there is none. With this spread and this probability the published gains need this many seeds, "
+        f"at least {LEAST_PAIRS} for a verdict: {needed}."
     )
 
 

@@ -115,9 +115,9 @@ def _without_tracks(plan: dict[str, Any], bench: dict[str, Any] | None) -> str:
     return (
         " The reason is that all presets but `paper` need the Fourier translation (`model.spectral_motion`) for the "
         "tracked motion {eq}`eq-b15`. As the motion of this clip has no rate, the "
-        "[plan for `paper`](#two-real-clips) switches this component off. As measured below, that saves "
-        f"{part['saved']:.0%} of the time of an iteration and {part['memory_saved']:.0%} of the memory of the "
-        "Gaussians."
+        "[plan for `paper`](#two-real-clips) switches this component off. In the measurement of the table below, which "
+        f"is not of this clip, that saves {part['saved']:.0%} of the time of an iteration and "
+        f"{part['memory_saved']:.0%} of the memory of the Gaussians."
     )
 
 
