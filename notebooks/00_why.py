@@ -109,7 +109,8 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# The definition of one iteration is short enough to read now. The figure above names the chapters of its stages.
+# The definition of the loss and the gradients of one view is short enough to read now. The figure above names the chapters
+# of its stages, and {doc}`14_full_sequence` has the rest of an iteration.
 #
 # <!-- definition: endotsr.definition.view.view_gradients -->
 # ```python

@@ -155,6 +155,7 @@ for factor in (1e-300, 1e-30, -1.0, 1e300):
     )
 assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(3))
 np.testing.assert_allclose(covariance_forward(q, s + 60)[0].scale, np.exp(40.0))
+np.testing.assert_allclose(covariance_forward(q, s - 60)[0].scale, np.exp(-40.0))
 
 # %% [markdown]
 # ## The reverse pass, line by line
@@ -303,6 +304,9 @@ np.testing.assert_allclose(
 at_zero, clipped = covariance_forward(0 * q, s)[1], covariance_forward(q, s + 60)[1]
 assert not covariance_reverse(Shape(g_R, g_S), at_zero).d_quaternion.any()
 assert not covariance_reverse(Shape(g_R, g_S), clipped).d_log_scale.any()
+for limit in (-40.0, 40.0):
+    at_limit = covariance_forward(q, 0 * s + limit)[1]
+    assert covariance_reverse(Shape(g_R, g_S), at_limit).d_log_scale.all(), "it passes at +-40"
 
 # %% [markdown]
 # ## Figure: a shape found by its gradient

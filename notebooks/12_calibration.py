@@ -39,12 +39,11 @@
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 
 import matplotlib.pyplot as plt
-import msgspec
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from endotsr.clips.simulator import SimulatorSettings, simulate
-from endotsr.config import PAPER
+from endotsr.config import PAPER, config_from_dict
 from endotsr.definition import calibration as definition
 from endotsr.errors import CalibrationError
 from endotsr.method.equations.calibration import calibrate, calibration_views, rms
@@ -324,4 +323,5 @@ of_blur, of_plus = (
 print(f"errors of one size: {of_blur:.2f} with the signs of a blur, {of_plus:.2f} all positive")
 assert of_plus > 1.5 * of_blur
 # The setting that enables the calibration.
-assert msgspec.structs.replace(PAPER.loss, lambda_lap="auto").lambda_lap == "auto"
+calibrating = config_from_dict({"preset": "paper", "loss": {"lambda_lap": "auto"}})
+assert calibrating.loss.lambda_lap == "auto"

@@ -374,8 +374,8 @@ plt.show()
 # ## The reverse pass: a check that can fail
 #
 # The gradient check is applied to one correct reverse pass and to four wrong ones: a flipped sign, a gradient that is
-# too large by one thousandth, a zero gradient, and one missing Gaussian. It must refuse all four and report where the
-# error is.
+# too large by one thousandth, a zero gradient, and one missing Gaussian, which has the index 2. It must refuse all four
+# and name the slice of the missing Gaussian.
 
 # %%
 pair = all_pairs()["matern_penalty"]
@@ -405,9 +405,10 @@ with one_thread():
             inputs,
             hard={"motion_coefficients": np.arange(inputs["motion_coefficients"].size)},
         )
-        verdict = "accepted" if report.passed else f"refused: {report.failures[0][:90]}"
+        verdict = "accepted" if report.passed else f"refused: {report.failures[-1][:90]}"
         print(f"{name:14s} {verdict}")
         assert report.passed == (name == "right")
+        assert ("slice [:, :, 2]" in verdict) == (name == "one forgotten")
 
 # %% [markdown]
 # The next cell checks the whole render, in float64 against differences and in float32 against float64:

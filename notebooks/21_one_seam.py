@@ -124,7 +124,9 @@ colour = lambda part: scene.window(part.window).render(part.time, camera).colour
 for g in (begin, begin + 2.5, end):
     w = (g - begin) / (end - begin)
     two = [part for part in scene.parts(g) if part.weight > 0]
-    np.testing.assert_allclose(sum(part.weight for part in two), 1)
+    weights = {part.window: part.weight for part in two}
+    found = [weights.get(window, 0) for window in (0, 1)]
+    np.testing.assert_allclose(found, [1 - w, w], atol=1e-12)  # (21.1)
     expected = sum(part.weight * colour(part) for part in two)
     np.testing.assert_allclose(
         scene.render(g / plan.frames, camera).colour, expected, atol=1e-6
