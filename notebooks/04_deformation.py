@@ -130,11 +130,10 @@ np.testing.assert_allclose(found, [0.91, 1.18, 1.8, 3.2], rtol=0.02)
 # ## Figure: which times do the bases cover?
 #
 # At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
-# with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the published width of
-# 0.01 there are times at which no basis exceeds 0.001. How many frames of a clip of 63 lie at such times: none, a few, or a
-# quarter? These frames add little to the gradients of the weights at first. Training can widen the bases later, as step
-# (4.5) below shows.
-# The preset `sharp` starts at the width 0.05 and has no such gaps.
+# with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the width 0.01 of the
+# preset `paper` there are times at which no basis exceeds 0.001. How many frames of a clip of 63 lie at such times: none,
+# a few, or a quarter? These frames add little to the gradients of the weights at first. Training can widen the bases
+# later, as step (4.5) below shows. The preset `sharp` starts at the width 0.05 and has no such gaps.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
