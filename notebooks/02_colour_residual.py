@@ -106,6 +106,8 @@ frames = [
 contrast = max(frame.max() - frame.min() for frame in frames)
 moved = max(np.abs(frame - frames[0]).max() for frame in frames)
 print(f"contrast within a frame {contrast:.2f}, change over time {moved:.2f}, bound {beta}")
+waves = [np.sin(2 * np.pi * t + 40 * place) for t in stamps]  # they move with time
+assert min(np.corrcoef(wave, frame)[0, 1] for wave, frame in zip(waves, frames)) > 0.99
 assert round(contrast, 2) == round(moved, 2) == 0.28 and np.abs(frames).max() < beta
 
 # %% [markdown]

@@ -124,8 +124,8 @@ for part in ("residual", "log_scale", "quaternion", "opacity_logit"):
 #
 # **(19.2) Do the flows agree?** Exact flows lead back to the start: $h(x)+g(x')=0$. The limit allows an error that
 # grows with the motion, and a constant one of some fraction of a pixel. The point stays followed if
-# $\lVert h(x)+g(x')\rVert^2\le0.02\,\lVert h(x)\rVert^2+0.5$ px². If the backward flow ends on another piece of tissue,
-# as it may at an occlusion, the test fails.
+# $\lVert h(x)+g(x')\rVert^2\le0.02\,\lVert h(x)\rVert^2+0.5$ px². If the backward flow ends far from $x$, as it may at
+# an occlusion, the test fails.
 #
 # **(19.3) Is it the same surface?** The four pixels around $x'$ must be tissue with a prior depth, and the depth may
 # change by at most 20 %<!--=tracks.depth-->. A masked instrument in front of the tissue fails the first test, and a
