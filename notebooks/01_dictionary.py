@@ -84,7 +84,7 @@ from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_strea
 # def dictionary_forward(t, omega):
 #     """Equation (1): phi (2F,), all sines, then all cosines, at normalised time t.
 #
-#     Quarter turns are removed first: for a sine of 1e-16 instead of 0, Adam would move A and C by a full step.
+#     Quarter turns are removed first: a sine of 1e-16 instead of 0 would give C a gradient, and Adam would move it.
 #     """
 #     turns = omega * t
 #     quarters = np.rint(4 * turns.real)

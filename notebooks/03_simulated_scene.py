@@ -200,7 +200,10 @@ plt.show()
 # <!-- definition: endotsr.definition.initialisation.drawn_pixels -->
 # ```python
 # def drawn_pixels(sequence, config, rng):
-#     """(frame, flat indices): pixels of the first training frame, then new or moved pixels of the others."""
+#     """(frame, flat indices): pixels of the first training frame, then new or moved pixels of the others, ascending.
+#
+#     Draws: one `rng.choice` in each frame with more of these pixels than are wanted.
+#     """
 #     usable = sequence.masks & (sequence.depth > 0) & np.isfinite(sequence.depth)
 #     first, count = sequence.train_index[0], len(sequence.images)
 #     for k in sequence.train_index:

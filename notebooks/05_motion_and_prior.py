@@ -132,7 +132,7 @@ assert [round(at_distance[k], 2) for k in (1, 2, 3)] == [0.52, 0.14, 0.03]
 # <!-- definition: endotsr.definition.matern.matern_weights -->
 # ```python
 # def matern_weights(omega, length):
-#     """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) and the correlation length, as printed.
+#     """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) > 0 and the correlation length >= 0, as printed.
 #
 #     The kernel first divides by the largest frequency, which avoids overflow. At 1e-40 every rho rounds to 1 already.
 #     """

@@ -224,7 +224,10 @@ np.testing.assert_allclose(covariance_forward(q, s - 60)[0].scale, np.exp(-40.0)
 # <!-- definition: endotsr.definition.covariance.rotation_reverse -->
 # ```python
 # def rotation_reverse(q, g):
-#     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N)."""
+#     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N).
+#
+#     That of the printed nine entries is less by 2 trace(g) q, and (6.8) removes any multiple of q.
+#     """
 #     w, v = q[0], q[1:]
 #     trace = np.einsum("iin->n", g)
 #     spin = np.einsum("ijn,ijk->kn", g, CROSS)  # (6.5)

@@ -112,7 +112,8 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 # def projection_forward(position, shape, camera, settings):
 #     """Equation (B3): Projected of centres (3, N); cov = J W Sigma W^T J^T + low-pass, det = a c - b^2.
 #
-#     The kernel sums the determinant from nonnegative terms, and clips axes above 1e60 px.
+#     a c - b^2 loses digits for a needle, which the kernel avoids by a sum of nonnegative terms. The kernel clips axes
+#     above 1e60 px (1e8 px in float32) and draws no Gaussian with |u| or |v| above it; here this limit is infinite.
 #     """
 #     point = camera.rotation @ position + camera.translation[:, None]
 #     visible = point[2].real > settings.near  # ruling "near plane"
@@ -499,7 +500,7 @@ for name in ("position", "rotation", "scale"):
 # <!-- definition: endotsr.definition.pose.exponential -->
 # ```python
 # def exponential(matrix):
-#     """Taylor series of exp(matrix / 2^s), squared s times. The kernel uses the closed form for 3 x 3."""
+#     """Taylor series of exp(matrix / 2^s), squared s times. The kernel has the closed form for 3 x 3."""
 #     halvings = max(0, int(np.ceil(np.log2(np.abs(matrix).sum() + 1))))
 #     term = total = np.eye(len(matrix))
 #     for k in range(1, 20):
@@ -519,7 +520,7 @@ for name in ("position", "rotation", "scale"):
 # <!-- definition: endotsr.definition.pose.pose_reverse -->
 # ```python
 # def pose_reverse(d_rotation, d_translation, saved):
-#     """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]^T."""
+#     """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]_x^T."""
 #     rotation, translation, vector = saved
 #     k = (CROSS @ vector).T
 #     g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (7.12)

@@ -159,7 +159,8 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # def composite_forward(projected, opacity_logit, colour, settings, background, width, height):
 #     """Equation (B5): Composite of Gaussians on the screen; colour (3, N), background (3,), logits (N,).
 #
-#     The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles.
+#     The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles. A
+#     colour that is not finite reaches all pixels here, and in the kernels those near its Gaussian.
 #     """
 #     layers, t = layers_of(projected, opacity_logit, settings, width, height)
 #     image = t * background[:, None, None]

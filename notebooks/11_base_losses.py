@@ -214,7 +214,10 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # <!-- definition: endotsr.definition.depth.normalised_depth_forward -->
 # ```python
 # def normalised_depth_forward(rendered_depth, target):
-#     """Equation (B8): each depth is divided by its maximum; 0 below 10 valid pixels or for an empty render."""
+#     """Equation (B8): each depth is divided by its maximum; 0 below 10 valid pixels or for an empty render.
+#
+#     The maximum is over the finite depths of the whole image, excluded pixels included.
+#     """
 #     largest = np.where(np.isfinite(rendered_depth), rendered_depth, 0).max()
 #     if target.count < 10 or largest <= 0:
 #         return 0.0, DepthSaved(rendered_depth, 0.0, 0 * target.normalised, 1)
@@ -226,7 +229,7 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # <!-- definition: endotsr.definition.smoothness.squared_steps -->
 # ```python
 # def squared_steps(depth, smooth):
-#     """Q and its derivative (H, W): squared differences of smooth neighbours, over the number of smooth pixels."""
+#     """Q and its derivative (H, W): squared steps between smooth neighbours, over 1e-6 + the number of smooth pixels."""
 #     total = 0.0
 #     gradient = np.zeros_like(depth)
 #     number = smooth.sum() + 1e-6
@@ -241,7 +244,7 @@ assert masked_ssim_forward(I_hat, ssim_target(I, nothing))[0] == 1
 # <!-- definition: endotsr.definition.smoothness.total_variation -->
 # ```python
 # def total_variation(image, mask):
-#     """TV of an image (C, H, W) that is 0 on tissue, and its derivative, 0 on tissue; sign(0) = 0."""
+#     """TV of an image (C, H, W), set to 0 on tissue first, and its derivative, 0 on tissue; sign(0) = 0."""
 #     outside = np.where(mask, 0, image)
 #     total = 0.0
 #     gradient = np.zeros_like(outside)

@@ -112,14 +112,14 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # <!-- definition: endotsr.definition.calibration.calibration_views -->
 # ```python
 # def calibration_views(n_train, count):
-#     """Distinct ascending positions within the training frames, rounded half to even."""
+#     """Distinct ascending positions within n_train >= 1 training frames, rounded half to even."""
 #     return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(int))
 # ```
 #
 # <!-- definition: endotsr.definition.calibration.calibrate -->
 # ```python
 # def calibrate(views, gradient_ratio):
-#     """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or without finite numbers is dropped.
+#     """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or no finite ratio is dropped.
 #
 #     Raises: ValueError if no view remains, or the median is 0 or too small to divide by.
 #     """

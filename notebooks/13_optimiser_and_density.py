@@ -369,7 +369,10 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # <!-- definition: endotsr.definition.density_control.densify -->
 # ```python
 # def densify(gaussians, statistics, config, rng, extent, remaining=1):
-#     """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
+#     """Equation (B11): prune, clone and split, with `remaining` runs left, this one included.
+#
+#     Draws: one `rng.standard_normal((2, 3, splits))`, none without a split.
+#     """
 #     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
 #     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
 #     by_threshold = config.growth == "threshold"
@@ -394,7 +397,10 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # <!-- definition: endotsr.definition.density_control.with_children -->
 # ```python
 # def with_children(gaussians, noise):
-#     """Move the last Gaussians, copies of their parents, to samples of the parents and shrink them by 1.6."""
+#     """Move the last Gaussians, copies of their parents, to samples of the parents and shrink them by 1.6.
+#
+#     noise (2, 3, splits) [child, axis, parent]: all first children come before all second ones.
+#     """
 #     noise = np.concatenate(noise, axis=1)
 #     children = slice(gaussians.opacity_logit.size - noise.shape[1], None)
 #     rotation = rotation_of(unit(gaussians.quaternion[:, children])[0])

@@ -69,7 +69,10 @@ rng = np.random.default_rng(20)
 # <!-- definition: endotsr.definition.density_control.densify -->
 # ```python
 # def densify(gaussians, statistics, config, rng, extent, remaining=1):
-#     """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
+#     """Equation (B11): prune, clone and split, with `remaining` runs left, this one included.
+#
+#     Draws: one `rng.standard_normal((2, 3, splits))`, none without a split.
+#     """
 #     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
 #     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
 #     by_threshold = config.growth == "threshold"

@@ -7,7 +7,8 @@ may take more: types, timers, gradients that can be left out. Six take others: `
 takes packed records and tile lists), `rotation_of` and `rotation_reverse` (four numbers in place of an array),
 `exponential` (of a matrix here), `calibrated_weight` and `train` (they continue a state). A tuple that exists in both
 has the same fields, but for `Calibration`, `ViewGradients` and saved tuples, which keep what their own reverse pass
-reads. Most functions accept complex input: branches compare real parts.
+reads. Apart from `calibrate`, no function here raises an error of its own: the checks that a contract lists under
+*Raises* are those of the twin. Most functions accept complex input: branches compare real parts.
 
     dictionary (1)  appearance (2)  motion (3)  matern (4)  laplacian (5)  objective (6)  calibration (7)
     deformation (B1)  covariance (B2)  projection (B3)  harmonics (B4)  compositing (B5)  render (B2)-(B5)

@@ -1,4 +1,4 @@
-"""`python -m endotsr.definition`: trains the scene of `simulate` and prints loss and held-out PSNR."""
+"""`python -m endotsr.definition`: trains the scene of `simulate` and prints its losses and its PSNR."""
 
 import numpy as np
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-SMALLEST = 1.1754943508222875e-38  # a smaller first moment becomes 0
+SMALLEST = 1.1754943508222875e-38  # a first moment of smaller absolute value becomes 0
 
 
 def adam_state(parameters):
@@ -20,7 +20,10 @@ def adam_step(parameter, gradient, first, second, step, learning_rate, beta1, be
 
 
 def adam_update(state, parameters, gradients, rates, beta1, beta2, epsilon):
-    """New (state, parameters) after one step of the arrays that have a gradient; the others are unchanged."""
+    """New (state, parameters) after one step of the arrays that have a gradient; the others are unchanged.
+
+    A rate is a number, or ((slice of the leading axis, rate), ...), as `learning_rates` gives it.
+    """
     state = dict(state)
     parameters = dict(parameters)
     for name, gradient in gradients.items():

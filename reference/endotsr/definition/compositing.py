@@ -4,8 +4,8 @@ from collections import namedtuple
 
 import numpy as np
 
-Composite = namedtuple("Composite", "colour depth opacity transmittance")  # Images of one view.
-Layer = namedtuple("Layer", "index dx dy value alpha front taken")  # One Gaussian at every pixel, (H, W) each.
+Composite = namedtuple("Composite", "colour depth opacity transmittance")  # (3, H, W), then (H, W) each.
+Layer = namedtuple("Layer", "index dx dy value alpha front taken")  # One Gaussian; (H, W) each but index.
 CompositeSaved = namedtuple("CompositeSaved", "projected opacity_logit colour settings background layers transmittance")
 CompositeGrads = namedtuple("CompositeGrads", "d_mean2d d_covariance2d d_opacity_logit d_colour d_depth d_background")
 
@@ -89,7 +89,8 @@ def layers_of(projected, opacity_logit, settings, width, height):
 def composite_forward(projected, opacity_logit, colour, settings, background, width, height):
     """Equation (B5): Composite of Gaussians on the screen; colour (3, N), background (3,), logits (N,).
 
-    The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles.
+    The kernels divide the image into tiles. They write q as a sum of squares, which stays accurate for needles. A
+    colour that is not finite reaches all pixels here, and in the kernels those near its Gaussian.
     """
     layers, t = layers_of(projected, opacity_logit, settings, width, height)
     image = t * background[:, None, None]

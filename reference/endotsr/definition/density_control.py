@@ -25,7 +25,7 @@ def gather_statistics(statistics, d_mean, visible, width, height):
 
 
 def scene_extent(config, cameras):
-    """Scene units: a number, or 1.1 x the largest distance of a camera from their mean."""
+    """Scene units: a number, or 1.1 x the largest distance of a camera from their mean, 0 for a static camera."""
     if config.extent != "cameras":
         return config.extent
     centres = np.array([-camera.rotation.T @ camera.translation for camera in cameras])
@@ -33,7 +33,10 @@ def scene_extent(config, cameras):
 
 
 def densify(gaussians, statistics, config, rng, extent, remaining=1):
-    """Equation (B11): prune, clone and split, with `remaining` runs left; draws (2, 3, splits) normal numbers."""
+    """Equation (B11): prune, clone and split, with `remaining` runs left, this one included.
+
+    Draws: one `rng.standard_normal((2, 3, splits))`, none without a split.
+    """
     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
     by_threshold = config.growth == "threshold"
@@ -56,7 +59,10 @@ def densify(gaussians, statistics, config, rng, extent, remaining=1):
 
 
 def with_children(gaussians, noise):
-    """Move the last Gaussians, copies of their parents, to samples of the parents and shrink them by 1.6."""
+    """Move the last Gaussians, copies of their parents, to samples of the parents and shrink them by 1.6.
+
+    noise (2, 3, splits) [child, axis, parent]: all first children come before all second ones.
+    """
     noise = np.concatenate(noise, axis=1)
     children = slice(gaussians.opacity_logit.size - noise.shape[1], None)
     rotation = rotation_of(unit(gaussians.quaternion[:, children])[0])

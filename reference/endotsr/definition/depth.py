@@ -10,14 +10,17 @@ DepthSaved = namedtuple("DepthSaved", "rendered_depth largest sign count")
 
 
 def depth_target(prior_depth, mask):
-    """Prior depth (H, W) in scene units; 0, negative or not finite = no depth."""
+    """Prior depth (H, W) in scene units; 0, negative or not finite = no depth. The maximum is of the whole image."""
     known = np.isfinite(prior_depth) & (prior_depth > 0)
     prior = np.where(known, prior_depth, 0)
     return DepthTarget(prior / (prior.max() or 1), known & mask, (known & mask).sum())
 
 
 def normalised_depth_forward(rendered_depth, target):
-    """Equation (B8): each depth is divided by its maximum; 0 below 10 valid pixels or for an empty render."""
+    """Equation (B8): each depth is divided by its maximum; 0 below 10 valid pixels or for an empty render.
+
+    The maximum is over the finite depths of the whole image, excluded pixels included.
+    """
     largest = np.where(np.isfinite(rendered_depth), rendered_depth, 0).max()
     if target.count < 10 or largest <= 0:
         return 0.0, DepthSaved(rendered_depth, 0.0, 0 * target.normalised, 1)

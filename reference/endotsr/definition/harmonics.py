@@ -60,7 +60,10 @@ def directions(position, centre):
 
 
 def harmonics_forward(harmonics, residual, position, centre, degree):
-    """Equation (B4): display colour (3, N), clamped to at least 0."""
+    """Equation (B4): display colour (3, N), clamped to at least 0.
+
+    From coefficients (K, 3, N), K >= (degree + 1)^2, residual (3, N) or None, positions (3, N) and the centre (3,).
+    """
     terms = (degree + 1) ** 2
     y = basis(directions(position, centre)[0], terms)
     colour = 0.5 + np.einsum("kn,kcn->cn", y, harmonics[:terms]) + (0 if residual is None else Y00 * residual)
@@ -72,7 +75,7 @@ def harmonics_reverse(d_colour, saved):
     """Reverse of (B4): through the coefficients and through the viewing direction."""
     harmonics, residual, position, centre, degree, clamped = saved
     terms = (degree + 1) ** 2
-    g = np.where(clamped, 0, d_colour)  # ruling "harmonics": clamped at 0, gradient 0 there; (8.1)
+    g = np.where(clamped, 0, d_colour)  # ruling "harmonics": gradient 0 where below 0; (8.1)
     n, inverse = directions(position, centre)
     d_harmonics = np.zeros_like(harmonics)
     d_harmonics[:terms] = np.einsum("kn,cn->kcn", basis(n, terms), g)  # (8.2)

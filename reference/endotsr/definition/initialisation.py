@@ -7,14 +7,20 @@ from endotsr.definition.scene import Gaussians
 
 
 def initialise(sequence, config, model, rng):
-    """Equation (B12): Gaussians of a sequence with images (n, 3, H, W) of 8 bit, masks and depth (n, H, W)."""
+    """Equation (B12): Gaussians of a sequence with images (n, 3, H, W) of 8 bit, masks and depth (n, H, W).
+
+    Without a drawn pixel there are N = 0 Gaussians; the twin raises an error.
+    """
     points = [lift(sequence, k, pixels) for k, pixels in drawn_pixels(sequence, config, rng)]
     position, colour = (np.concatenate(parts, axis=1) for parts in zip(*points))
     return gaussians_at(position, colour, model)
 
 
 def drawn_pixels(sequence, config, rng):
-    """(frame, flat indices): pixels of the first training frame, then new or moved pixels of the others."""
+    """(frame, flat indices): pixels of the first training frame, then new or moved pixels of the others, ascending.
+
+    Draws: one `rng.choice` in each frame with more of these pixels than are wanted.
+    """
     usable = sequence.masks & (sequence.depth > 0) & np.isfinite(sequence.depth)
     first, count = sequence.train_index[0], len(sequence.images)
     for k in sequence.train_index:
@@ -39,7 +45,10 @@ def lift(sequence, k, pixels):
 
 
 def neighbour_distance(position):
-    """(N,) mean squared distance to the 3 nearest others, from all pairwise distances. The fast path uses a tree."""
+    """(N,) mean squared distance to the 3 nearest others, from all pairwise distances. The fast path uses a tree.
+
+    With two or three points it is the mean over the others, with one point 0.
+    """
     squared = sum((axis[:, None] - axis) ** 2 for axis in position)
     return np.sort(squared, axis=1)[:, 1:4].sum(axis=1) / max(min(3, position.shape[1] - 1), 1)
 

@@ -8,7 +8,7 @@ MaternSaved = namedtuple("MaternSaved", "motion_coefficients rho")
 
 
 def matern_weights(omega, length):
-    """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) and the correlation length, as printed.
+    """Equation (4), upper line: rho (F,), mean 1, for frequencies (F,) > 0 and the correlation length >= 0, as printed.
 
     The kernel first divides by the largest frequency, which avoids overflow. At 1e-40 every rho rounds to 1 already.
     """

@@ -1,4 +1,7 @@
-"""Equations (M1) and (M2): PSNR and SSIM of a render (3, H, W) against a frame; mask (H, W) True = tissue."""
+"""Equations (M1) and (M2): PSNR and SSIM of a render (3, H, W) against a frame; mask (H, W) True = tissue.
+
+The caller clips the render to [0, 1]. Without tissue the values are those of empty means: infinity, NaN, 1 and 1.
+"""
 
 import numpy as np
 
@@ -6,7 +9,7 @@ from endotsr.definition.masked_ssim import masked_ssim_forward, ssim_target
 
 
 def psnr(render, truth, mask):
-    """Equation (M1): dB over the full image."""
+    """Equation (M1): dB over the full image, excluded pixels 0."""
     return -10 * np.log10((np.where(mask, render - truth, 0) ** 2).mean())
 
 

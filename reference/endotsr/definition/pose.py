@@ -11,7 +11,7 @@ PoseGrads = namedtuple("PoseGrads", "d_rotation d_translation d_rotation_vector 
 
 
 def exponential(matrix):
-    """Taylor series of exp(matrix / 2^s), squared s times. The kernel uses the closed form for 3 x 3."""
+    """Taylor series of exp(matrix / 2^s), squared s times. The kernel has the closed form for 3 x 3."""
     halvings = max(0, int(np.ceil(np.log2(np.abs(matrix).sum() + 1))))
     term = total = np.eye(len(matrix))
     for k in range(1, 20):
@@ -27,7 +27,7 @@ def pose_forward(rotation, translation, rotation_vector, offset):
 
 
 def pose_reverse(d_rotation, d_translation, saved):
-    """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]^T."""
+    """Reverse of (B16): the derivative of exp is the upper right block of exp [[K, G], [0, K]], K = [omega]_x^T."""
     rotation, translation, vector = saved
     k = (CROSS @ vector).T
     g = d_rotation @ rotation.T + np.outer(d_translation, translation)  # (7.12)

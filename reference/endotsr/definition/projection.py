@@ -9,7 +9,7 @@ from endotsr.definition.covariance import covariance_matrix
 # Pinhole camera: x_camera = rotation x_world + translation; x right, y down, z forward.
 Camera = namedtuple("Camera", "rotation translation fx fy cx cy width height")
 CameraGrads = namedtuple("CameraGrads", "d_rotation d_translation")
-# Gaussians on the screen; 0 where not visible.
+# Gaussians on the screen: u, v (2, N), a, b, c (3, N), their determinant, z and whether it is drawn (N,). 0 where not.
 Projected = namedtuple("Projected", "mean2d covariance2d determinant depth visible")
 ProjectionSaved = namedtuple("ProjectionSaved", "position shape camera settings visible")
 ProjectionGrads = namedtuple("ProjectionGrads", "d_position d_rotation d_scale d_camera")
@@ -33,7 +33,8 @@ def jacobian(point, camera, settings):
 def projection_forward(position, shape, camera, settings):
     """Equation (B3): Projected of centres (3, N); cov = J W Sigma W^T J^T + low-pass, det = a c - b^2.
 
-    The kernel sums the determinant from nonnegative terms, and clips axes above 1e60 px.
+    a c - b^2 loses digits for a needle, which the kernel avoids by a sum of nonnegative terms. The kernel clips axes
+    above 1e60 px (1e8 px in float32) and draws no Gaussian with |u| or |v| above it; here this limit is infinite.
     """
     point = camera.rotation @ position + camera.translation[:, None]
     visible = point[2].real > settings.near  # ruling "near plane"

@@ -17,7 +17,10 @@ def keys(s):
 
 
 def registration_forward(rotation, translation, points, reference, picture, camera):
-    """Equation (B19): residuals (M,) = I(pi(W x + d)) - reference of points (3, M) that the picture (H, W) shows."""
+    """Equation (B19): residuals (M,) = I(pi(W x + d)) - reference of points (3, M); 0 for a point out of view.
+
+    The points are finite. The picture is (H, W); of the camera, the intrinsics alone are read.
+    """
     x, y, z = rotation @ points + translation[:, None]
     safe, (height, width) = np.where(z > 0, z, 1), picture.shape
     u, v = camera.fx * x / safe + camera.cx - 0.5, camera.fy * y / safe + camera.cy - 0.5

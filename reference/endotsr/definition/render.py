@@ -12,7 +12,7 @@ from endotsr.definition.projection import CameraGrads, projection_forward
 
 # Raw parameters of N Gaussians at one time.
 Scene = namedtuple("Scene", "position quaternion log_scale opacity_logit harmonics residual", defaults=[None])
-RenderOut = namedtuple("RenderOut", "colour depth opacity")  # Images of one view.
+RenderOut = namedtuple("RenderOut", "colour depth opacity")  # Images of one view: (3, H, W), (H, W), (H, W).
 # The saved tuples of the stages.
 RenderSaved = namedtuple("RenderSaved", "covariance projection harmonics composite visible")
 RenderGrads = namedtuple(

@@ -1,4 +1,7 @@
-"""Equations (6) and (B10): every schedule, as a function of the iteration i = 1, 2, ... and the settings."""
+"""Equations (6) and (B10): the schedules as functions of the iteration i = 1, 2, ... and the settings.
+
+The rates of poses (B16) and of tracked motion (B15) before K_s are not among them.
+"""
 
 from endotsr.definition.exposure import EXPOSURES
 
@@ -44,7 +47,7 @@ def laplacian_ramp(iteration, config):
 
 
 def smoothness_active(iteration, config):
-    """[i >= i_s]."""
+    """[i >= i_s], False for the weight 0."""
     return config.loss.smoothness_weight > 0 and iteration >= config.loss.smoothness_from
 
 

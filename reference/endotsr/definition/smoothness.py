@@ -16,7 +16,7 @@ def steps_reverse(d_steps, axis):
 
 
 def squared_steps(depth, smooth):
-    """Q and its derivative (H, W): squared differences of smooth neighbours, over the number of smooth pixels."""
+    """Q and its derivative (H, W): squared steps between smooth neighbours, over 1e-6 + the number of smooth pixels."""
     total = 0.0
     gradient = np.zeros_like(depth)
     number = smooth.sum() + 1e-6
@@ -29,7 +29,7 @@ def squared_steps(depth, smooth):
 
 
 def total_variation(image, mask):
-    """TV of an image (C, H, W) that is 0 on tissue, and its derivative, 0 on tissue; sign(0) = 0."""
+    """TV of an image (C, H, W), set to 0 on tissue first, and its derivative, 0 on tissue; sign(0) = 0."""
     outside = np.where(mask, 0, image)
     total = 0.0
     gradient = np.zeros_like(outside)

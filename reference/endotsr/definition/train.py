@@ -54,7 +54,7 @@ def weights_at(iteration, config):
 
 
 def activated(state, config):
-    """The state with A and C added as zeros, with zero moments."""
+    """The state with those of A and C that are on added as zeros, with zero moments."""
     model = config.model
     gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
     return state._replace(gaussians=gaussians, adam=adam_state(arrays(gaussians)) | state.adam)
@@ -108,7 +108,7 @@ def controlled(state, sequence, config, rng):
 
 
 def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
-    """lambda_lap of equation (7), from training views rendered without A and S."""
+    """lambda_lap of equation (7), from training views rendered without A and S, and here without exposures (B13)."""
     base = gaussians._replace(appearance_coefficients=None, motion_coefficients=None)
     views = []
     chosen = calibration_views(len(sequence.train_index), config.loss.calibration_views)
@@ -124,7 +124,10 @@ def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
 
 
 def train(sequence, config, rng, raster=PAPER, on_iteration=lambda state, view: None):
-    """Gaussians and Spectral after all iterations, initialised from the depth of the training frames."""
+    """Gaussians and Spectral after all iterations, initialised from the depth of the training frames.
+
+    The edges of (B9) are empty, by `no_edges`; exposures (B13) are trained and not returned.
+    """
     exposures = no_exposures(config.model, len(sequence.train_index))
     state = start(initialise(sequence, config.initialisation, config.model, rng), exposures)
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
@@ -135,7 +138,7 @@ def train(sequence, config, rng, raster=PAPER, on_iteration=lambda state, view: 
 
 
 def evaluate(gaussians, spectral, sequence, config, indices, raster=PAPER):
-    """Mean PSNR (M1) over tissue of some frames, dB."""
+    """Mean PSNR (M1) over tissue of some frames, dB; the render is clipped to [0, 1] and has no exposure (B13)."""
     found = []
     for frame in (frame_of(sequence, k) for k in indices):
         scene, _ = scene_at(gaussians, spectral, config.model, frame.time)

@@ -56,6 +56,16 @@ def test_residuals_equal_their_definition(n, dtype):
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
+def test_each_product_and_each_sum_of_the_atoms_is_rounded(dtype):
+    coefficients, atoms, _ = case(1100, dtype)
+    expected = np.zeros((3, 1100), dtype)
+    for k, atom in enumerate(atoms):
+        expected = expected + atom * coefficients[:, k]
+    assert expected.dtype == dtype
+    np.testing.assert_array_equal(atom_sums.combine(coefficients, atoms), expected)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
 def test_hard_H3_a_tiny_residual_keeps_its_digits(dtype):
     """beta tanh(x) / Y00 relative to 8 u down to x = 1e-30; colour with it minus colour without it is 0 in float32."""
     x = np.geomspace(1e-30, 1e-9, 64).astype(dtype)

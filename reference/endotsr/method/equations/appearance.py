@@ -19,7 +19,7 @@ from endotsr.method.kernels.threads import parallel_for
 
 LN2_HIGH = 355.0 / 512.0  # ln 2 in nine bits: k * LN2_HIGH is exact for every exponent k of either precision
 LN2_LOW = -2.1219444005469058e-4  # ln 2 - LN2_HIGH
-SATURATED = 1e4  # exp(-1e4) is 0 in either precision
+SATURATED = 1e4  # exp(-1e4) is below the smallest number of either precision
 
 
 class AppearanceSaved(NamedTuple):
@@ -38,8 +38,9 @@ class AppearanceGrads(NamedTuple):
 
 
 def _exp_nonpositive(z):
-    """exp(-z) for z >= 0 by straight-line arithmetic, accurate to a few ulp even for large z.
+    """exp(-z) for z >= 0 by straight-line arithmetic, accurate to a few ulp down to the smallest normal number.
 
+    In place of a smaller exponential it returns a number between half of that number and that number.
     z = k ln 2 + r: the product k * LN2_HIGH is exact, so r keeps full precision; 2^(-z log2 e) would lose
     the digits of the integer part of z.
     """
@@ -54,7 +55,7 @@ _exp_nonpositive_kernel = jit(_exp_nonpositive)
 
 
 def _tanh_and_slope(x):
-    """tanh x and its derivative, both to a few ulp for every x.
+    """tanh x to a few ulp for all x, and its derivative to a few ulp up to |x| = 350 (float64) and 43 (float32).
 
     With e = exp(-2|x|): tanh |x| = (1 - e) / (1 + e) and tanh' = 4 e / (1 + e)^2. The textbook 1 - tanh^2
     loses every digit of a saturated residual (0 from x = 10 in float32), which could then never recover.

@@ -1,8 +1,8 @@
 """The sum over atoms that equations (2) and (3) share: out[c, i] = sum_a coefficients[c, a, i] atoms[a].
 
-In: coefficients (3, 2F, N), atoms (2F,). Out: (3, N). Atoms are summed in order with one rounding per step, so the
-result does not depend on the block size or the number of threads. The reverse pass sums over the Gaussians in float64,
-block by block.
+In: coefficients (3, 2F, N), atoms (2F,). Out: (3, N). Atoms are summed in order, and each product and each sum is
+rounded to the dtype of the coefficients. The result does not depend on the block size or the number of threads. The
+reverse pass sums over the Gaussians in float64, block by block.
 """
 
 import numpy as np

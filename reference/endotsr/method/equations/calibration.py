@@ -73,7 +73,7 @@ def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_rati
     Edges:          a view with g_rgb = 0, or with a non-finite gradient or ratio, is dropped. The median of an even
                     number of ratios is the mean of the middle two.
     Raises:         CalibrationError with the table if no view is valid, or the median is 0 or so small that lambda_lap
-                    overflows; ValueError for r <= 0.
+                    overflows; ValueError unless r is finite and > 0.
     Oracle:         `endotsr.definition.calibration`
     """
     if not (math.isfinite(gradient_ratio) and gradient_ratio > 0):

@@ -62,7 +62,8 @@ def deformation_forward(
     fdm_weight  (10, B, N)  w; position, quaternion or log-scale units by channel
     fdm_centre  (10, B, N)  theta, normalised time
     fdm_width   (10, B, N)  sigma, normalised time, any sign (only its square counts)
-    t           normalised time; far from all centres the model fades to the canonical pose
+    t           normalised time, rounded to the dtype of the arrays; far from all centres the model fades to the
+                canonical pose
     returns     (10, N) offsets in the dtype of the input, and the saved tuple
 
     Reverse: `deformation_reverse`.

@@ -82,7 +82,7 @@ def frequencies(count: int, low: float, high: float, dtype: DTypeLike = np.float
         raise ValueError(f"frequencies from {low} to {high}; allowed: 0 < low <= high, finite")
     omega = np.geomspace(low, high, count)
     omega[-1] = high if count > 1 else low
-    omega[0] = low  # exp(linspace(log)) would miss both ends by an ulp
+    omega[0] = low  # exp(linspace(log)) would miss 16 by an ulp
     return omega.astype(dtype)
 
 

@@ -7,8 +7,8 @@ tissue. Out: a scalar in display units, and its derivative with respect to the r
     L_lap = (1/3) sum_j mean over the valid band pixels and the channels of |P_j(rendered) - P_j(observed)|
 
 A band pixel is valid when every input pixel of its footprint is tissue. The pyramid is linear, so one pyramid of the
-difference image, set to 0 outside tissue, gives all valid band pixels exactly. Values under the instrument (NaN
-included) reach none of them, and equal images have loss and gradient exactly 0.
+difference image, set to 0 outside tissue, gives all valid band differences up to rounding. Values under the instrument
+(NaN included) reach none of them, and equal images have loss and gradient exactly 0.
 """
 
 from typing import NamedTuple
@@ -188,7 +188,7 @@ def _expand_adjoint(first, stop, field, scale, starts, index, weight, even, odd,
 
 
 def _reduce_adjoint(first, stop, d_coarse, starts, index, weight, field, scale, keep_out, gate, out):
-    """out = gate * (out if keep_out else 0 + scale * field + reduce^T(d_coarse))"""
+    """out = (out if keep_out else 0) + (scale * field + reduce^T(d_coarse)) where gate is True, 0 elsewhere."""
     h, w = gate.shape
     m = d_coarse.shape[2]
     real = out.dtype.type

@@ -21,7 +21,7 @@ _block_sums_kernel = jit(_block_sums)
 
 
 def sum_columns(rows: FloatArray, length: int) -> FloatArray:
-    """Sum of the columns of `rows` (K, N), shape (K,): first within blocks of `length` columns, then over blocks."""
+    """Sum of the columns of `rows` (K, N), shape (K,), in their dtype: blocks of `length` columns, then the blocks."""
     blocks = -(-rows.shape[1] // length)
     sums = np.empty((blocks, rows.shape[0]), rows.dtype)
     parallel_for(_block_sums_kernel, blocks, rows, length, sums)

@@ -35,7 +35,7 @@ class DepthSaved(NamedTuple):
 def depth_target(prior_depth: FloatArray, mask: BoolArray) -> DepthTarget:
     """Normalise the prior depth of a frame.
 
-    prior_depth  (H, W)  scene units; 0, negative, NaN and Inf all mean "no depth" (D4)
+    prior_depth  (H, W)  scene units; 0, negative, NaN and Inf all mean "no depth"
     mask         (H, W)  bool, True = tissue
     The largest prior is the maximum over the whole image, instruments included, as in SurgicalGS.
     """
@@ -57,7 +57,7 @@ def normalised_depth_forward(rendered_depth: FloatArray, target: DepthTarget) ->
     returns         (loss, dimensionless, summed in float64; saved)
 
     Reverse: `normalised_depth_reverse`.
-    Edges:   fewer than 10 valid pixels, or a render without positive depth: loss 0, gradient 0 (D3, D4).
+    Edges:   fewer than 10 valid pixels, or a render without positive depth: loss 0, gradient 0.
              Non-finite values are excluded from the maximum.
     Raises:  ValueError if the shapes disagree.
     Oracle:  `endotsr.definition.depth`.

@@ -5,7 +5,8 @@
 S    sum over horizontal and vertical pairs of (D_a - D_b)^2 v_a v_b / (sum v + 1e-6), v = tissue and no edge
 TV   sum over horizontal and vertical pairs of |x_a - x_b| / (C H W)
 
-Pairs across the mask border are included: (1 - M) x is 0 on tissue, so the border is a step to zero with a gradient.
+(1 - M) x stands for a selection, x where excluded and 0 on tissue, whatever x is there. Pairs across the mask border
+are included: (1 - M) x is 0 on tissue, so the border is a step to zero with a gradient.
 Edges are a boolean input: the edge detector is not differentiated. Depth is not normalised.
 """
 
@@ -56,7 +57,7 @@ def smoothness_forward(
 
     Reverse: `smoothness_reverse`; subgradient 0 where a TV pair is equal.
     Edges:   all tissue: TV is 0; no tissue: S is 0; one pixel: no pairs, 0.
-    Raises:  ValueError if the shapes disagree.
+    Raises:  ValueError if the shapes disagree or the mask is not boolean.
     Oracle:  `endotsr.definition.smoothness`; skimage's total variation is isotropic and not comparable.
     Source:  SurgicalGS's depth smoothness and masked total variation.
     """

@@ -57,7 +57,7 @@ class Composite(NamedTuple):
 
 
 class CompositeSaved(NamedTuple):
-    """Inputs and final transmittance, for the reverse pass."""
+    """Inputs and images, for the reverse pass."""
 
     records: FloatArray
     lists: TileLists
@@ -182,7 +182,7 @@ def _composite_reverse(
         end = first + length
         pair_gradients[first:end] = zero
         hit = np.empty(length, np.int64)  # pairs that were blended, nearest first
-        kept = np.empty((length, 5), records.dtype)  # alpha, T, e, dy, whether the gradient passes the clamp
+        kept = np.empty((length, 5), records.dtype)  # alpha, T, e, dy, and the factor of dL/dalpha below
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         for row in range(top, min(height, top + TILE_HEIGHT)):
             for column in range(left, min(width, left + TILE_WIDTH)):
@@ -229,7 +229,8 @@ def composite_forward(
     returns     Composite
 
     Reverse: `composite_reverse`.
-    Edges:   n = 0 gives the background; alpha = 1 ends a pixel with T = 0.
+    Edges:   n = 0 gives the background. alpha = 1 ends a pixel: with T = 0 if the stop is 0; with a stop above 0, the
+             pixel ends before this Gaussian, which is not blended.
     Oracle:  `endotsr.definition.compositing`.
     """
     dtype = records.dtype

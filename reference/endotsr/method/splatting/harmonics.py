@@ -164,6 +164,7 @@ def harmonics_forward(
 
     Reverse: `harmonics_reverse`; the gradient is zero for a channel whose value before the clamp is < 0.
     Edges:   a Gaussian at the camera centre uses degree 0 only.
+    Raises:  ValueError for a degree outside 0..3, or too few coefficients.
     Oracle:  `endotsr.definition.harmonics`; rotation invariance of every degree.
     """
     dtype = position.dtype

@@ -29,8 +29,8 @@ from endotsr.method.splatting.settings import RasterSettings
 
 POSES_PER_SUM = 256  # Gaussians per partial sum of the pose gradient
 
-# px. A longer projected semi-axis is clipped, with zero gradient: its square and the determinant stay finite.
-# A Gaussian with a centre farther out is not drawn.
+# px. A projected semi-axis with a larger |du| + |dv| is clipped, with zero gradient: its square and the determinant
+# stay finite. A Gaussian with a larger |u| or |v| is not drawn.
 AXIS_LIMIT = {np.dtype(np.float32): 1e8, np.dtype(np.float64): 1e60}
 
 
@@ -86,8 +86,8 @@ def projection_forward(
     returns   Projected; Gaussians with z <= near are invisible and all their entries are zero
 
     Reverse: `projection_reverse`, through the mean, the Jacobian, the rotation and the pose.
-    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient. A Gaussian
-             with its centre farther out or with a non-finite number is invisible.
+    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64), measured as |du| + |dv|, is clipped with
+             zero gradient. A Gaussian with |u| or |v| above this limit or with a non-finite number is invisible.
     Oracle:  `endotsr.definition.projection`; determinant against mpmath.
     """
     dtype = position.dtype

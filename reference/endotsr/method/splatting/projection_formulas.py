@@ -25,7 +25,7 @@ class Rules(NamedTuple):
 
     low_pass: np.floating  # epsilon, px^2
     near: np.floating  # scene units
-    axis_limit: np.floating  # px: a longer projected semi-axis is clipped, a centre farther out is not drawn
+    axis_limit: np.floating  # px: of |du| + |dv| of a projected semi-axis, which is clipped, and of |u| and |v|
 
 
 @jit_formula
@@ -95,7 +95,7 @@ def product_reverse(a, b, d_product):
 
 @jit_formula
 def clipped_axis(t0, t1, scale, limit):
-    """S_k clipped to `limit` px on the screen, and whether it is unclipped; (t0, t1) is column k of T."""
+    """S_k clipped to S_k (|t0| + |t1|) <= `limit` px, and whether it is unclipped; (t0, t1) is column k of T."""
     length = abs(t0) + abs(t1)
     free = not scale * length > limit  # written so that a NaN scale stays NaN
     return scale if free else limit / length, free

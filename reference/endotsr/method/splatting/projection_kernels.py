@@ -1,6 +1,7 @@
 """Kernels of the projection, forward and reverse: the formulas of one Gaussian, applied to all in groups (`groups`).
 
-A Gaussian that is not drawn is computed with harmless numbers (z = 1, determinant 1), and its results are set to zero.
+A Gaussian behind the near plane is computed with z = 1, and in reverse any that is not drawn with z = 1 and
+determinant 1. The results of all that are not drawn are set to zero.
 """
 
 from typing import NamedTuple

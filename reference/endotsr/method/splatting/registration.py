@@ -20,7 +20,7 @@ LENS = 4  # fx, fy, cx, cy
 
 
 class RegistrationSaved(NamedTuple):
-    """Inputs by reference, and the slope of every residual at the point in target axes."""
+    """Inputs in float64, and the slope of every residual at the point in target axes."""
 
     rotation: FloatArray  # (3, 3)
     points: FloatArray  # (3, M)
@@ -29,7 +29,7 @@ class RegistrationSaved(NamedTuple):
 
 
 class RegistrationGrads(NamedTuple):
-    """Derivatives with respect to all inputs but the picture."""
+    """Derivatives with respect to all inputs but the picture and the camera."""
 
     d_rotation: FloatArray  # (3, 3)
     d_translation: FloatArray  # (3,)
@@ -122,7 +122,7 @@ def registration_forward(
 
     rotation     (3, 3)  from source to target axes; every entry is independent
     translation  (3,)    scene units
-    points       (3, M)  in the axes of the source camera, scene units
+    points       (3, M)  in the axes of the source camera, scene units, finite
     reference    (M,)    values of the points in the source picture, unit of the picture
     picture      (H, W)  of the target frame
     camera       intrinsics of the target frame; its pose is not used

@@ -11,7 +11,7 @@ class LegacyDeviations(NamedTuple):
     drop_depth_to_z: bool = False  # no gradient from the depth image to z
     pass_clamped_alpha: bool = False  # gradient passes through the alpha clamp
     double_clamp_term: bool = False  # factor 2 instead of 1 in d(Jacobian)/dz where the off-axis clamp is active
-    conic_epsilon: bool = False  # 1/(det^2 + 1e-7) instead of 1/det^2
+    conic_epsilon: bool = False  # 1/(det^2 + 1e-7) instead of 1/det^2 in d(a, b, c)
 
 
 class RasterSettings(NamedTuple):

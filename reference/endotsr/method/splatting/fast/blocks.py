@@ -362,8 +362,10 @@ def composite_blocks_forward(
 ) -> tuple[Composite, BlocksSaved]:
     """As `composite_forward`, on tiles of 64x16 pixels; the opacity image is 1 - T (equal to the sum to rounding).
 
-    Edges: within one rounding of the cutoff or the stop, the two paths may decide differently. The difference is then
-           at most T alpha |c - behind|, see tests/method/splatting.
+    Edges: within rounding of the cutoff or the stop, the two paths may decide differently about a Gaussian k. If the
+           decisions about those behind it stay, the colour then differs by T_k alpha_k |rgb_k - R_{k+1}| at the cutoff
+           and by T_k |R_k - background| at the stop, with the R of (B5c). A colour that is not finite reaches all
+           visited blocks of its Gaussian.
     """
     dtype = records.dtype
     out = empty_composite(width, height, dtype)
