@@ -471,8 +471,11 @@ plt.show()
 # def smoothness_reverse(d_loss, saved):
 #     """Reverse of (B9)."""
 #     depth, rendered, mask, edges, factor = saved
-#     d_depth = squared_steps(depth, mask & ~edges)[1] + factor * total_variation(depth[None], mask)[1][0]
-#     return SmoothnessGrads(d_loss * factor * total_variation(rendered, mask)[1], d_loss * d_depth)
+#     d_depth, d_image = squared_steps(depth, mask & ~edges)[1], np.zeros_like(rendered)
+#     if factor:
+#         d_depth = d_depth + factor * total_variation(depth[None], mask)[1][0]
+#         d_image = factor * total_variation(rendered, mask)[1]
+#     return SmoothnessGrads(d_loss * d_image, d_loss * d_depth)
 # ```
 
 # %%

@@ -376,9 +376,9 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 #     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
 #     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
 #     by_threshold = config.growth == "threshold"
-#     least = config.gradient_threshold if by_threshold else 0
+#     steep = steepness >= config.gradient_threshold if by_threshold else steepness > 0
 #     runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
-#     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))  # (13.7)
+#     candidates = np.flatnonzero(alive & steep)  # (13.7)
 #     room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
 #     steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
 #     candidates = np.sort(steepest_first[:room])
@@ -405,7 +405,8 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 #     children = slice(gaussians.opacity_logit.size - noise.shape[1], None)
 #     rotation = rotation_of(unit(gaussians.quaternion[:, children])[0])
 #     position, log_scale = gaussians.position.copy(), gaussians.log_scale.copy()
-#     position[:, children] += np.einsum("ijn,jn->in", rotation, np.exp(log_scale[:, children]) * noise)
+#     axes = np.exp(np.clip(log_scale[:, children], -40, 40))
+#     position[:, children] += np.einsum("ijn,jn->in", rotation, axes * noise)
 #     log_scale[:, children] -= np.log(1.6)
 #     return gaussians._replace(position=position, log_scale=log_scale)
 # ```

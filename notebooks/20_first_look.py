@@ -76,9 +76,9 @@ rng = np.random.default_rng(20)
 #     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
 #     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
 #     by_threshold = config.growth == "threshold"
-#     least = config.gradient_threshold if by_threshold else 0
+#     steep = steepness >= config.gradient_threshold if by_threshold else steepness > 0
 #     runs = 1 if by_threshold else remaining  # a budget is shared by the runs that are left
-#     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))  # (13.7)
+#     candidates = np.flatnonzero(alive & steep)  # (13.7)
 #     room = -(-max(0, config.maximum - alive.sum()) // runs)  # (20.1), (20.3)
 #     steepest_first = candidates[np.argsort(-steepness[candidates], kind="stable")]
 #     candidates = np.sort(steepest_first[:room])

@@ -155,7 +155,7 @@ assert 0.5 * medians[1] < without_noise < medians[1]
 #         np.einsum("mj,ji,mi->m", b, picture, a) for b, a in ((down, across), (down, across_slope), (down_slope, across))
 #     )
 #     slope = np.array([slope_u * camera.fx / safe, slope_v * camera.fy / safe])
-#     slope = seen * np.array([*slope, -(slope * [x, y]).sum(axis=0) / safe])  # (22.3)
+#     slope = np.where(seen, [*slope, -(slope * [x, y]).sum(axis=0) / safe], 0)  # (22.3)
 #     return np.where(seen, value - reference, 0), RegistrationSaved(rotation, points, slope, seen)
 # ```
 

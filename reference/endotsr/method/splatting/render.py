@@ -101,7 +101,8 @@ def choose_compositor(settings: RasterSettings, compositor: Compositor) -> Compo
         return "blocks" if compositing_blocks.supports(settings) else "definition"
     if compositor == "blocks" and not compositing_blocks.supports(settings):
         raise ValueError(
-            "compositor 'blocks' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1; use 'definition'"
+            "compositor 'blocks' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1 and no pass_clamped_alpha;"
+            " use 'definition'"
         )
     return compositor
 
