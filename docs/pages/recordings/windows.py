@@ -122,19 +122,25 @@ def followed_errors(run: Path, raw: Path) -> dict[str, Any]:
     return seam_errors(scene, masks, lambda g, other: positions(place[g], place[other]))._asdict()
 
 
-def recording(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Raw recording to film."""
-    raw, clip, run = (folder / name for name in ("raw", "clip", "run"))
-    width, height = options.size.split("x")
+def recorded_clip(steps: Steps, folder: Path, frames: int, size: str) -> Path:
+    """A raw recording, and the folder `clip` that `prepare` and `depth` make of it; returns the raw folder."""
+    raw, clip = folder / "raw", folder / "clip"
+    width, height = size.split("x")
     cycles = {"breathing": FRAMES_A_BREATH, "pulsation": FRAMES_A_BEAT, "camera-motion": FRAMES_A_SWING}
     words = ["simulate", "--effects", EFFECTS, "--layout", "stereomis", "--out", str(raw), "--width", width]
-    words += ["--height", height, "--frames", str(options.frames)]
+    words += ["--height", height, "--frames", str(frames)]
     for effect, length in cycles.items():
-        words += [f"--{effect}.cycles", f"{options.frames / length:g}"]
-    steps, depth = Steps(folder), clip / "depth"
+        words += [f"--{effect}.cycles", f"{frames / length:g}"]
     steps.make("simulate", raw, *words)
     steps.make("prepare", clip, "prepare", str(raw), "--out", str(clip))
-    steps.make("depth", depth, "depth", str(clip), "--nearest", "25", "--farthest", "120")
+    steps.make("depth", clip / "depth", "depth", str(clip), "--nearest", "25", "--farthest", "120")
+    return raw
+
+
+def recording(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Raw recording to film."""
+    steps, clip, run = Steps(folder), folder / "clip", folder / "run"
+    raw = recorded_clip(steps, folder, options.frames, options.size)
     found = trained(clip, run, f"simulated {options.frames} frames {options.size}", options, options.windows[0])
     steps.keep("train", found["seconds"])
     film, page = folder / "film.mp4", folder / "page.html"
