@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from pages.recordings.window_length import BASELINES, LENGTHS, PROGRAM, SPLITS
 from pages.store.intervals import interval
 
