@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.camera import Intrinsics
+from endotsr.clips.sequences.checks.late import lag_in_words
 from endotsr.clips.sequences.clip import Clip, Masks, Picture, PicturePair
 from endotsr.clips.sequences.crop import crop_within
 from endotsr.clips.sequences.source_options import SourceOptions
@@ -226,7 +227,7 @@ def paired_by_time(clip: Clip, late: int) -> Clip:
                 yield PicturePair(left.pop(turn), right.pop(turn))
                 turn = next(waiting, None)
 
-    note = f"right view taken as {_lag(late)}: frame i is paired with right picture i {late:+d}"
+    note = f"right view taken as {lag_in_words(late)}: frame i is paired with right picture i {late:+d}"
     return replace(clip, pictures=pictures, right=[], notes=[*clip.notes, note])
 
 
@@ -241,7 +242,7 @@ def masks_by_time(clip: Clip, late: int) -> Clip:
         raise InputError(f"{clip.where}: no masks; --masks-late is allowed for a clip with masks alone")
     _refuse_long_lag(clip, late, "--masks-late")
     read = lambda i: masks(i + late) if 0 <= i + late < clip.count else None
-    note = f"masks taken as {_lag(late)}: frame i has mask i {late:+d}"
+    note = f"masks taken as {lag_in_words(late)}: frame i has mask i {late:+d}"
     return replace(clip, masks=replace(masks, read=read, files=[], levels=None), notes=[*clip.notes, note])
 
 
@@ -250,10 +251,6 @@ def _refuse_long_lag(clip: Clip, late: int, option: str) -> None:
         raise InputError(
             f"{option} {late}: allowed: -{clip.count - 1} to {clip.count - 1} for {counted(clip.count, 'frame')}"
         )
-
-
-def _lag(late: int) -> str:
-    return f"{counted(abs(late), 'frame')} {'late' if late > 0 else 'early'}"
 
 
 def with_partner(clip: Clip, frames: list[int], late: int, what: str, notes: list[str]) -> list[int]:

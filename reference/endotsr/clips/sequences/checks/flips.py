@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.checks.masks import smaller_part
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.names import counted
 
@@ -112,10 +113,7 @@ class DepthTurns:
 
     def findings(self, where: str) -> list[Finding]:
         """A warning on the frames whose depth has another orientation than most."""
-        ends = [*(frame for frame, _ in self._turns), self._count]
-        turned = [i for a, b in zip(ends[::2], ends[1::2]) for i in range(a, b)]
-        if 2 * len(turned) > self._count:
-            turned = sorted(set(range(self._count)) - set(turned))
+        turned = smaller_part([frame for frame, _ in self._turns], self._count)
         if not turned:
             return []
         flip, first = self._turns[0][1], turned[0]

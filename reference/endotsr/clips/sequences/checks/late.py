@@ -1,9 +1,9 @@
 """Masks and depth of other moments than their pictures: all of them late or early by about the same number of frames.
 
 In: pictures, tissue and depth of a clip, one frame at a time. Out: findings. What the masks exclude has other colours
-than tissue. The mutual information of the colour of a pixel in frame t and its mask in frame t + k is largest at the
-shift k at which the masks fit the pictures. It also grows with the excluded area, as where an instrument enters. The
-pixels whose mask the shift changes must confirm it:
+than tissue. The shift k with the largest mutual information of the colour of a pixel in frame t and its mask in frame
+t + k is taken for the lag of the masks. An excluded area that grows, as where an instrument enters, may favour another
+shift. The pixels whose mask the shift changes have to agree:
 
     gain(k) = mean of s l over the pixels p of all frames t with m(p, t + k) != m(p, t)
     l = log (part of the tissue pixels that have the colour of (p, t) / part of the excluded pixels that have it)
@@ -87,7 +87,7 @@ def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list
         return []
     if np.mean(gains[changed > 0] > 0) < AGREEING:
         return []
-    what = f"the masks seem to be about {_shift(best)}: moved so, they fit the colours of the pictures better"
+    what = f"the masks seem to be about {lag_in_words(best)}: moved so, they fit the colours of the pictures better"
     return [finding("late-masks", where, what)]
 
 
@@ -99,8 +99,8 @@ def late_depth(known: BoolArray, tissue: BoolArray, where: str) -> list[Finding]
     if best == 0 or apart[0] < APART or apart[0] < BETTER * apart[best]:
         return []
     what = (
-        f"the depth seems to be {_shift(best)}: its holes differ from the masks in {apart[0]:.1%} of the pixels, and in"
-        f" {apart[best]:.1%} if moved so"
+        f"the depth seems to be {lag_in_words(best)}: its holes differ from the masks in {apart[0]:.1%} of the pixels,"
+        f" and in {apart[best]:.1%} if moved so"
     )
     return [finding("late-depth", where, what)]
 
@@ -125,5 +125,6 @@ def _gain(colours: NDArray[np.intp], tissue: BoolArray, moved: BoolArray) -> tup
     return signed.sum(axis=(1, 2)), changed.sum(axis=(1, 2), dtype=np.float64)
 
 
-def _shift(k: int) -> str:
-    return f"{counted(abs(k), 'frame')} {'late' if k > 0 else 'early'}"
+def lag_in_words(frames: int) -> str:
+    """`3 frames late`, or `1 frame early` for -1."""
+    return f"{counted(abs(frames), 'frame')} {'late' if frames > 0 else 'early'}"

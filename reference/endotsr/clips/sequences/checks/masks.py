@@ -41,13 +41,21 @@ class MaskTurns:
 
     def findings(self, where: str) -> list[Finding]:
         """A warning on masks of two polarities, if each has two masks or more."""
-        ends = [*self.frames, self._count]
-        other = sum(b - a for a, b in zip(ends[::2], ends[1::2]))
-        fewer = min(other, self._count - other)
+        fewer = len(smaller_part(self.frames, self._count))
         if fewer < 2:
             return []
         what = f"{fewer} of {self._count} masks have another polarity than the rest; here it changes for the first time"
-        return [finding("turned-masks", where, what, ends[0])]
+        return [finding("turned-masks", where, what, self.frames[0])]
+
+
+def smaller_part(changes: list[int], count: int) -> list[int]:
+    """Of `count` frames between two states, those in the rarer one; of equally many, those after the first change.
+
+    changes   ascending frames at which the other state begins
+    """
+    ends = [*changes, count]
+    other = [i for a, b in zip(ends[::2], ends[1::2]) for i in range(a, b)]
+    return sorted(set(range(count)) - set(other)) if 2 * len(other) > count else other
 
 
 class MaskSteps:

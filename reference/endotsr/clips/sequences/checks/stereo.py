@@ -17,6 +17,7 @@ from endotsr.clips.poses.views import side_of, usable_pixels
 from endotsr.clips.sequences.checks.copies import SAME, steps_between
 from endotsr.clips.sequences.checks.frames import small_picture
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.checks.late import lag_in_words
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.clips.sequences.view_frames import frame_of
@@ -182,9 +183,9 @@ def late_finding(rows: list[RowMatches], where: str) -> list[Finding]:
     by_frame = [np.median((usual - d[far]) / m[far]) for d, m in moving for far in [np.abs(m) > CLEAR]]
     if abs(frames) < LATE or np.mean(np.array(by_frame) / frames > 0.5) < ALIKE:
         return []
-    whole, side = max(1, round(abs(frames))), "late" if frames > 0 else "early"
+    lag = int(np.copysign(max(1, round(abs(frames))), frames))
     what = (
-        f"the right view is about {counted(whole, 'frame')} {side}: points that move up or"
+        f"the right view is about {lag_in_words(lag)}: points that move up or"
         f" down lie where the left view {'showed' if frames > 0 else 'will show'} them (estimate"
         f" {abs(frames):.1f}, from {counted(len(moving), 'frame')})"
     )
@@ -210,8 +211,8 @@ def late_steps_finding(left: FloatArray, right: FloatArray, where: str) -> list[
     if abs(best) < SHORTEST or alike[best] < FITS or alike[best] - alike[0] < GAIN:
         return []
     what = (
-        f"the right view is about {counted(abs(best), 'frame')} {'late' if best > 0 else 'early'}: its steps from frame"
-        f" to frame fit those of the left view then (correlation {alike[best]:.2f}, as stored {alike[0]:.2f})"
+        f"the right view is about {lag_in_words(best)}: its steps from frame to frame"
+        f" fit those of the left view then (correlation {alike[best]:.2f}, as stored {alike[0]:.2f})"
     )
     return [finding("late-right-view", where, what)]
 
