@@ -117,7 +117,8 @@ def test_a_comparison_without_its_end_is_found(golden, tmp_path, monkeypatch):
 
     monkeypatch.setattr(density_control, "densify", converted)
     said = causes(golden, tmp_path, "density")
-    assert "`(steepness) > (least)` where `steepness >= least` is right: equation (B11)" in said
+    least = "config.gradient_threshold"
+    assert f"`(steepness) > ({least})` where `steepness >= {least}` is right: equation (B11)" in said
 
 
 def test_a_setting_that_is_fixed_is_found(golden, tmp_path):
