@@ -5,8 +5,17 @@ tiny gradients, and a second moment of 0, which moves nothing.
 """
 
 from makers.making import Made, Seeds, Spec, changed
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("adam",)
+DECLARED = {
+    "adam": Operation(
+        {"parameter_after": Judged(1, oracle="adam.adam_scalar"), "first": Judged(1), "second": Judged(1)},
+        "one step for each of `gradients`, from zero moments; `first`, `second` = moments at the end, before bias"
+        " correction",
+        settings={name: f"optimiser.{name}" for name in ("beta1", "beta2", "epsilon")},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _spec(case: str, title: str, flags: tuple[str, ...], parameter: Made, gradients: Made) -> Spec:

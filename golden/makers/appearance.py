@@ -5,8 +5,20 @@ Inputs: coefficients A, normalised atoms and the gradient with respect to the re
 """
 
 from makers.making import Seeds, Spec
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("appearance",)
+DECLARED = {
+    "appearance": Operation(
+        {
+            "residual": Judged(1, "display / Y00", oracle="appearance.appearance_forward"),
+            "d_appearance_coefficients": Judged(2, "loss", "last", "appearance.appearance_reverse"),
+            "d_phi_bar": Judged(2, "loss", oracle="appearance.appearance_reverse"),
+        },
+        "atoms are given",
+        settings={"beta": "model.beta"},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

@@ -7,8 +7,22 @@ an even number of views, a view without photometric gradient, and no valid view.
 import numpy as np
 
 from makers.making import Seeds, Spec, changed
+from makers.operations import PER_DISPLAY, Judged, Operation
 
-OPERATIONS = ("calibration",)
+DECLARED = {
+    "calibration": Operation(
+        {
+            "g_rgb": Judged(1, PER_DISPLAY),
+            "g_lap": Judged(1, PER_DISPLAY),
+            "lambda_lap": Judged(1, oracle="calibration.calibrate"),
+            "refused": Judged(1, scale="exact"),
+        },
+        "axis 0 = views; `g_rgb`, `g_lap` = RMS over all other axes; `refused` True and `lambda_lap` 0 if no view is"
+        " valid",
+        settings={"gradient_ratio": "loss.gradient_ratio"},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

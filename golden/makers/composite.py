@@ -8,11 +8,30 @@ the preset legacy, and gradients without division by 1 - alpha.
 import numpy as np
 
 from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.port.stages.compositing import IMAGES
 from makers.making import Seeds, Spec, given
+from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
 from makers.screens import flat_covariance, raster_settings, screen_inputs
 from makers.views import PRESETS, logit_of
 
-OPERATIONS = ("composite",)
+UNITS = dict(zip(IMAGES, ("display", "scene unit", "1")))
+FORWARD, REVERSE = "compositing.composite_forward", "compositing.composite_reverse"
+DECLARED = {
+    "composite": Operation(
+        {
+            **{name: Judged(1, unit, oracle=FORWARD) for name, unit in UNITS.items()},
+            "d_mean2d": Judged(2, "loss per px", "last", REVERSE),
+            "d_covariance2d": Judged(2, "loss per px^2", "last", REVERSE),
+            "d_opacity_logit": Judged(2, "loss", "last", REVERSE),
+            "d_colour": Judged(2, PER_DISPLAY, "last", REVERSE),
+            "d_depth": Judged(2, PER_LENGTH, "last", REVERSE),
+            "d_background": Judged(2, PER_DISPLAY, oracle=REVERSE),
+        },
+        "from screen quantities; det = a c - b^2, here only, where nothing else is given: in `render` det comes from"
+        " the sum of (B3); `d_covariance2d[1]` is the derivative by the scalar b",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _preset(name: str) -> Spec:

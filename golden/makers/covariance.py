@@ -6,8 +6,20 @@ log-scale at +-40.
 """
 
 from makers.making import Made, Seeds, Spec, changed, given
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("covariance",)
+DECLARED = {
+    "covariance": Operation(
+        {
+            "rotation": Judged(1, "1", "last", "covariance.rotation_of"),
+            "scale": Judged(1, "scene unit", "last"),
+            "d_quaternion": Judged(2, "loss", "last"),
+            "d_log_scale": Judged(2, "loss", "last"),
+        },
+        "`rotation` (3, 3, N) of the normalised quaternion, `scale` = exp(log_scale), and back",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _generic(seeds: Seeds, count: int) -> dict[str, Made]:

@@ -7,8 +7,23 @@ sign of a width, which affects only its gradient, and the floor of a squared wid
 import numpy as np
 
 from makers.making import Seeds, Spec, changed, given, scalar
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("deformation",)
+DECLARED = {
+    "deformation": Operation(
+        {
+            "offsets": Judged(1, "raw parameter", "last", "deformation.deformation_forward"),
+            "d_fdm_weight": Judged(2, "loss per raw parameter", "last", "deformation.deformation_reverse"),
+            "d_fdm_centre": Judged(2, "loss", "last", "deformation.deformation_reverse"),
+            "d_fdm_width": Judged(2, "loss", "last", "deformation.deformation_reverse"),
+            "d_t": Judged(2, "loss", oracle="deformation.deformation_reverse"),
+        },
+        "offsets at `t`",
+        settings={"basis": "model.basis"},
+        free={"model.deformation": "a rigid scene has no arrays of the deformation, and their absence says so"},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

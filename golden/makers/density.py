@@ -11,10 +11,30 @@ import numpy as np
 
 from endotsr.config import DensityConfig
 from makers.making import Made, Seeds, Spec, changed, given, permutation
+from makers.operations import Judged, Operation
 from makers.settings import written_section
 from makers.views import pose
 
-OPERATIONS = ("density",)
+DENSIFY = "density_control.densify"
+DECLARED = {
+    "density": Operation(
+        {
+            "extent": Judged(1, "scene unit", oracle=DENSIFY),
+            "mean_gradient": Judged(1, "loss per NDC unit", oracle=DENSIFY),
+            **{
+                name: Judged(1, scale="exact", oracle=DENSIFY)
+                for name in ("pruned", "cloned", "split", "count", "parent", "moments_kept")
+            },
+            "position_after": Judged(1, "scene unit", oracle=DENSIFY),
+            "log_scale_after": Judged(1, oracle=DENSIFY),
+        },
+        "the parameters are those after the step of Adam; `d_mean2d` [view, axis, Gaussian] per px, `visible` [view,"
+        " Gaussian], image `width` and `height`, `split_noise` as in `training`. `pruned`, `cloned`, `split` by old"
+        " index; `count` Gaussians afterwards, `parent` their old index, `moments_kept` False for clones and children;"
+        " where nothing is cloned or split the noise is not used",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 VIEWS, COUNT = 3, 12
 
 

@@ -9,8 +9,18 @@ import numpy as np
 
 from makers.images import HEIGHT, WIDTH, spoiled, tool_mask
 from makers.making import Made, Seeds, Spec, changed, given, scalar
+from makers.operations import PER_LENGTH, Judged, Operation
 
-OPERATIONS = ("normalised_depth",)
+DECLARED = {
+    "normalised_depth": Operation(
+        {
+            "loss": Judged(1, oracle="depth.normalised_depth_forward"),
+            "d_rendered_depth": Judged(2, PER_LENGTH, oracle="depth.normalised_depth_forward"),
+        },
+        "`d_loss` is the given derivative",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _uniform(seeds: Seeds) -> dict[str, Made]:

@@ -8,8 +8,34 @@ import numpy as np
 
 from makers.clock import omegas, stamps, train_index
 from makers.making import Made, Seeds, Spec, given, scalar
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("frequencies", "dictionary", "atoms")
+DECLARED = {
+    "frequencies": Operation(
+        {"omega": Judged(1, "cycles per sequence", oracle="fourier_oracle.frequencies")},
+        "`count` log-spaced values from `low` to `high`",
+        settings={"count": "model.frequencies", "low": "model.frequency_min", "high": "model.frequency_max"},
+    ),
+    "dictionary": Operation(
+        {
+            "phi": Judged(1, oracle="fourier_oracle.dictionary"),
+            "d_t": Judged(2, "loss"),
+            "d_omega": Judged(2, "loss per cycle"),
+        },
+        "atoms at `t`, derivatives by `t` and `omega`",
+    ),
+    "atoms": Operation(
+        {
+            "mean": Judged(1),
+            "rms": Judged(1),
+            "dead": Judged(1, scale="exact"),
+            "phi_bar": Judged(1, oracle="fourier_oracle.normalised"),
+            "d_phi": Judged(2, "loss"),
+        },
+        "statistics over `times[train_index]`; `rms` is 0 where `dead`; `phi_bar` from the given `phi`",
+    ),
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _frequencies() -> list[Spec]:

@@ -5,8 +5,24 @@ sides of 1. One case has exposed colours below 0 and the other above 1, which re
 """
 
 from makers.making import Seeds, Spec
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("exposure",)
+DECLARED = {
+    "exposure": Operation(
+        {
+            "exposed": Judged(1, "display", oracle="exposure.exposure_forward"),
+            "d_colour": Judged(2, "loss per display", oracle="exposure.exposure_reverse"),
+            "d_log_gain": Judged(2, "loss", oracle="exposure.exposure_reverse"),
+            "d_bias": Judged(2, "loss per display", oracle="exposure.exposure_reverse"),
+        },
+        "gain and bias of each channel; nothing is clamped. `objective` and `training` use it in one case each",
+        free={
+            "optimiser.exposure": "a rate of an option that is off in every preset; one trajectory has a value of its"
+            " own"
+        },
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

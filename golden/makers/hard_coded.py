@@ -20,40 +20,23 @@ from endotsr.port.judge.format import Case
 from endotsr.port.judge.store import Golden
 from endotsr.port.reference import reference, stored
 from endotsr.port.search.requests import with_value
+from makers.registry import DECLARED
 
 Place = tuple[str, ...]  # keys of the settings of a case, from the outside in
 
 SECTIONS = ("model", "raster", "loss", "optimiser", "density", "initialisation", "training")
-FREE = {
-    "model.deformation": "a rigid scene has no arrays of the deformation, and their absence says so",
-    "model.pose_correction": "an option that is off in every preset; its equation has a family of its own",
-    "optimiser.exposure": "a rate of an option that is off in every preset; one trajectory has a value of its own",
-    "optimiser.pose": "a rate of that option",
+GENERAL = {
     "raster.preset": "the name of eleven values, each of which is a setting of the cases",
-    "initialisation.first_frame_points": "how many candidates are drawn; the cases take every candidate",
-    "initialisation.other_frame_points": "how many candidates are drawn; the cases take every candidate",
-    "initialisation.motion": "tracked motion needs optical flow, which no case has",
-    "training.visits_per_frame": "the length of a run; a case states its number of iterations",
-    "training.bridge_fraction": "times between frames need optical flow, which no case has",
-    "training.coarse_start": "an option that is not part of the paper",
-    "training.seed": "random draws are inputs of the cases",
     "training.threads": "changes no result",
     "training.precision": "the precision is that of the request",
     "training.checkpoint_every": "changes no result",
 }
-"""Settings that no case must vary, with the reason. `preset` and the section `sequence` belong to the reader."""
+"""Settings of no operation that no case must vary, with the reason; `preset` and `sequence` belong to the reader."""
 REMEDIES = (
-    "give it two values in the cases of golden/makers/objective.py or of its own family, or add a line"
-    " '{}' with the reason to FREE of golden/makers/hard_coded.py"
+    "give it two values in the cases of golden/makers/objective.py or of its own family, or add a line '{}' with the"
+    " reason to `free` of its operation in that family; a setting of no operation to GENERAL of"
+    " golden/makers/hard_coded.py"
 )
-ALONE = {
-    "appearance": "model.beta", "matern": "model.correlation_length", "deformation": "model.basis",
-    "laplacian": "loss.upsampling", "calibration": "loss.gradient_ratio",
-    "smoothness": "loss.total_variation_factor",
-}  # fmt: skip
-"""Operation with one setting -> the corresponding setting of the configuration."""
-OTHERS = {"rate": "", "beta1": "optimiser.beta1", "beta2": "optimiser.beta2", "epsilon": "optimiser.epsilon",
-          "count": "model.frequencies", "low": "model.frequency_min", "high": "model.frequency_max"}  # fmt: skip
 
 
 class Row(NamedTuple):
@@ -77,6 +60,17 @@ class Row(NamedTuple):
         return ""
 
 
+def _free() -> dict[str, str]:
+    """Settings that no case must vary, with the reason, in the order of the configuration."""
+    found = GENERAL | {name: reason for operation in DECLARED.values() for name, reason in operation.free.items()}
+    config = msgspec.to_builtins(Config())
+    place = {name: k for k, name in enumerate(f"{section}.{key}" for section in SECTIONS for key in config[section])}
+    return dict(sorted(found.items(), key=lambda one: place.get(one[0], len(place))))
+
+
+FREE = _free()
+
+
 def wanted_settings() -> dict[str, Any]:
     """Every setting that a case must vary, with its published value."""
     config = msgspec.to_builtins(Config())
@@ -95,9 +89,7 @@ def places(case: Case, setting: str) -> Iterator[Place]:
         if _at(case.settings, (*start, *path)) is not None:
             yield (*start, *path)
     for key in case.settings:
-        if ALONE.get(case.operation) == setting and key == path[-1]:
-            yield (key,)
-        elif case.operation in ("adam", "frequencies") and OTHERS.get(key) == setting:
+        if DECLARED[case.operation].settings.get(key) == setting:
             yield (key,)
 
 

@@ -6,8 +6,21 @@ Gaussian at the optical centre, which has no direction.
 """
 
 from makers.making import Seeds, Spec, changed
+from makers.operations import PER_LENGTH, Judged, Operation
 
-OPERATIONS = ("harmonics",)
+DECLARED = {
+    "harmonics": Operation(
+        {
+            "colour": Judged(1, "display", oracle="harmonics.harmonics_forward"),
+            "d_harmonics": Judged(2, "loss"),
+            "d_residual": Judged(2, "loss"),
+            "d_position": Judged(2, PER_LENGTH),
+            "d_centre": Judged(2, PER_LENGTH),
+        },
+        "`residual` is added to coefficient 0; `centre` is the optical centre",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _degree(degree: int) -> Spec:

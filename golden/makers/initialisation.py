@@ -8,10 +8,29 @@ import numpy as np
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from makers.making import Made, Seeds, Spec, changed, given
+from makers.operations import Judged, Operation
 from makers.settings import OF_THE_INITIALISATION, written_section
 from makers.views import pose
 
-OPERATIONS = ("initialisation",)
+DECLARED = {
+    "initialisation": Operation(
+        {
+            "count": Judged(1, scale="exact", oracle="initialisation.initialise"),
+            "position": Judged(1, "scene unit", "last", "initialisation.initialise"),
+            "log_scale": Judged(1, oracle="initialisation.initialise"),
+            "harmonics": Judged(1, "display / Y00", oracle="initialisation.initialise"),
+            **{name: Judged(1) for name in ("quaternion", "opacity_logit", "fdm_weight", "fdm_centre", "fdm_width")},
+        },
+        "every candidate is taken. Order: frames as in `train_index`, pixels of a frame row by row. `prior_depths` are"
+        " clipped already",
+        free={
+            "initialisation.first_frame_points": "how many candidates are drawn; the cases take every candidate",
+            "initialisation.other_frame_points": "how many candidates are drawn; the cases take every candidate",
+            "initialisation.motion": "tracked motion needs optical flow, which no case has",
+        },
+    )
+}
+OPERATIONS = tuple(DECLARED)
 LENS = {"fx": 7.0, "fy": 9.0, "cx": 2.75, "cy": 2.25, "width": 6, "height": 5}
 
 

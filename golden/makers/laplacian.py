@@ -6,10 +6,25 @@ a level without valid pixels, an image without tissue, equal images, and non-fin
 
 import numpy as np
 
+from endotsr.port.stages.laplacian import LEVELS
 from makers.images import spoiled, tissue
 from makers.making import Made, Seeds, Spec, given, scalar
+from makers.operations import PER_DISPLAY, Judged, Operation
 
-OPERATIONS = ("laplacian",)
+DECLARED = {
+    "laplacian": Operation(
+        {
+            **{f"band_{j}": Judged(1, "display", oracle="laplacian.laplacian_levels") for j in range(1, LEVELS + 1)},
+            **{f"valid_{j}": Judged(1, scale="exact", oracle="laplacian.support_masks") for j in range(1, LEVELS + 1)},
+            "loss": Judged(1, "display", oracle="laplacian.laplacian_loss_forward"),
+            "d_rendered": Judged(2, PER_DISPLAY, oracle="laplacian.laplacian_loss_reverse"),
+        },
+        "`band_j` = Laplacian bands of `observed`, without mask; `valid_j` = valid pixels of `mask`; loss of `rendered`"
+        " against `observed`",
+        settings={"upsampling": "loss.upsampling"},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _images(case: str, shape: tuple[int, int]) -> dict[str, Made]:

@@ -6,8 +6,18 @@ equal images, and non-finite numbers under the mask: excluded values must have n
 
 from makers.images import masked_mean
 from makers.making import Spec
+from makers.operations import PER_DISPLAY, Judged, Operation
 
-OPERATIONS = ("masked_l1",)
+DECLARED = {
+    "masked_l1": Operation(
+        {
+            "loss": Judged(1, "display", oracle="masked_l1.masked_l1_forward"),
+            "d_rendered": Judged(2, PER_DISPLAY),
+        },
+        "`d_loss` is the given derivative",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

@@ -7,8 +7,20 @@ order of the weights along the atoms.
 
 from makers.clock import omegas
 from makers.making import Seeds, Spec, scalar
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("matern",)
+DECLARED = {
+    "matern": Operation(
+        {
+            "rho": Judged(1, oracle="matern_oracle.weights"),
+            "penalty": Judged(1, "scene unit^2", oracle="matern.matern_penalty_forward"),
+            "d_motion_coefficients": Judged(2, "loss per scene unit", oracle="matern.matern_penalty_reverse"),
+        },
+        "weights, penalty, gradient for `d_penalty`",
+        settings={"correlation_length": "model.correlation_length"},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

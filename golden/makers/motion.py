@@ -5,8 +5,19 @@ linear, and its only possible mistake is to omit sines or cosines.
 """
 
 from makers.making import Seeds, Spec
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("motion",)
+DECLARED = {
+    "motion": Operation(
+        {
+            "translation": Judged(1, "scene unit", oracle="motion.motion_forward"),
+            "d_motion_coefficients": Judged(2, "loss per scene unit", "last", "motion.motion_reverse"),
+            "d_phi": Judged(2, "loss", oracle="motion.motion_reverse"),
+        },
+        "atoms are given",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

@@ -10,12 +10,46 @@ from collections.abc import Callable
 import numpy as np
 
 from endotsr.port.stages.requests import raster_dict
+from endotsr.port.stages.scene import TWICE
+from endotsr.training.scene.gaussians import Gaussians
 from makers.images import tissue
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import LENS, TIME, model_settings, moving_inputs
+from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
 from makers.views import PRESETS
 
-OPERATIONS = ("objective", "determinism")
+GRADIENT_UNITS = {"position": PER_LENGTH, "motion_coefficients": PER_LENGTH}
+DECLARED = {
+    "objective": Operation(
+        {
+            "colour_image": Judged(3, "display", oracle="render.render_forward"),
+            "depth_image": Judged(3, "scene unit", oracle="render.render_forward"),
+            "term_l1": Judged(3, "display", oracle="masked_l1.masked_l1_forward"),
+            "term_ssim": Judged(3, oracle="masked_ssim.masked_ssim_forward"),
+            "term_depth": Judged(3, oracle="depth.normalised_depth_forward"),
+            "term_smoothness": Judged(3, "scene unit^2", oracle="smoothness.smoothness_forward"),
+            "term_laplacian": Judged(3, "display", oracle="laplacian.laplacian_loss_forward"),
+            "term_penalty": Judged(3, "scene unit^2", oracle="matern.matern_penalty_forward"),
+            "objective": Judged(3, "loss", oracle="masked_l1.masked_l1_forward"),
+            **{f"d_{name}": Judged(3, GRADIENT_UNITS.get(name, "loss"), "last") for name in Gaussians._fields},
+            "d_exposure_log_gain": Judged(3, "loss"),
+            "d_exposure_bias": Judged(3, PER_DISPLAY),
+        },
+        "`scene`, `render` on black, then (1 - w) L1 + w (1 - SSIM) + depth + smoothness + lambda_lap Laplacian (all"
+        " weights in `loss`) + lambda_msp penalty. Terms are unweighted; `term_ssim` is the mean SSIM itself, not"
+        " 1 - SSIM. There is no schedule: every weight in `loss` applies. An input that is absent is a component that"
+        " is off; without `model.laplacian` there is no Laplacian term. With `exposure_log_gain` and `exposure_bias`,"
+        " those of this frame, every term reads the exposed render (B13), and so does `colour_image`",
+    ),
+    "determinism": Operation(
+        {
+            **{f"{name}_1": Judged(5, "loss") for name in TWICE},
+            **{f"{name}_2": Judged(5, "loss", f"identical {name}_1") for name in TWICE},
+        },
+        "`objective` computed twice by two separate passes: `_1` and `_2` must have the same bits",
+    ),
+}
+OPERATIONS = tuple(DECLARED)
 HEIGHT, WIDTH = int(LENS["height"]), int(LENS["width"])
 WEIGHTS = {
     "ssim_weight": 0.25, "depth_weight": 1.0, "smoothness_weight": 0.05, "total_variation_factor": 2.0,

@@ -6,8 +6,26 @@ by an angle at which the closed forms lose digits.
 """
 
 from makers.making import Made, Seeds, Spec
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("pose",)
+DECLARED = {
+    "pose": Operation(
+        {
+            "corrected_rotation": Judged(1, oracle="pose_oracle.corrected"),
+            "corrected_translation": Judged(1, "scene", oracle="pose_oracle.corrected"),
+            "d_rotation": Judged(2, "loss", oracle="pose_oracle.gradients"),
+            "d_translation": Judged(2, "loss per scene", oracle="pose_oracle.gradients"),
+            "d_rotation_vector": Judged(2, "loss per rad", oracle="pose_oracle.gradients"),
+            "d_offset": Judged(2, "loss per scene", oracle="pose_oracle.gradients"),
+        },
+        "`rotation` need not be one: its nine entries are independent, and so are those of `d_rotation`",
+        free={
+            "model.pose_correction": "an option that is off in every preset; its equation has a family of its own",
+            "optimiser.pose": "a rate of that option",
+        },
+    )
+}
+OPERATIONS = tuple(DECLARED)
 FLAGS = ("rotation_vector_reversed", "rotation_after_pose", "offset_before_rotation", "radial_gradient_dropped")
 
 

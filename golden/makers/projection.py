@@ -9,9 +9,28 @@ import numpy as np
 
 from endotsr.method.splatting.settings import PAPER
 from makers.making import Seeds, Spec, given
+from makers.operations import PER_LENGTH, Judged, Operation
 from makers.views import PRESETS, lens_settings, pose, seen_at, shape_inputs, spread_points
 
-OPERATIONS = ("projection",)
+FORWARD = "projection.projection_forward"
+DECLARED = {
+    "projection": Operation(
+        {
+            "visible": Judged(1, scale="exact"),
+            "mean2d": Judged(1, "px", "last", FORWARD),
+            "covariance2d": Judged(1, "px^2", "last", FORWARD),
+            "depth": Judged(1, "scene unit", "last", FORWARD),
+            "d_position": Judged(2, PER_LENGTH, "last"),
+            "d_rotation": Judged(2, "loss", "last"),
+            "d_scale": Judged(2, PER_LENGTH, "last"),
+            "d_rotation_matrix": Judged(2, "loss"),
+            "d_translation": Judged(2, PER_LENGTH),
+        },
+        "from `rotation` and `scale`; `covariance2d` = a, b, c with the low-pass; entries of invisible Gaussians are 0."
+        " `d_rotation_matrix`: its nine entries taken as independent",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _preset(name: str) -> Spec:

@@ -7,8 +7,25 @@ or the pixel centres before its equations are judged.
 import numpy as np
 
 from makers.making import Spec, given, scalar
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("reading", "generator")
+DECLARED = {
+    "reading": Operation(
+        {
+            **{name: Judged(0, scale="exact") for name in ("column", "flat", "scalar", "empty")},
+            **{name: Judged(0, scale="exact") for name in ("tissue_pixels", "tissue_row")},
+            **{name: Judged(0, "px", "exact") for name in ("sample_x", "sample_y")},
+        },
+        "`column` = `harmonics[:, :, gaussian]`; `flat` = `harmonics` in row-major order; `scalar` and `empty` as they"
+        " are; `tissue_pixels` = number of True; `tissue_row` = columns that are True in row `row` of `mask`;"
+        " `sample_x`, `sample_y` = sample positions of all columns, rows",
+    ),
+    "generator": Operation(
+        {name: Judged(0, scale="exact") for name in ("words", "unit_numbers")},
+        "the first `count` words of `seed`; `unit_numbers` = (word >> 40) / 2^24",
+    ),
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _layout() -> Spec:

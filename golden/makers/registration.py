@@ -9,8 +9,23 @@ independent.
 import numpy as np
 
 from makers.making import Made, Seeds, Spec, changed, given
+from makers.operations import PER_LENGTH, Judged, Operation
 
-OPERATIONS = ("registration",)
+FORWARD, REVERSE = "registration.registration_forward", "registration.registration_reverse"
+DECLARED = {
+    "registration": Operation(
+        {
+            "residual": Judged(1, "unit of the picture", oracle=FORWARD),
+            "seen": Judged(1, scale="exact", oracle=FORWARD),
+            "d_rotation": Judged(2, "loss", oracle=REVERSE),
+            "d_translation": Judged(2, PER_LENGTH, oracle=REVERSE),
+            "d_points": Judged(2, PER_LENGTH, oracle=REVERSE),
+            "d_reference": Judged(2, "loss per unit of the picture", oracle=REVERSE),
+        },
+        "the lens is in `camera`; `rotation` need not be one; `picture` is not differentiated",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 LENS = {"fx": 19.0, "fy": 23.0, "cx": 9.5, "cy": 7.25, "width": 19, "height": 15}
 COUNT = 12
 

@@ -10,10 +10,34 @@ from collections.abc import Callable
 import numpy as np
 
 from endotsr.method.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
+from makers.composite import UNITS
 from makers.making import Made, Seeds, Spec, changed, given
+from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
 from makers.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
 
-OPERATIONS = ("render",)
+DECLARED = {
+    "render": Operation(
+        {
+            **{name: Judged(3, unit, oracle="render.render_forward") for name, unit in UNITS.items()},
+            "visible": Judged(3, scale="exact"),
+            "d_position": Judged(3, PER_LENGTH, "last"),
+            "d_quaternion": Judged(3, "loss", "last"),
+            "d_log_scale": Judged(3, "loss", "last"),
+            "d_opacity_logit": Judged(3, "loss", "last"),
+            "d_harmonics": Judged(3, "loss", "last"),
+            "d_residual": Judged(3, "loss", "last"),
+            "d_mean2d": Judged(3, "loss per px", "last"),
+            "d_background": Judged(3, PER_DISPLAY),
+            "d_rotation_matrix": Judged(3, "loss"),
+            "d_translation": Judged(3, PER_LENGTH),
+        },
+        "raw parameters, already at their time; `conic_epsilon` uses the det of (B3); `d_mean2d` = gradient with"
+        " respect to the screen mean, for density control; `visible` = counted by its statistic (B11), asked for where"
+        " no box ends within 0.1 px of a pixel centre",
+        equations="(B2) to (B5)",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def _view(case: str, count: int, degree: int, static: bool) -> dict[str, Made]:

@@ -6,8 +6,22 @@ test the normalisation of the atoms, the order of the ten offsets, and offsets b
 
 from makers.making import Seeds, Spec
 from makers.moving import TIME, model_settings, moving_inputs
+from makers.operations import Judged, Operation
 
-OPERATIONS = ("scene",)
+DECLARED = {
+    "scene": Operation(
+        {
+            "position_at_t": Judged(1, "scene unit", "last", "motion.motion_forward"),
+            "quaternion_at_t": Judged(1, "1", "last", "deformation.deformation_forward"),
+            "log_scale_at_t": Judged(1, "1", "last", "deformation.deformation_forward"),
+            "residual_at_t": Judged(1, "display / Y00", "last", "appearance.appearance_forward"),
+        },
+        "raw parameters at time `t`: offsets, C phi added; `residual_at_t` by (2). `model` holds the settings,"
+        " statistics are over `times[train_index]`",
+        equations="(1) to (3), (B1)",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

@@ -7,10 +7,36 @@ before and after them, and a short run with the opposite choices.
 import numpy as np
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, TrainingConfig
+from endotsr.port.stages.optimiser import RESIDUAL_RATES
 from makers.making import Spec, given
+from makers.operations import Judged, Operation
 from makers.settings import written
 
-OPERATIONS = ("schedule",)
+RATES = [
+    "position", "quaternion", "log_scale", "opacity_logit", "harmonics_base", "harmonics_rest", "fdm_weight_position",
+    "fdm_weight_other", "fdm_centre", "fdm_width", *RESIDUAL_RATES,
+]  # fmt: skip
+DECLARED = {
+    "schedule": Operation(
+        {
+            **{f"rate_{name}": Judged(1, "per step", oracle="schedules.learning_rates") for name in RATES},
+            "laplacian_weight": Judged(1, oracle="schedules.learning_rates"),
+            **{
+                name: Judged(1, scale="exact", oracle="schedules.learning_rates")
+                for name in ("degree", "residuals", "smoothness", "gathers", "densifies")
+            },
+        },
+        "`config` as in `training`, at the iterations `iteration`. `rate_harmonics_base` is that of `harmonics[0]`,"
+        " `rate_harmonics_rest` of the others; `rate_fdm_weight_position` of channels 0 to 2, `rate_fdm_weight_other`"
+        " of 3 to 9; rates of A and C are 0 up to K_s, and 0 throughout for a model with neither A nor S."
+        " `laplacian_weight` = lambda_lap(i), and 0 throughout for a model without L; `degree` = active degree; True"
+        " where residuals are evaluated (`residuals`: never for a model with neither A nor S, whatever `lambda_msp`"
+        " is), smoothness counts (`smoothness`: never where its weight is 0), (B11) gathers its statistic (`gathers`)"
+        " and its rule runs (`densifies`)",
+        equations="(6), (B10)",
+    )
+}
+OPERATIONS = tuple(DECLARED)
 MILESTONES = (1, 499, 500, 501, 600, 999, 1000, 1001, 1499, 1500, 1750, 2499, 2500, 2999, 3000, 3001, 3500, 3900, 3999,
               4000, 5999, 6000)  # fmt: skip
 

@@ -8,8 +8,20 @@ import numpy as np
 
 from makers.images import HEIGHT, WIDTH, nothing, tool_mask
 from makers.making import Seeds, Spec, given, scalar
+from makers.operations import PER_DISPLAY, PER_LENGTH, Judged, Operation
 
-OPERATIONS = ("smoothness",)
+DECLARED = {
+    "smoothness": Operation(
+        {
+            "loss": Judged(1, "scene unit^2", oracle="smoothness.smoothness_forward"),
+            "d_rendered": Judged(2, PER_DISPLAY, oracle="smoothness.smoothness_forward"),
+            "d_rendered_depth": Judged(2, PER_LENGTH, oracle="smoothness.smoothness_forward"),
+        },
+        "`edges` are given; in `training` there are none",
+        settings={"total_variation_factor": "loss.total_variation_factor"},
+    )
+}
+OPERATIONS = tuple(DECLARED)
 
 
 def cases() -> list[Spec]:

@@ -17,14 +17,41 @@ from endotsr.config import (
     RasterConfig,
     TrainingConfig,
 )
+from endotsr.definition.exposure import EXPOSURES
+from endotsr.port.stages.optimiser import SQUARES, STATE, TERMS
+from endotsr.training.scene.gaussians import Gaussians
 from makers.clock import stamps, train_index
 from makers.images import tissue
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import BASES, FRAMES, FREQUENCIES, LENS
+from makers.operations import Judged, Operation
 from makers.settings import written
 from makers.views import pose, scene_inputs
 
-OPERATIONS = ("training",)
+DECLARED = {
+    "training": Operation(
+        {
+            "lambda_lap": Judged(4),
+            **{name: Judged(4, order="iteration") for name in TERMS},
+            "loss": Judged(4, "loss", order="iteration"),
+            "count": Judged(4, scale="exact", order="iteration"),
+            **{name: Judged(4, "raw parameter^2", order="iteration") for name in SQUARES},
+            **{name: Judged(4, order="iteration") for name in STATE},
+            **{f"final_{name}": Judged(4, "raw parameter", "max") for name in Gaussians._fields},
+            **{f"square_{name}": Judged(4, "raw parameter^2", order="iteration") for name in EXPOSURES},
+            **{f"final_{name}": Judged(4, "raw parameter", "max") for name in EXPOSURES},
+        },
+        "see below",
+        equations="(6), (7), (B10), (B11)",
+        free={
+            "training.visits_per_frame": "the length of a run; a case states its number of iterations",
+            "training.bridge_fraction": "times between frames need optical flow, which no case has",
+            "training.coarse_start": "an option that is not part of the paper",
+            "training.seed": "random draws are inputs of the cases",
+        },
+    )
+}
+OPERATIONS = tuple(DECLARED)
 COUNT, ITERATIONS, SHORT = 16, 20, 12
 
 

@@ -16,7 +16,8 @@ from makers.twins import distances, made_up
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add_component.md"
 SQUARED, DEFINITION = "reference/endotsr/method/losses/squared.py", "reference/endotsr/definition/squared.py"
-STAGES, JUDGED = "reference/endotsr/port/stages/losses.py", "golden/makers/registry.py"
+STAGES, FAMILY = "reference/endotsr/port/stages/losses.py", "golden/makers/masked_squared.py"
+NOTEBOOK = "notebooks/11_base_losses.py"
 BLOCKS = re.findall(r"^```python\n# (\S+)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
@@ -36,9 +37,10 @@ def component(monkeypatch):
 
 
 def test_the_guide_has_a_block_for_each_step():
-    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, JUDGED, "notebooks/11_base_losses.py"]
+    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, FAMILY, NOTEBOOK]
     root = GUIDE.parents[2]
-    assert all((root / path).is_file() for path, _ in BLOCKS[2:]), "the guide names files that exist"
+    assert all((root / path).is_file() for path in (STAGES, NOTEBOOK)), "the guide names files that exist"
+    assert all((root / path).parent.is_dir() for path, _ in BLOCKS), "a new file is in a folder that exists"
 
 
 def test_the_component_agrees_with_its_definition(component):
@@ -54,7 +56,7 @@ def test_the_component_agrees_with_its_definition(component):
 
 
 def test_the_stage_agrees_with_its_twin(component):
-    (stage,), judged = component[STAGES].STAGES, component[JUDGED].JUDGED["masked_squared"]
+    (stage,), judged = component[STAGES].STAGES, component[FAMILY].DECLARED["masked_squared"].outputs
     twin = twin_of(stage)
     assert twin.forward.__self__.forward is component[DEFINITION].masked_squared_forward
     found = distances(stage, stage._replace(forward=twin.forward, reverse=twin.reverse), made_up(stage), judged)
@@ -77,4 +79,4 @@ def test_the_stage_answers_what_is_judged(component):
     rng = np.random.default_rng(1)
     inputs = {"rendered": rng.random((3, 4, 4)), "observed": rng.random((3, 4, 4)), "mask": np.ones((4, 4), bool)}
     found = stage.compute({**inputs, "d_loss": np.array(1.0)}, {})
-    assert set(found) == set(component[JUDGED].JUDGED[stage.name])
+    assert set(found) == set(component[FAMILY].DECLARED[stage.name].outputs)

@@ -1,5 +1,7 @@
 """Every family holds its operations, cases and mistakes together, and the published order is kept."""
 
+from pathlib import Path
+
 import msgspec
 import pytest
 
@@ -27,6 +29,20 @@ def test_a_family_has_cases_and_mistakes_of_its_own_operations(family):
 
 def test_every_operation_is_in_a_family():
     assert {name for family in families() for name in family.OPERATIONS} == set(all_operations())
+
+
+def test_every_module_with_cases_is_a_family():
+    modules = Path(registry.__file__).parent.glob("*.py")
+    assert {file.stem for file in modules if "\ndef cases(" in file.read_text(encoding="utf-8")} == set(FAMILIES)
+
+
+def test_every_operation_is_declared_in_one_family_which_has_cases_of_it(monkeypatch):
+    declaring = [family for family in families() if hasattr(family, "DECLARED")]
+    assert [name for family in declaring for name in family.OPERATIONS] == list(registry.DECLARED)
+    assert registry.DECLARED.keys() == all_operations().keys()
+    monkeypatch.setattr(registry, "FAMILIES", ("motion", "motion"))
+    with pytest.raises(ValueError, match=r"^makers\.motion: operation motion is declared twice$"):
+        registry.all_declared()
 
 
 def test_the_cases_are_those_of_the_manifest():

@@ -4,6 +4,7 @@ import pytest
 
 from endotsr.port.judge.store import golden_folder, read_golden
 from makers import hard_coded
+from makers.registry import DECLARED
 
 GOLDEN = read_golden(golden_folder())
 GOLDEN = GOLDEN._replace(cases=sorted(GOLDEN.cases, key=lambda case: case.level))
@@ -33,7 +34,8 @@ def test_a_setting_that_no_case_moves_is_a_gap():
 
 def test_a_fault_names_the_list_with_the_remedy():
     one = hard_coded.Row("loss.new", {"0.0": ""})
-    assert "a line 'loss.new' with the reason to FREE of golden/makers/hard_coded.py" in one.fault
+    assert "a line 'loss.new' with the reason to `free` of its operation in that family; a setting of no" in one.fault
+    assert one.fault.endswith(" to GENERAL of golden/makers/hard_coded.py")
     assert "always uses ['1.0'] passes; " in hard_coded.Row("loss.new", {"0.0": "adam/a", "1.0": ""}).fault
     assert hard_coded.Row("loss.new", {"0.0": "adam/a", "1.0": "adam/b"}).fault == ""
 
@@ -43,3 +45,9 @@ def test_what_is_left_out_is_a_setting_and_has_a_reason():
     known = {f"{section}.{key}" for section in hard_coded.SECTIONS for key in config[section]}
     assert hard_coded.FREE.keys() <= known and all(hard_coded.FREE.values())
     assert set(config) - set(hard_coded.SECTIONS) == {"preset", "sequence"}
+
+
+def test_a_setting_with_another_name_is_one_of_the_cases_and_stands_for_one_that_they_move():
+    held = {(case.operation, name) for case in GOLDEN.cases for name in case.settings}
+    stands_for = {(op, name): key for op, one in DECLARED.items() for name, key in one.settings.items()}
+    assert len(stands_for) > 8 and stands_for.keys() <= held and set(stands_for.values()) <= WANTED.keys()
