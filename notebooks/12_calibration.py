@@ -112,18 +112,19 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # <!-- definition: endotsr.definition.calibration.calibration_views -->
 # ```python
 # def calibration_views(n_train, count):
-#     """Distinct ascending positions within n_train >= 1 training frames, rounded half to even."""
-#     return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(int))
+#     """Distinct ascending positions within n_train training frames, rounded half to even; none without a frame."""
+#     return np.unique(np.round(np.linspace(0, n_train - 1, count if n_train else 0)).astype(int))
 # ```
 #
 # <!-- definition: endotsr.definition.calibration.calibrate -->
 # ```python
 # def calibrate(views, gradient_ratio):
-#     """Equation (7): from (name, g_rgb, g_lap) of every view. One with g_rgb = 0 or no finite ratio is dropped.
+#     """Equation (7): from (name, g_rgb, g_lap) of every view. One without g_rgb > 0 and a finite ratio >= 0 is dropped.
 #
 #     Raises: ValueError if no view remains, or the median is 0 or too small to divide by.
 #     """
-#     ratios = np.array([fine / rgb for _, rgb, fine in views if 0 < rgb < np.inf and np.isfinite(fine / rgb)])  # (12.6)
+#     ratios = [fine / rgb for _, rgb, fine in views if 0 < rgb < np.inf]
+#     ratios = np.array([ratio for ratio in ratios if 0 <= ratio < np.inf])  # (12.6)
 #     median = np.median(ratios) if ratios.size else 0.0
 #     if median == 0 or not np.isfinite(gradient_ratio / median):
 #         raise ValueError("calibration: no view has a ratio, or their median is 0 or too small")
