@@ -10,7 +10,8 @@ def test_a_kernel_reaches_its_room_its_gradients_and_its_twin():
     assert "pyright reference/endotsr/method/losses/depth.py" in found
     near, far = (set(command.split()) for command in found[-2:])
     assert near >= {"tests/method/losses", "tests/test_gradcheck.py", "tests/definition/test_twins.py"}
-    assert "tests/training/fitting/test_objective.py" in far - near and "tests/method/losses/test_depth.py" not in far
+    assert "tests/training/fitting/test_objective.py" in near
+    assert "tests/training/fitting/test_packed.py" in far - near and "tests/method/losses/test_depth.py" not in far
 
 
 def test_lists_that_lack_a_new_component_come_before_the_programs_but_after_the_cases_that_they_read():

@@ -12,19 +12,12 @@ from endotsr.port.judge.format import Case
 PARTS = {
     "scene": ("frequencies", "dictionary", "atoms", "appearance", "motion", "deformation"),
     "render": ("covariance", "projection", "harmonics", "composite"),
-    "objective": ("scene", "render", "masked_l1", "masked_ssim", "normalised_depth", "smoothness", "laplacian",
-                  "matern", "exposure"),
+    "objective": ("scene", "render", "exposure", "masked_l1", "masked_ssim", "normalised_depth", "smoothness",
+                  "laplacian", "matern"),
     "training": ("objective", "calibration", "adam", "schedule", "density"),
     "determinism": ("objective",),
 }  # fmt: skip
-"""Operations that an operation is directly composed of."""
-ORDER = (
-    "reading", "generator", "frequencies", "dictionary", "atoms", "appearance", "motion", "deformation", "covariance",
-    "projection", "harmonics", "composite", "exposure", "pose", "registration", "masked_l1", "masked_ssim",
-    "normalised_depth", "smoothness", "laplacian", "matern", "calibration", "adam", "schedule", "density",
-    "initialisation", "scene", "render", "objective", "training", "determinism",
-)  # fmt: skip
-"""Files, then the operations without parts in the order of the diagnosis, then those composed of others."""
+"""Operations that an operation is directly composed of, in the order of the method; a part comes before the whole."""
 MOST_CASES = 4  # listed by name
 
 
@@ -32,6 +25,16 @@ def made_of(operation: str) -> set[str]:
     """All operations that an operation is composed of, at any depth."""
     parts = set(PARTS.get(operation, ()))
     return parts.union(*map(made_of, parts))
+
+
+def order_of(cases: Sequence[Case]) -> list[str]:
+    """The operations in the order of the diagnosis: those without parts, and then those composed of others.
+
+    Of those without parts, the parts of others come first, and the rest follows as the cases have it.
+    """
+    parts = [part for whole in PARTS.values() for part in whole]
+    simple = [name for name in (*parts, *(case.operation for case in cases)) if name not in PARTS]
+    return list(dict.fromkeys((*simple, *PARTS)))
 
 
 def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
@@ -82,9 +85,9 @@ def _follows(case: Case, output: str) -> bool:
 
 def first_wrong(cases: Sequence[Case], reports: Sequence[Any]) -> tuple[int, Case | None]:
     """The first case with a refused output, by level, then in the order of the method, and that level."""
-    known, place = {case.name: case for case in cases}, {name: k for k, name in enumerate(ORDER)}
+    known, place = {case.name: case for case in cases}, {name: k for k, name in enumerate(order_of(cases))}
     wrong = [
-        (o.level, place.get(known[r.name].operation, len(ORDER)), k, r.name)
+        (o.level, place[known[r.name].operation], k, r.name)
         for k, r in enumerate(reports)
         for o in r.outputs
         if o.status == "refused" and r.name in known
