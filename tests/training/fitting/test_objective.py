@@ -3,15 +3,11 @@
 import msgspec
 import numpy as np
 import pytest
+from terms import TERMS, alone
 
 from endotsr.clips.sequences.sequence import Frame
 from endotsr.config import PAPER
 from endotsr.method.equations.calibration import rms
-from endotsr.method.equations.laplacian import LEVELS, laplacian_loss_forward, laplacian_loss_reverse, support_masks
-from endotsr.method.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.method.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
-from endotsr.method.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
-from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import RenderOut
 from endotsr.training.fitting import objective
@@ -19,8 +15,8 @@ from endotsr.training.fitting.objective import LossWeights, calibrate_on, frame_
 
 WIDTH, HEIGHT = 20, 16
 CAMERA = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, WIDTH / 2, HEIGHT / 2, WIDTH, HEIGHT)
-WEIGHTS = LossWeights(ssim=0.3, depth=0.7, smoothness=0.2, laplacian=0.6)
-OFF = LossWeights(0.0, 0.0, 0.0, 0.0)
+WEIGHTS = LossWeights(*(0.3 * 1.5**k for k in range(len(TERMS))))
+OFF = LossWeights(*(0.0 for _ in TERMS))
 
 
 @pytest.fixture
@@ -63,33 +59,17 @@ def test_targets_of_terms_that_are_off_are_not_made(frame):
 
 def parts(rendered, frame):
     """Value and gradients (by colour, by depth) of each term at weight 1, from its own module."""
-    none = np.zeros((HEIGHT, WIDTH))
-    image, mask = np.where(frame.mask, frame.image, 0), frame.mask
-    l1, l1_saved = masked_l1_forward(rendered.colour, image, mask)
-    ssim, ssim_saved = masked_ssim_forward(rendered.colour, ssim_target(frame.image, mask))
-    depth, depth_saved = normalised_depth_forward(rendered.depth, depth_target(frame.depth, mask))
-    edges = objective.canny_edges(rendered.depth)
-    smooth, smooth_saved = smoothness_forward(
-        rendered.depth, rendered.colour, mask, edges, PAPER.loss.total_variation_factor
-    )
-    supports = support_masks(mask, LEVELS, PAPER.loss.upsampling)
-    detail, detail_saved = laplacian_loss_forward(rendered.colour, image, supports, PAPER.loss.upsampling)
-    back = smoothness_reverse(1.0, smooth_saved)
-    return {
-        "l1": (l1, masked_l1_reverse(1.0, l1_saved), none),
-        "ssim": (ssim, masked_ssim_reverse(1.0, ssim_saved), none),
-        "depth": (depth, 0, normalised_depth_reverse(1.0, depth_saved)),
-        "smoothness": (smooth, back.d_rendered, back.d_rendered_depth),
-        "laplacian": (detail, laplacian_loss_reverse(1.0, detail_saved), none),
-    }
+    return {name: alone(name, rendered, frame) for name in ("l1", *TERMS)}
 
 
-def test_every_term_of_the_objective_is_in_this_file(frame, rendered):
-    assert parts(rendered, frame).keys() == {"l1", *LossWeights._fields}, "a term is missing in `parts` of this file"
-    assert all(WEIGHTS), "a term has no weight in WEIGHTS of this file"
+def test_no_two_terms_have_the_same_weight_value_or_gradient(frame, rendered):
+    """Each is told from the others, and none is 0."""
+    values = [*WEIGHTS, *(value for value, _, _ in parts(rendered, frame).values())]
+    assert all(values) and len({*values}) == len(values)
+    assert all(np.any(by_colour) or np.any(by_depth) for _, by_colour, by_depth in parts(rendered, frame).values())
 
 
-@pytest.mark.parametrize("on", ["all", "none", *LossWeights._fields])
+@pytest.mark.parametrize("on", ["all", "none", *TERMS])
 def test_the_objective_is_the_weighted_sum_of_its_terms(frame, rendered, on):
     weights = WEIGHTS if on == "all" else OFF if on == "none" else OFF._replace(**{on: getattr(WEIGHTS, on)})
     found = image_loss(rendered, frame_targets(frame, PAPER), weights, PAPER.loss)
@@ -100,14 +80,22 @@ def test_the_objective_is_the_weighted_sum_of_its_terms(frame, rendered, on):
     loss = weights.ssim + sum(factors[name] * value for name, (value, _, _) in wanted.items())
     assert found.loss == pytest.approx(loss, rel=1e-13)
     for got, place in ((found.d_colour, 1), (found.d_depth, 2)):
-        gradient = sum(factors[name] * term[place] for name, term in wanted.items())
+        gradient = sum((factors[name] * term[place] for name, term in wanted.items()), np.zeros(got.shape))
         np.testing.assert_allclose(got, gradient, rtol=1e-11, atol=1e-16)
 
 
-def test_a_term_without_target_is_left_out(frame, rendered):
-    targets = frame_targets(frame, PAPER)._replace(ssim=None, depth=None, supports=None)
-    found = image_loss(rendered, targets, WEIGHTS, PAPER.loss)
-    assert set(found.terms) == {"l1", "smoothness"}
+def test_a_term_without_its_target_is_left_out_and_no_other(frame, rendered):
+    """Image and mask belong to all of them; edges are found as they are needed."""
+    whole, every = frame_targets(frame, PAPER), {"l1", *TERMS}
+
+    def left_out(*names):
+        bare = whole._replace(**dict.fromkeys(names))
+        return every - image_loss(rendered, bare, WEIGHTS, PAPER.loss).terms.keys()
+
+    optional = set(whole._fields) - {"image", "mask"}
+    by_target = {name: left_out(name) for name in optional}
+    assert by_target | {"ssim": {"ssim"}, "depth": {"depth"}, "supports": {"laplacian"}} == by_target
+    assert all(by_target.values()) and left_out(*optional) == set().union(*by_target.values()) <= every - {"smoothness"}
 
 
 def test_nothing_is_rendered_for_the_depth_of_a_photometric_loss(frame, rendered):

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from terms import TERMS, alone, forward_functions
 
 from endotsr.clips.effects.plan import with_setting
 from endotsr.clips.effects.savings import numbers_of_a_gaussian
-from endotsr.config import PAPER
+from endotsr.config import PAPER, LossConfig
 from endotsr.method.equations import laplacian
 from endotsr.method.equations.laplacian import support_masks
 from endotsr.method.losses import smoothness
@@ -14,15 +15,7 @@ from endotsr.method.splatting.camera import Camera
 from endotsr.method.splatting.render import render_forward, render_reverse
 from endotsr.method.splatting.settings import PAPER as RASTER
 from endotsr.training.fitting.model import scene_at, spectral_from, with_exposure, with_exposure_reverse
-from endotsr.training.fitting.objective import (
-    LossWeights,
-    depth_term,
-    frame_targets,
-    full_weights,
-    image_loss,
-    laplacian_term,
-    smoothness_term,
-)
+from endotsr.training.fitting.objective import LossWeights, frame_targets, full_weights, image_loss
 from endotsr.training.fitting.state import bench_state
 from endotsr.training.scene import workload
 from endotsr.training.scene.gaussians import Gaussians, arrays
@@ -111,49 +104,37 @@ def test_exposure_off_equals_an_exposure_of_zero_bitwise():
     np.testing.assert_array_equal(with_exposure_reverse(d_colour, saved)[0], with_exposure_reverse(d_colour, None)[0])
 
 
-LOSSES = {
-    "ssim": ("loss.ssim_weight", 0.0, ()),
-    "depth": ("loss.depth_weight", 0.0, ("depth_term", "normalised_depth_forward")),
-    "smoothness": ("loss.smoothness_weight", 0.0, ("smoothness_term", "smoothness_forward")),
-    "laplacian": ("model.laplacian", False, ("laplacian_term", "laplacian_loss_forward")),
-}
+def switched_off(term):
+    """The configuration of the paper with one term off: by its weight, or as a component of the model."""
+    of_loss = f"{term}_weight" in LossConfig.__struct_fields__
+    return with_setting(PAPER, *((f"loss.{term}_weight", 0.0) if of_loss else (f"model.{term}", False)))
 
 
-def test_every_term_of_the_objective_is_switched_off_here():
-    assert LOSSES.keys() == set(LossWeights._fields), "a term is missing in LOSSES of this file"
-
-
-@pytest.mark.parametrize("name", LOSSES)
+@pytest.mark.parametrize("name", TERMS)
 def test_a_loss_that_is_off_equals_the_loss_of_weight_zero_bitwise(name, monkeypatch):
-    """Loss and gradients; when it is off its functions are not called, and its targets are not made."""
-    key, value, functions = LOSSES[name]
+    """Loss and gradients; when it is off its functions are not called, and its target is not made."""
     rendered, _ = view(*made_up({}))
-    frame = workload.sequence(WIDTH, HEIGHT, frames=4).frame(0)
-    config = with_setting(PAPER, key, value)
-    weights = full_weights(PAPER.loss, 0.8)._replace(**{"smoothness": 0.5, name: 0.0})
+    frame, config = workload.sequence(WIDTH, HEIGHT, frames=4).frame(0), switched_off(name)
+    weights = LossWeights(*(max(weight, 0.5) for weight in full_weights(PAPER.loss, 0.8)))._replace(**{name: 0.0})
     whole, bare = frame_targets(frame, PAPER), frame_targets(frame, config)
-    assert sum(target is None for target in bare) == (name != "smoothness")  # edges are found as they are needed
-    zero = _terms_of_weight_zero(rendered, whole)
+    assert {one for one, target in bare._asdict().items() if target is None} == targets_of(name, rendered, whole)
+    value, *gradients = alone(name, rendered, frame, 0.0)
+    assert value > 0 and not any(np.any(gradient) for gradient in gradients)
     on = image_loss(rendered, whole, weights, PAPER.loss)
-    for function in functions:
+    for function in forward_functions(name):
         monkeypatch.setattr(f"endotsr.training.fitting.objective.{function}", None)
     off = image_loss(rendered, bare, weights, config.loss)
-    assert on.loss == off.loss and name not in off.terms
+    assert on.loss == off.loss and off.terms.keys() == {"l1", *TERMS} - {name}
     for gradient in ("d_colour", "d_depth"):
         np.testing.assert_array_equal(getattr(on, gradient), getattr(off, gradient))
-    assert off.d_colour.any() and (name not in zero or not any(np.any(d) for d in zero[name]))
+    assert off.d_colour.any()
 
 
-def _terms_of_weight_zero(rendered, targets):
-    """Gradients of the terms, evaluated with weight 0."""
-    found = {
-        "depth": depth_term(rendered, targets.depth, 0.0),
-        "smoothness": smoothness_term(rendered, targets.mask, 0.0, 30.0, None),
-        "laplacian": laplacian_term(rendered.colour, targets.image, targets.supports, 0.0, "co_sited"),
-    }
-    for name, term in found.items():
-        assert term.value > 0, name
-    return {name: [d for d in term[1:] if d is not None] for name, term in found.items()}
+def targets_of(term, rendered, whole):
+    """The targets without which a term is not evaluated; none for one that compares with image and mask alone."""
+    on = LossWeights(*(0.5 for _ in TERMS))
+    without = {one: whole._replace(**{one: None}) for one in set(whole._fields) - {"image", "mask"}}
+    return {one for one, bare in without.items() if term not in image_loss(rendered, bare, on, PAPER.loss).terms}
 
 
 # --- masks that exclude nothing ---
