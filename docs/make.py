@@ -58,7 +58,7 @@ def main(words: list[str]) -> int:
     if name not in found:
         print(f"docs/make.py: {name!r} is not a program; use one of: {', '.join(found)}", file=sys.stderr)
         return 2
-    sys.path.insert(0, str(HERE))
+    sys.path[:0] = [str(HERE), str(HERE.parent / "golden")]  # `pages`, and `makers` of the golden cases
     sys.argv = [f"docs/make.py {name}", *rest]  # the name that argparse prints
     module = import_module("pages." + ".".join(found[name].relative_to(PAGES).with_suffix("").parts))
     (module.PROGRAM.run if hasattr(module, "PROGRAM") else module.main)(rest)

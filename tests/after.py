@@ -33,6 +33,7 @@ LISTED = ("golden/", *(f"{PACKAGE}{room}" for room in ("config.py", "definition/
 WRITE = "python golden/make.py write"
 # Beginning of a changed path -> commands whose output depends on it.
 CONSTANTS, INVENTORIES = "python tests/port/unseen/by_hand/constants.py", "python docs/make.py recordings.inventories"
+OPERATIONS = "python docs/make.py ports.operations"
 MAKERS = {
     f"{PACKAGE}config.py": ("python docs/make.py book.settings", CONSTANTS),
     f"{PACKAGE}definition/": ("python docs/make.py book.definitions",),
@@ -42,6 +43,9 @@ MAKERS = {
     f"{PACKAGE}cli/parts/related_options.py": (INVENTORIES,),
     "notebooks/": ("python docs/make.py book.chapters",),
     "golden/cases/": (CONSTANTS,),
+    "golden/makers/": (OPERATIONS,),
+    f"{PACKAGE}port/judge/profiles.py": (OPERATIONS,),
+    f"{PACKAGE}port/stages/": (OPERATIONS,),
 }
 # Beginning of a changed path -> tests beside those of its room.
 MORE = {

@@ -27,7 +27,7 @@ def test_a_record_reaches_the_pages_that_read_it():
     assert after.makers(["docs/results/levers.json"]) == ["python docs/make.py full_size.levers"]
     assert "python docs/make.py book.chapters" in after.makers(["notebooks/04_deformation.py"])
     assert after.makers(["README.md"]) == []
-    assert after.makers(["golden/makers/depth.toml"]) == ["python golden/make.py write depth"]
+    assert after.makers(["golden/makers/depth.toml"]) == ["python golden/make.py write depth", after.OPERATIONS]
 
 
 def test_a_page_of_the_specification_reaches_the_notebooks_that_repeat_its_displays():

@@ -35,7 +35,8 @@ def test_a_page_is_what_its_program_writes(name, page):
 
 MARK = re.compile(r"<!-- (\w+:\w+):start -->")
 SURVEY = "programs:tables"  # written by `tests/port/programs/survey.py`
-MARKS = sorted({mark for folder in ("", "docs", "docs/guides", "docs/specification", "docs/results", "notebooks")
+FOLDERS = ("", "docs", "docs/guides", "docs/specification", "docs/results", "notebooks", "golden")
+MARKS = sorted({mark for folder in FOLDERS
                 for page in (program.DOCS.parent / folder).glob("*.md")
                 for mark in MARK.findall(page.read_text(encoding="utf-8"))} - {SURVEY})  # fmt: skip
 

@@ -15,12 +15,12 @@ from endotsr.port.judge.store import Golden
 
 REVERSE = "d_"  # the names of the outputs of a reverse pass begin with it
 WITHOUT = ", without "  # before what a claim leaves out
-_FILES = ("reading", "generator")
+FILES = ("reading", "generator")
 _SCREEN = ("covariance", "projection", "harmonics", "composite")
 _LOSSES = ("masked_l1", "masked_ssim", "normalised_depth", "smoothness", "laplacian", "matern")
 _DECISIONS = ("adam", "schedule", "density", "initialisation", "calibration")
 _TIME = ("frequencies", "dictionary", "atoms", "appearance", "motion", "deformation", "scene")
-_METHOD = (*_FILES, *_TIME, *_LOSSES, *_SCREEN, *_DECISIONS, "render", "objective")
+_METHOD = (*FILES, *_TIME, *_LOSSES, *_SCREEN, *_DECISIONS, "render", "objective")
 
 
 class Profile(NamedTuple):
@@ -40,23 +40,23 @@ class Profile(NamedTuple):
 
 PROFILES = {
     "renderer-forward": Profile(
-        "renderer (forward)", (*_FILES, *_SCREEN, "render"),
+        "renderer (forward)", (*FILES, *_SCREEN, "render"),
         {1: "shape, projection, colour and compositing of Gaussians", 3: "colour, depth and opacity images"},
         forward=True,
     ),
     "renderer": Profile(
-        "renderer with gradients", (*_FILES, *_SCREEN, "render"),
+        "renderer with gradients", (*FILES, *_SCREEN, "render"),
         {1: "shape, projection, colour and compositing of Gaussians, forward",
          2: "shape, projection, colour and compositing of Gaussians, forward and reverse",
          3: "images, and their gradients with respect to every parameter and to the pose"},
     ),
     "losses": Profile(
-        "losses", (*_FILES, *_LOSSES),
+        "losses", (*FILES, *_LOSSES),
         {1: "values of L1, SSIM, depth, smoothness, Laplacian and Matern terms",
          2: "L1, SSIM, depth, smoothness, Laplacian and Matern terms, and their gradients"},
     ),
     "optimiser": Profile(
-        "optimiser and density", (*_FILES, *_DECISIONS),
+        "optimiser and density", (*FILES, *_DECISIONS),
         {1: "steps of Adam, rates and weights, density control, first Gaussians, calibration"},
     ),
     "method": Profile(
