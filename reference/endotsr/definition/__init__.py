@@ -13,8 +13,9 @@ reads. Apart from `calibrate`, no function here raises an error of its own: the 
     dictionary (1)  appearance (2)  motion (3)  matern (4)  laplacian (5)  objective (6)  calibration (7)
     deformation (B1)  covariance (B2)  projection (B3)  harmonics (B4)  compositing (B5)  render (B2)-(B5)
     masked_l1 (B6)  masked_ssim (B7)  depth (B8)  smoothness (B9)  adam, schedules (B10)  density_control (B11)
-    initialisation (B12)  exposure (B13)  pose (B16)  registration (B19)  metrics (M1), (M2)
+    initialisation (B12)
 
+Options and metrics have modules of their own. The first line of a module names its equations.
 `legacy` has the four deviations of the CUDA rasterisers; the other files are the equations alone.
 (B14) and (B15) start from an optical flow, (B17) and (B18) plan runs, and LPIPS (M3) needs a trained network; they are
 not in this room.
