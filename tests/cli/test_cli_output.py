@@ -1,8 +1,11 @@
 """`-q`, `--log-file`, the short and the whole help, and completion scripts."""
 
+import os
 import re
 import shutil
+import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,6 +50,45 @@ def test_a_log_on_a_full_disk_ends_with_one_warning_and_the_command_goes_on(quie
     said = capsys.readouterr()
     assert ("usage: endotsr render" in said.out) == (not quiet)
     assert said.err == "endotsr: warning: /dev/full: the disk is full; the log ends here, the command goes on\n"
+
+
+PRINTS = (["--help"], ["--version"], ["--completion", "bash"], ["check", "--help"], ["golden", "judge", "--help"])
+
+
+def code_and_errors(words, output, unbuffered, errors=subprocess.PIPE):
+    """Exit code and standard error of a process of its own, whose exit writes what is left in its buffers."""
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"} | unbuffered
+    command = [sys.executable, "-m", *words]
+    done = subprocess.run(command, stdout=output, stderr=errors, env=environment, text=True, timeout=300)
+    return done.returncode, done.stderr
+
+
+@pytest.fixture
+def left_by_its_reader():
+    reader, writer = os.pipe()
+    os.close(reader)
+    yield writer
+    os.close(writer)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes the reading end of a pipe")
+@pytest.mark.parametrize("unbuffered", [{}, {"PYTHONUNBUFFERED": "1"}], ids=["buffered", "unbuffered"])
+def test_a_closed_pipe_ends_a_command_without_a_traceback(unbuffered, left_by_its_reader):
+    for words in PRINTS:
+        assert code_and_errors(["endotsr", *words], left_by_its_reader, unbuffered) == (141, ""), words
+    refused = ["endotsr", "check", "no such folder"]
+    assert code_and_errors(refused, left_by_its_reader, unbuffered, left_by_its_reader) == (2, None)
+    definition = ["endotsr.definition"]
+    assert code_and_errors(definition, left_by_its_reader, unbuffered) == (-signal.SIGPIPE, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is a device of Linux")
+@pytest.mark.parametrize("unbuffered", [{}, {"PYTHONUNBUFFERED": "1"}], ids=["buffered", "unbuffered"])
+def test_a_full_disk_under_the_output_ends_a_command_in_one_line(unbuffered):
+    with Path("/dev/full").open("w") as full:
+        for words in PRINTS:
+            expected = (2, "endotsr: error: the disk is full\n")
+            assert code_and_errors(["endotsr", *words], full, unbuffered) == expected, words
 
 
 def test_no_output_replaces_a_recording_a_clip_or_a_run(run_copy, tmp_path, capsys):

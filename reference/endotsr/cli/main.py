@@ -18,6 +18,7 @@ from endotsr.training.runs.stopping import INTERRUPTED, signals_stop
 from endotsr.untrusted.names import plain_line
 
 OTHER_PROGRAMS = "close other programs"
+CLOSED_PIPE = 141
 LESS_MEMORY = {  # advice by command; the other commands get OTHER_PROGRAMS
     "train": "a smaller --scale, fewer --frames or a smaller --density.maximum needs less; with --resume, "
     + OTHER_PROGRAMS,
@@ -34,19 +35,22 @@ def main(argv: list[str] | None = None) -> int:
     try:
         output, words = split_output(argv)
         with redirected(output):
-            return _main(words)
+            code = _main(words)
+            if sys.stdout is not None:
+                sys.stdout.flush()  # raises for a closed pipe, which at the exit of the program would be a traceback
+            return code
     except InputError as error:
         return _fail(str(error))
+    except OSError as error:  # of the line above, or of what a handler of `_main` prints
+        return _system_error(error)
 
 
 def _main(words: list[str]) -> int:
-    if _answered(words):
-        return 0
     try:
+        if _answered(words):
+            return 0
         with signals_stop():
-            code = _command(words[0])(words[1:])
-            print(end="", flush=True)  # raises for a closed pipe
-            return code
+            return _command(words[0])(words[1:])
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
         print(table)
@@ -56,15 +60,10 @@ def _main(words: list[str]) -> int:
     except SystemExit as leaving:  # `--help` of a command
         return leaving.code if isinstance(leaving.code, int) else 0
     except KeyboardInterrupt as interrupt:
-        print(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}", file=sys.stderr)
+        _complain(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}")
         return INTERRUPTED
     except OSError as error:
-        if _is_closed_pipe(error):  # for example `endotsr ... | head`
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 141
-        from endotsr.training.runs.files import os_error_line
-
-        return _fail(os_error_line(error))
+        return _system_error(error)
     except FloatingPointError as error:
         _fail(f"training diverged: non-finite values: {error}; a smaller learning rate may help")
         return 1
@@ -87,6 +86,26 @@ def _answered(words: list[str]) -> bool:
     else:
         return False
     return True
+
+
+def _system_error(error: OSError) -> int:
+    """The exit code after an error of the system. A closed pipe, as of `endotsr ... | head`, has no message."""
+    closed = _is_closed_pipe(error)
+    if not closed:
+        from endotsr.training.runs.files import os_error_line
+
+        _fail(os_error_line(error))
+    _discard_unwritten()
+    return CLOSED_PIPE if closed else 2
+
+
+def _discard_unwritten() -> None:
+    """Drop the text that a closed pipe or a full disk does not take, so that the exit does not try it once more."""
+    for stream in filter(None, (sys.__stdout__, sys.__stderr__)):  # None without a console
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _is_closed_pipe(error: OSError) -> bool:
@@ -117,8 +136,16 @@ def _completion(words: list[str]) -> str:
 
 
 def _fail(message: str) -> int:
-    print(f"endotsr: error: {plain_line(message)}", file=sys.stderr)
+    _complain(f"endotsr: error: {plain_line(message)}")
     return 2
+
+
+def _complain(line: str) -> None:
+    """Print a line on standard error, whose reader may have left: the exit code tells the rest."""
+    try:
+        print(line, file=sys.stderr, flush=True)
+    except OSError:
+        _discard_unwritten()
 
 
 def _overview() -> str:
