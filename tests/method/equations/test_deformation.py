@@ -110,6 +110,8 @@ def test_hard_F7_dead_frames_at_the_start():
     width = np.full_like(weight, 0.01)
     best = [deformation_forward(weight, centre, width, k / 63)[0][0].max() for k in range(63)]
     assert sum(b < 1e-3 for b in best) == 16
+    wide = [deformation_forward(weight, centre, 5 * width, k / 63)[0][0].max() for k in range(63)]
+    assert min(wide) > 0.8  # width 0.05, as in the presets other than `paper`
 
 
 @pytest.mark.parametrize("basis", BASES)
