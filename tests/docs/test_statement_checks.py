@@ -130,6 +130,28 @@ def test_the_target_between_frames_against_the_moved_pair():
     assert not closer.pop("every eighth frame") and closer and all(closer.values())
 
 
+def test_no_tolerance_of_the_vectors_is_as_small_as_the_last_bit():
+    """docs/guides/platforms.md, and the floors that golden/README.md states."""
+    files = sorted((ROOT / "golden" / "cases").glob("*/*/case.json"))
+    outputs = [one for file in files for one in json.loads(file.read_text(encoding="utf-8"))["outputs"].values()]
+    rules = [one["compare"] for one in outputs if one["compare"]["kind"] != "exact"]
+    assert len(rules) > 1000
+    for name, bit, floor in (("float64", 2.0**-52, 1e-12), ("float32", 2.0**-23, 5e-6)):
+        assert bit < floor == min(rule[name] for rule in rules)
+
+
+def test_what_the_clamp_of_the_jacobian_costs_on_cutting():
+    """docs/guides/which_preset.md: most of the RMS difference of `paper`, and not most of the largest one."""
+    points = json.loads((RESULTS / "tradeoff_cutting_sharp.json").read_text(encoding="utf-8"))["points"]
+    of = {point["name"]: point["error"] for point in points}
+    paper, without = of["paper"], of["float64, cutoff 1/255, stop 1e-4"]
+    page = (ROOT / "docs/guides/which_preset.md").read_text(encoding="utf-8")
+    for error in (paper, without, of["alpha clamp 0.99"]):
+        shown = [f"{value:.1e}".replace("e-0", "e-") for value in (error["rms"], error["max"])]
+        assert " and ".join(shown) in " ".join(page.split())
+    assert without["rms"] < paper["rms"] / 2 and without["max"] > paper["max"] / 2
+
+
 def test_the_bound_of_the_hard_cases_is_not_below_the_worst():
     cases = json.loads((RESULTS / "hard_cases.json").read_text(encoding="utf-8"))["cases"]
     worst = max(float(row["float32"]["ours_error"]) for row in cases)
