@@ -74,8 +74,8 @@ def matern(dtype):
     "Zero border in the pyramid",
     naive="5-tap filter with zeros outside",
     bound=4,
-    why="A constant image has no detail. With zeros outside the image, its corners have bands of half the "
-    "brightness, at every frame and in every gradient.",
+    why="A constant image has no detail. With zeros outside the image, the bands at its corners are half its "
+    "brightness.",
 )
 def border(dtype):
     taps = np.array([1, 4, 6, 4, 1], dtype) / dtype(16)
