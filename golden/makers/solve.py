@@ -13,7 +13,8 @@ from endotsr.port.judge.words import signs
 from endotsr.port.reference import reference, stored
 from endotsr.port.stages.stage import Inputs, Outputs, Stage
 from makers.making import Spec
-from makers.registry import JUDGED, Judged
+from makers.operations import Judged
+from makers.registry import JUDGED
 from makers.wrong import Wrong
 
 MARGIN = 10.0  # smallest size of a detected mistake, in tolerances

@@ -17,7 +17,8 @@ from endotsr.port.judge.store import Golden
 from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.registry import all_stages
 from endotsr.port.stages.stage import Inputs, Settings, Stage
-from makers.registry import JUDGED, Judged
+from makers.operations import Judged
+from makers.registry import JUDGED
 
 SEEDS = (0, 1, 2)
 BOUND = 2e-14  # of the scale, for every output that is not in BOUNDS
