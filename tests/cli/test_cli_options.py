@@ -172,7 +172,7 @@ def test_help_lists_no_choice_called_none(command, capsys):
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        ("[model]\nbetta = 1\n", ["unknown key model.betta", "allowed: appearance"]),
+        ("[model]\nbetta = 1\n", ["unknown key model.betta", "allowed: appearance", "did you mean beta?"]),
         ("[model]\nbeta = 'x'\n", ["model.beta", "'x'", "a number > 0"]),
         ("[model]\nbasis = 'cubic'\n", ["model.basis", "'cubic'", "quartic, gaussian"]),
         ("[training]\nseed = true\n", ["training.seed", "True", "an integer >= 0"]),

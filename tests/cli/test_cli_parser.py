@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import pytest
 
+from endotsr.cli.parts.commands import COMMANDS
+from endotsr.cli.parts.completion import options_of
 from endotsr.cli.parts.fields import REQUIRED, Option, fields_of
 from endotsr.cli.parts.help_page import help_page
 from endotsr.cli.parts.mistakes import option_names
@@ -88,6 +90,8 @@ def test_several_values_and_none():
     assert tried("--sizes", "3", "4", "5").sizes == (3, 4, 5)
     with pytest.raises(InputError, match="--sizes: missing value"):
         tried("--sizes")
+    assert tried("--sizes", "3", "4", "--sizes", "5").sizes == (3, 4, 5), "given in parts"
+    assert tried("--places", "1", "2", "3", "--places", "4", "5", "6").places == (4.0, 5.0, 6.0), "the last one counts"
     assert tried("--marks").marks == () and tried("--marks", "7").marks == (7,)
     assert tried("--sequence.depth-percentiles", "1", "99").settings.sequence.depth_percentiles == (1.0, 99.0)
 
@@ -106,6 +110,7 @@ def test_several_values_and_none():
         (("--offset", "low"), "--offset 'low' is not allowed; allowed: a number"),
         (("-o", "x"), "-o: no such option; `endotsr try --help` lists the options"),
         (("--model.beta.x", "1"), "--model.beta.x: no such option; did you mean --model.beta?"),
+        (("--model.base", "1"), "command line: unknown key model.base; allowed: appearance"),
         (("--odd.beta", "1"), "command line: unknown key odd; allowed: sequence, model, raster"),
     ],
 )
@@ -113,7 +118,16 @@ def test_a_mistake_is_named_with_what_is_allowed(words, said):
     with pytest.raises(InputError) as refusal:
         tried(*words)
     found = str(refusal.value)
+    assert ("; did you mean bases?" in found) == (words[0] == "--model.base")
     assert found.startswith(said) and ("written out" in found) == ("written out" in said)
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if options_of(name)])
+def test_the_help_shows_where_several_values_can_stand(command):
+    for field in fields_of(options_of(command)):
+        shown = field.name if field.positional else field.metavar
+        counted = {"FX FY CX CY", "X Y WIDTH HEIGHT"}  # as many values as they name, which the command checks
+        assert (field.count == "*") == (" ..." in shown or shown in counted), field.name
 
 
 def test_known_options_are_picked_out_of_others():

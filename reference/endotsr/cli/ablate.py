@@ -26,7 +26,7 @@ class AblateOptions:
     that is, with the same number of Gaussians. An interrupted command continues when repeated, as `endotsr sweep`.
     """
 
-    sequences: Annotated[tuple[str, ...], Option("SEQUENCE", positional=True)]
+    sequences: Annotated[tuple[str, ...], Option("SEQUENCE ...", positional=True)]
     """sequence folders, or `simulated`"""
     out: Annotated[Path, Option("DIR")]
     """folder of the sweep"""
@@ -38,13 +38,13 @@ class AblateOptions:
     """exact length of every run; stretches the schedule"""
     scale: float = 1.0
     """image scale"""
-    splits: Annotated[tuple[str, ...], Option("SPLIT")] = ("every_eighth",)
+    splits: Annotated[tuple[str, ...], Option("SPLIT ...")] = ("every_eighth",)
     """held-out frames, one or more of every_eighth, every_second, "blocks N", "end N\""""
-    configurations: Annotated[tuple[str, ...], Option("NAME")] = ()
+    configurations: Annotated[tuple[str, ...], Option("NAME ...")] = ()
     """only these configurations (default: all seven)"""
     fixed_count: bool = True
     """also train with a fixed number of Gaussians"""
-    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
+    measures: Annotated[tuple[str, ...], Option("NAME ...")] = ()
     """additional measurements: depth, flicker, right_view"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights"""

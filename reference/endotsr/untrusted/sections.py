@@ -4,8 +4,10 @@ In: plain data of a TOML or JSON file, or of a command line. Out: a section, or 
 allowed values.
 """
 
+import difflib
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
@@ -47,9 +49,16 @@ def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") 
     fields = {f.name: f.type for f in msgspec.structs.fields(struct)}
     for key, value in data.items():
         if key not in fields:
-            raise InputError(f"{where}: unknown key {prefix}{key}; allowed: {', '.join(fields)}")
+            raise InputError(f"{where}: {unknown_key(key, fields, prefix)}")
         if isinstance(value, dict) and is_section(fields[key]):
             refuse_unknown_keys(value, fields[key], where, f"{prefix}{key}.")
+
+
+def unknown_key(key: str, allowed: Iterable[str], prefix: str = "") -> str:
+    """What is wrong with an unknown key: the allowed ones, and at the end the one that is spelled most like it."""
+    listed = list(allowed)
+    meant = "".join(f"; did you mean {name}?" for name in difflib.get_close_matches(key, listed, n=1))
+    return f"unknown key {prefix}{key}; allowed: {', '.join(listed)}{meant}"
 
 
 def is_section(kind: Any) -> bool:

@@ -60,7 +60,7 @@ class EvaluateOptions:
     """also write the metrics of every held-out frame, or the table of a comparison, as CSV"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
-    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
+    measures: Annotated[tuple[str, ...], Option("NAME ...")] = ()
     """additional measurements, each with reference rows: depth, flicker, right_view"""
     view: bool = True
     """write the viewer page view.html, linked from the report"""

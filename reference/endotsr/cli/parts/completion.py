@@ -28,13 +28,22 @@ FIRST_WORDS = {
 
 def words_of(command: str) -> list[str]:
     """The possible words after a command: its first words, then its options in the order of the help."""
-    module, name = SHARED_MODULE.get(command, (command, f"{command.capitalize()}Options"))
-    command_module: Any = importlib.import_module(f"endotsr.cli.{module}")
+    command_module, options = _module_and_options(command)
     found = list(getattr(command_module, CHOICES[command]) if command in CHOICES else FIRST_WORDS.get(command, ()))
-    options = getattr(command_module, name, None)  # golden has a class per first word instead
     if options is not None:
         found += [word for word in option_names(fields_of(options)) if word not in ALWAYS]
     return [*found, *ALWAYS]
+
+
+def options_of(command: str) -> type | None:
+    """The class of the options of a command; None for golden, which has a class per first word."""
+    return _module_and_options(command)[1]
+
+
+def _module_and_options(command: str) -> tuple[Any, type | None]:
+    module, name = SHARED_MODULE.get(command, (command, f"{command.capitalize()}Options"))
+    found: Any = importlib.import_module(f"endotsr.cli.{module}")
+    return found, getattr(found, name, None)
 
 
 def bash() -> str:

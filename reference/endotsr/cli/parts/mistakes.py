@@ -6,6 +6,7 @@ import os
 from endotsr.cli.parts.fields import Field
 from endotsr.errors import InputError
 from endotsr.untrusted.json import Keys
+from endotsr.untrusted.sections import unknown_key
 
 LIKE_ENOUGH = 0.7  # minimum similarity of a suggested option
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section, to prefer an option of that name
@@ -48,7 +49,7 @@ def _unknown_key(fields: list[Field], option: str) -> str:
         return ""
     for depth, name in enumerate(path):
         if name not in keys:
-            return f"unknown key {'.'.join(path[: depth + 1])}; allowed: {', '.join(keys)}"
+            return unknown_key(name, keys, "".join(f"{section}." for section in path[:depth]))
         if keys[name] is None:
             break
         keys = keys[name]

@@ -115,7 +115,8 @@ def _parser(fields: list[Field]) -> argparse.ArgumentParser:
         else:
             several = field.count != "*" or field.may_be_empty  # otherwise an option without values is a mistake
             count = field.count if several else "+"
-            parser.add_argument(field.name, dest=path, nargs=None if count == 1 else count)
+            more = "extend" if field.count == "*" else "store"  # `--sizes 1 --sizes 2` is `--sizes 1 2`
+            parser.add_argument(field.name, dest=path, action=more, nargs=None if count == 1 else count)
     return parser
 
 
