@@ -104,11 +104,19 @@ def run(words: list[str]) -> int:
         try:
             found = evaluate_run(folder, sequence, options.lpips, source=options.sequence or None, wait=True)
         except KeyboardInterrupt:
-            command = f"endotsr evaluate {shlex.quote(str(folder.path))}"
+            command = shlex.join(["endotsr", "evaluate", str(folder.path), *_evaluation_words(options)])
             raise KeyboardInterrupt(f"the training is finished, its evaluation is not: `{command}` makes it") from None
         shown.remember_evaluation()
         write_result(options.json, **found)
     return 0
+
+
+def _evaluation_words(options: TrainOptions) -> list[str]:
+    """The options of the evaluation. They are no settings of the run, and a command that continues it needs them."""
+    if not options.evaluate:
+        return ["--no-evaluate"]
+    files = (("--lpips", options.lpips), ("--json", options.json))
+    return [word for name, file in files if file is not None for word in (name, str(file))]
 
 
 def _train_windows(options: TrainOptions, words: list[str]) -> int:
@@ -198,7 +206,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
         print(line)
     shown = _progress(RunFolder(options.out), source, sequence, config, options)
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads)
-    folder = train_new_run(options.out, {**record, **found}, sequence, config, shown)
+    again = shlex.join(_evaluation_words(options))
+    folder = train_new_run(options.out, {**record, **found}, sequence, config, shown, again)
     shown.remember_speed()
     return folder, sequence, shown
 
@@ -243,7 +252,7 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
     config = folder.config()
     shown = _progress(folder, source, sequence, config, options, _reached(folder, config))
-    resume_run(folder, sequence, threads, shown)
+    resume_run(folder, sequence, threads, shown, shlex.join(_evaluation_words(options)))
     return folder, sequence, shown
 
 

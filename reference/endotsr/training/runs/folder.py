@@ -142,9 +142,9 @@ def lock_taken(file: IO[bytes]) -> bool:
         return True
 
 
-def resume_command(run: Path) -> str:
-    """The command that continues a run, as a shell takes it."""
-    return f"endotsr train --out {shlex.quote(str(run))} --resume"
+def resume_command(run: Path, options: str = "") -> str:
+    """The command that continues a run, as a shell takes it; `options` are those that are no settings of the run."""
+    return " ".join(["endotsr train --out", shlex.quote(str(run)), "--resume", *([options] if options else [])])
 
 
 def refuse_existing(path: Path) -> None:

@@ -61,9 +61,9 @@ class Observer(Protocol):
 
 
 def train_new_run(
-    out: "Path", record: RunRecord, sequence: "Sequence", config: Config, observer: Observer
+    out: "Path", record: RunRecord, sequence: "Sequence", config: Config, observer: Observer, options: str = ""
 ) -> RunFolder:
-    """Create a run folder and train to the end; errors as in `train_run`.
+    """Create a run folder and train to the end; `options` and errors as in `train_run`.
 
     The folder is removed if a write fails before the first checkpoint.
     """
@@ -74,7 +74,7 @@ def train_new_run(
     folder = create_run(out, config, record, record_of(sequence))
     try:
         with folder.locked():
-            train_run(folder, state, sequence, config, observer)
+            train_run(folder, state, sequence, config, observer, options)
     except RunStopped as stopped:
         if folder.has_checkpoint:
             raise
@@ -83,7 +83,7 @@ def train_new_run(
     return folder
 
 
-def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: Observer) -> None:
+def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: Observer, options: str = "") -> None:
     """Train a run from its last checkpoint to the end with the settings of its config.toml."""
     from endotsr.training.fitting.state import new_training
     from endotsr.training.runs.model import load_training
@@ -99,7 +99,7 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
         if state.iteration < planned:
             entry: ResumedEntry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
             folder.update({"status": "running", "resumed": [*folder.record().get("resumed", []), entry]})
-            train_run(folder, state, sequence, config, observer)
+            train_run(folder, state, sequence, config, observer, options)
         elif folder.record().get("status") != "finished":  # stopped between the last checkpoint and this record
             folder.update({"status": "finished", "finished": now(), "iterations_done": state.iteration})
 
@@ -143,9 +143,16 @@ def _state_to_extend(folder: RunFolder, before: Config, after: Config) -> "Train
 
 
 def train_run(
-    folder: RunFolder, state: "TrainingState", sequence: "Sequence", config: Config, observer: Observer
+    folder: RunFolder,
+    state: "TrainingState",
+    sequence: "Sequence",
+    config: Config,
+    observer: Observer,
+    options: str = "",
 ) -> "TrainingState":
     """Train from `state` to the end, with log, checkpoints and observer; returns the last state.
+
+    options   of the evaluation that follows, for the line on how to continue
 
     A signal completes the current iteration and writes a checkpoint. After a second signal, or if the iteration takes
     too long, the last checkpoint remains.
@@ -156,7 +163,7 @@ def train_run(
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.fitting.trainer import train
 
-    recorder = _Recorder(folder, state, config, observer)
+    recorder = _Recorder(folder, state, config, observer, options)
     observer.begin(state)
     try:
         with finishing():
@@ -189,9 +196,11 @@ def seconds_between(trained: float, saving: float) -> float:
 class _Recorder:
     """Writes log, checkpoints and run.json of one training while it runs."""
 
-    def __init__(self, folder: RunFolder, state: "TrainingState", config: Config, observer: Observer) -> None:
+    def __init__(
+        self, folder: RunFolder, state: "TrainingState", config: Config, observer: Observer, options: str
+    ) -> None:
         self.log = RunLog(folder.log, state.iteration)
-        self._folder, self._config, self._observer = folder, config, observer
+        self._folder, self._config, self._observer, self._options = folder, config, observer, options
         self._seconds_before, self._began = self.log.seconds, time.monotonic()
         self._last_tick = self._saved_at = self._began
         self._state, self._saving_took = state, 0.0
@@ -266,7 +275,7 @@ class _Recorder:
     def _advice(self) -> str:
         saved = self._saved
         kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet; the run starts again"
-        return f"{kept}; continue with `{resume_command(self._folder.path)}`"
+        return f"{kept}; continue with `{resume_command(self._folder.path, self._options)}`"
 
     def _mark(self, status: str) -> None:
         with contextlib.suppress(OSError, InputError):  # fails too on a full disk
