@@ -154,6 +154,8 @@ def run(words: list[str]) -> int:
         print(f"  {note}")
     camera = found.camera
     print(f"written: {options.out}, {counted(found.frames, 'frame')} of {camera.width}x{camera.height}")
+    if any(note.startswith("warning: ") for note in notes):
+        print(f"`endotsr check {shlex.quote(str(options.out))}` lists the remedy of each warning")
     print(_next_step(options.out, found, pair))
     write_result(
         options.json, source=options.source, layout=clip.layout, folder=options.out, frames=found.frames,
@@ -166,12 +168,13 @@ def run(words: list[str]) -> int:
 def _check_options(options: PrepareOptions, words: list[str]) -> None:
     """Raises InputError for an existing output, for wrong numbers, and for options that do not go together."""
     from endotsr.clips.sequences.layouts import layout_of
-    from endotsr.clips.sequences.sequence_file import WRITTEN
+    from endotsr.clips.sequences.sequence_file import FILE_NAME, WRITTEN
     from endotsr.training.runs.files import refuse_nested
     from endotsr.untrusted.writing import refuse_existing
 
     if not options.replace:
-        refuse_existing(options.out)
+        remedy = ", or replace it with --replace" if (options.out / FILE_NAME).is_file() else ""
+        refuse_existing(options.out, remedy)
     _check_numbers(options)
     if options.source.resolve() != options.out.resolve():  # with --replace they may be the same one
         refuse_nested(options.source, options.out, WRITTEN, f", or the source {options.out}")

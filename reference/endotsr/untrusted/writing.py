@@ -142,14 +142,14 @@ def leftover_notes(path: Path) -> list[str]:
     ]
 
 
-def refuse_existing(path: Path) -> None:
-    """Raises InputError if the path exists, unless it is an empty folder, which is removed."""
+def refuse_existing(path: Path, remedy: str = "") -> None:
+    """Raises InputError if the path exists, unless it is an empty folder, which is removed; `remedy` ends its line."""
     if path.is_symlink():
         raise InputError(f"{path}: {LINK}")
     if path.is_dir() and not any(path.iterdir()):
         path.rmdir()
     if os.path.lexists(path):
-        raise InputError(f"{path}: exists already; choose another --out")
+        raise InputError(f"{path}: exists already; choose another --out{remedy}")
 
 
 def _beside(path: Path) -> Path:

@@ -72,6 +72,44 @@ def test_a_baseline_in_metres_is_named(tmp_path, stated):
     assert "baseline-unit" not in " ".join(notes)
 
 
+def test_the_calibration_of_a_pair_beside_pictures_of_one_view_is_named(tmp_path):
+    files(tmp_path, "clip", [np.hstack([scene_picture(i), scene_picture(i, 3.0)]) for i in range(3)])
+    (tmp_path / "scope.ini").write_text(ini())
+    stated = {"calibration": tmp_path / "scope.ini"}
+    _, notes = prepared(tmp_path / "clip", tmp_path / "pair", stereo="side_by_side", **stated)
+    assert "that of a pair" not in " ".join(notes)
+    files(tmp_path, "left", [scene_picture(i) for i in range(3)])
+    _, notes = prepared(tmp_path / "left", tmp_path / "one", **stated)
+    said = [note for note in notes if note.startswith("the calibration is that of a pair")]
+    assert len(said) == 1 and "--stereo side_by_side" in said[0] and "--right FILE" in said[0]
+
+
+def test_a_recording_without_intrinsics_is_told_of_the_calibration_beside_it(tmp_path):
+    write_video(tmp_path / "clip.avi", [scene_picture(i) for i in range(3)])
+    for name, said in (("other.ini", r"right border$"), ("Calibration.ini", r"a calibration: .*/Calibration\.ini$")):
+        (tmp_path / name).write_text(ini())
+        with pytest.raises(InputError, match=said):
+            prepared(tmp_path / "clip.avi", tmp_path / "out")
+
+
+def test_the_command_names_the_way_to_replace_its_folder_and_to_the_remedies(tmp_path, capsys):
+    files(tmp_path, "clip", [scene_picture(i) * (i != 1) for i in range(3)])
+    out = str(tmp_path / "out")
+    words = ["prepare", str(tmp_path / "clip"), "--out", out, "--field-of-view", "60"]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "warning: black-frame" in said and f"`endotsr check {out}` lists the remedy of each warning" in said
+    assert main(words) == 2
+    assert capsys.readouterr().err.endswith("exists already; choose another --out, or replace it with --replace\n")
+    assert main([*words, "--replace", "--drop", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "warning: " not in said and "lists the remedy" not in said
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign" / "a").write_text("a")
+    assert main([*words[:3], str(tmp_path / "foreign"), *words[4:]]) == 2
+    assert capsys.readouterr().err.endswith("exists already; choose another --out\n")
+
+
 @pytest.mark.parametrize(("stereo", "join"), [("side_by_side", np.hstack), ("stacked", np.vstack)])
 def test_halves_of_a_stereo_picture(tmp_path, stereo, join):
     files(tmp_path, "clip", [join([scene_picture(i), scene_picture(i, 5.0)]) for i in range(3)])

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from common_folder import moving, written
+from raw_sources import write_video
 from test_stereo_depth import slanted_pair, stereo_folder
 
 from data_folder import data_folder
@@ -473,6 +474,21 @@ def test_the_command_writes_json_and_a_page(sequence, tmp_path, capsys):
     assert "black-frame" in page and "<script" not in page and "data:image" in page
     assert main(["check"]) == 2 and "SEQUENCE is missing" in capsys.readouterr().err
     assert main(["check", str(tmp_path / "nowhere")]) == 2
+
+
+def test_a_folder_without_a_part_of_a_sequence_is_sent_to_prepare(tmp_path, capsys):
+    """Before, it counted as an EndoNeRF sequence of which every part is missing."""
+    clip = tmp_path / "clip"
+    clip.mkdir()
+    write_video(clip / "a.avi", np.zeros((3, 48, 64, 3), np.uint8))
+    (clip / "calibration.yaml").write_text("%YAML:1.0\n")
+    for words in (["check", str(clip)], ["train", str(clip), "--out", str(tmp_path / "run")]):
+        assert main(words) == 2
+        said = capsys.readouterr().err
+        assert f"it holds a.avi, which `endotsr prepare {clip / 'a.avi'} --out FOLDER` converts" in said
+        assert said.count("\n") == 1 and len(said) < 600
+    (clip / "images").mkdir()
+    assert main(["check", str(clip)]) == 1 and "masks-files" in capsys.readouterr().out
 
 
 @pytest.mark.data

@@ -180,7 +180,7 @@ def _write_frames(
         if straight is None:
             height, width = pair.left.shape[:2]
             straight = straightener(clip, width, height, settings.scale)
-            notes += straight.notes
+            notes += [*straight.notes, *_without_partner(clip, pair)]
             notes += _unchanged(settings.scale, width, height, straight)
         new = _checked(clip, i, pair, straight)
         facts.append(frame_facts(clip.names[i], new.left))
@@ -215,6 +215,16 @@ def _findings(clip: Clip, straight: Straightener, facts: list[FrameFacts]) -> li
     found = frame_findings(facts, where)
     found += intrinsics_findings(straight.intrinsics, where, clip.crop)
     return found + baseline_findings(straight.baseline, clip.arbitrary, where)
+
+
+def _without_partner(clip: Clip, pair: PicturePair) -> list[str]:
+    """A note on the calibration of a pair beside pictures of one view."""
+    if clip.calibration is None or pair.right is not None:
+        return []
+    return [
+        "the calibration is that of a pair, and the pictures are read as its left view: if each of them has both views,"
+        " --stereo side_by_side or --stereo stacked divides it; --right FILE adds the video of the right view"
+    ]
 
 
 def _unchanged(scale: float, width: int, height: int, straight: Straightener) -> list[str]:

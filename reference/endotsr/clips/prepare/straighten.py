@@ -5,11 +5,13 @@ new pictures. Left and right each have their own distortion.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.camera import Intrinsics, intrinsics_of_matrix, opencv_matrix
+from endotsr.clips.formats.files import shortened, visible_files
 from endotsr.clips.opencv import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
 from endotsr.clips.sequences.checks.lens import lens_warnings
@@ -18,6 +20,7 @@ from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_dep
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose, degrees_between
+from endotsr.untrusted.names import plain_line
 
 SKEWED = 0.5  # largest vertical over horizontal offset of two cameras that count as side by side
 
@@ -85,7 +88,7 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     if intrinsics is None:
         raise InputError(
             f"{clip.where}: the intrinsics are unknown; use --camera FX FY CX CY in pixels, --calibration FILE, or"
-            " --field-of-view DEGREES, the angle from the left to the right border"
+            f" --field-of-view DEGREES, the angle from the left to the right border{_calibrations_beside(clip.where)}"
         )
     if (intrinsics.width, intrinsics.height) != (width, height):
         raise InputError(
@@ -104,6 +107,13 @@ def straightener(clip: Clip, width: int, height: int, scale: float) -> Straighte
     notes += lens_warnings(maps.matrix, np.array(intrinsics.distortion), width, height)
     resized = new_size != (width, height)
     return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), clip.baseline, notes, clipped, resized)
+
+
+def _calibrations_beside(source: Path) -> str:
+    """The end of a message that lists the files with the name of a calibration beside a recording, or in its folder."""
+    folder = source if source.is_dir() else source.parent
+    found = [file for file in visible_files(folder) if "calib" in file.name.lower() and file.is_file()]
+    return f"; by its name a calibration: {shortened([plain_line(str(file)) for file in found])}" if found else ""
 
 
 def _rectified(clip: Clip, new_size: tuple[int, int]) -> Straightener:

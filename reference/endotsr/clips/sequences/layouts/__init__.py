@@ -20,6 +20,8 @@ from endotsr.clips.formats.video_file import LARGEST_FILE, VIDEO_ENDINGS
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
+from endotsr.clips.sequences.poses import POSE_FILES
+from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, MASKS
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import MASK_ENDINGS
 from endotsr.clips.sequences.unread import folders_of, together, unread
@@ -64,6 +66,7 @@ AS_PICTURES = "frames in arrays are not read; write each as a png picture"
 JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
 DICOM_ENDINGS = (".dcm", ".dicom", "")  # recorders also write names without an ending
 EXPORT_DICOM = "export it as a video or as PNG pictures before, for example with the program that shows it"
+PARTS_OF_ENDONERF = (IMAGES, DEPTH, MASKS, "gt_masks", *POSE_FILES)
 OTHER_VIDEOS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjpg", ".yuv")
 
 
@@ -120,6 +123,8 @@ def _held(path: Path) -> str:
     if ending in JPEG_NAMES:
         return f": it holds {count} files that end in {ending}; let their names end in .jpg"
     videos = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
+    if len(videos) == 1:
+        return f": it holds {videos[0]}, which `endotsr prepare {path / videos[0]} --out FOLDER` converts"
     if videos:
         return f": it holds {shortened(videos)}; give the video itself, and join the parts of one recording before"
     if not any(path.iterdir()):
@@ -212,12 +217,17 @@ def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
 def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     """The clip of a folder that training reads directly, with its faults and what it does not read.
 
-    A path in no known layout counts as EndoNeRF.
+    A folder in no known layout counts as EndoNeRF if it has a part of one.
 
     Raises:  InputError for a layout that needs `endotsr prepare`, and for a folder that cannot be described at all.
     """
     path = Path(path)
     found = next((layout for layout in layouts() if path.exists() and layout.recognises(path)), None)
+    if found is None and path.is_dir() and not any((path / part).exists() for part in PARTS_OF_ENDONERF):
+        raise InputError(
+            f"{path}: no sequence{_held(path)}; allowed: a folder that `endotsr prepare SOURCE --out FOLDER` wrote, or"
+            " one with images/, depth/, masks/ and poses_bounds.npy"
+        )
     if found is None or (found.name == "pictures" and (path / "depth").is_dir()):
         found = layout_of(path, "endonerf")  # its messages name the missing parts
     if not found.direct:
