@@ -1,5 +1,7 @@
-"""Two evaluations of one run, and what a command that was killed left where another one writes."""
+"""Two evaluations of one run, what a killed command left where another one writes, and how a stopped one goes on."""
 
+import json
+import shlex
 import shutil
 import threading
 
@@ -8,6 +10,7 @@ import pytest
 from tiny import assert_refused, run_line, train_words
 
 from endotsr.cli.main import main
+from endotsr.cli.parts import progress
 from endotsr.clips.opencv import write_png
 from endotsr.clips.prepare.prepare import PrepareSettings, prepare
 from endotsr.clips.sequences.layouts import describe
@@ -102,3 +105,19 @@ def test_a_signal_during_the_evaluation_of_a_training_says_what_is_done(tmp_path
     assert code == 130 and said.strip().splitlines()[-1] == told
     monkeypatch.undo()
     assert main(command.split()[1:]) == 0
+
+
+def test_the_command_that_continues_a_run_evaluates_as_the_first_one_would(tmp_path, capsys, monkeypatch):
+    out, metrics = tmp_path / "run", tmp_path / "the metrics.json"
+
+    def interrupt(self, entry):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(progress.Progress, "update", interrupt)
+    _, said = run_line(capsys, *train_words(out, "--json", str(metrics)))
+    command = said.strip().splitlines()[-1].split("`")[1]
+    assert shlex.split(command) == ["endotsr", "train", "--out", str(out), "--resume", "--json", str(metrics)]
+    _, said = run_line(capsys, *train_words(tmp_path / "other", "--no-evaluate"))
+    assert said.strip().endswith("--resume --no-evaluate`")
+    monkeypatch.undo()
+    assert main(shlex.split(command)[1:]) == 0 and "held_out" in json.loads(metrics.read_text())

@@ -5,7 +5,6 @@ import errno
 import json
 import os
 import random
-import shlex
 import shutil
 import signal
 import subprocess
@@ -118,22 +117,6 @@ def test_the_forecast_knows_whether_a_clip_has_a_true_motion(tmp_path, monkeypat
         )
         shutil.rmtree(tmp_path / "clip" / "truth", ignore_errors=True)
     assert [plan.frames.compared for plan in plans] == [2 * 8, 0]
-
-
-def test_the_command_that_continues_a_run_evaluates_as_the_first_one_would(tmp_path, capsys, monkeypatch):
-    out, metrics = tmp_path / "run", tmp_path / "the metrics.json"
-
-    def interrupt(self, entry):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(progress.Progress, "update", interrupt)
-    _, said = run_line(capsys, *train_words(out, "--json", str(metrics)))
-    command = said.strip().splitlines()[-1].split("`")[1]
-    assert shlex.split(command) == ["endotsr", "train", "--out", str(out), "--resume", "--json", str(metrics)]
-    _, said = run_line(capsys, *train_only(tmp_path / "other"))
-    assert said.strip().endswith("--resume --no-evaluate`")
-    monkeypatch.undo()
-    assert main(shlex.split(command)[1:]) == 0 and "held_out" in json.loads(metrics.read_text())
 
 
 @pytest.mark.parametrize("at", [3, 17])

@@ -1,7 +1,5 @@
 """`python -m endotsr.definition`: trains the scene of `simulate` and prints its losses and its PSNR."""
 
-import signal
-
 import numpy as np
 
 from endotsr.definition.settings import SMALL
@@ -17,8 +15,6 @@ def report(state, view):
 
 
 if __name__ == "__main__":
-    if hasattr(signal, "SIGPIPE"):  # not on Windows
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # a closed pipe, as of `| head`, ends it without a traceback
     sequence = simulate()
     model = train(sequence, SMALL, np.random.default_rng(0), on_iteration=report)
     for name, indices in (("training", sequence.train_index), ("held-out", sequence.test_index)):
