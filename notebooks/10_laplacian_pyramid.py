@@ -190,10 +190,8 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 # def laplacian_loss_forward(rendered, observed, masks, upsampling="co_sited"):
 #     """Equation (5): display units, from two pyramids. The kernel builds one pyramid of the difference.
 #
-#     Raises: ValueError unless `upsampling` is the rule of the masks, by which the reverse pass goes.
+#     `upsampling` is the rule of the masks, by which the reverse pass goes.
 #     """
-#     if upsampling != masks.upsampling:
-#         raise ValueError(f"upsampling: {upsampling!r}, but {masks.upsampling!r} in the masks")
 #     images = [np.where(masks.image, image, 0) for image in (rendered, observed)]
 #     one, other = (laplacian_levels(image, len(masks.bands), upsampling).bands for image in images)
 #     loss, slopes = 0.0, []

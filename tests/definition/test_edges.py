@@ -1,4 +1,4 @@
-"""Edges of the definition that the compiled method has too: long axes, a threshold of 0, excluded NaN, refusals."""
+"""Edges of the definition that the compiled method has too: long axes, a threshold of 0, excluded NaN, views."""
 
 from types import SimpleNamespace
 
@@ -9,17 +9,14 @@ import pytest
 from endotsr.config import PAPER
 from endotsr.definition import calibration as definition_of_calibration
 from endotsr.definition import density_control as definition_of_density
-from endotsr.definition import laplacian as definition_of_laplacian
-from endotsr.definition.harmonics import harmonics_forward as plain_harmonics
 from endotsr.definition.registration import registration_forward
 from endotsr.definition.scene import Gaussians as PlainGaussians
 from endotsr.definition.settings import PAPER_CONFIG
 from endotsr.definition.smoothness import smoothness_forward as plain_smoothness
 from endotsr.definition.smoothness import smoothness_reverse as plain_reverse
-from endotsr.method.equations import calibration, laplacian
+from endotsr.method.equations import calibration
 from endotsr.method.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.method.splatting.camera import Camera
-from endotsr.method.splatting.harmonics import harmonics_forward
 from endotsr.training.scene import density_control
 from endotsr.training.scene.gaussians import Gaussians
 
@@ -93,22 +90,6 @@ def test_a_point_out_of_view_has_no_slope_even_if_it_is_no_number():
         np.eye(3), np.zeros(3), points, np.zeros(2), np.random.default_rng(1).random((8, 8)), camera
     )
     assert residual[1] == 0 and saved.slope[:, 0].any() and not saved.slope[:, 1].any()
-
-
-def test_the_rule_of_the_pyramid_is_that_of_the_masks_in_both():
-    mask, image = np.ones((8, 9), bool), np.zeros((3, 8, 9))
-    for room in (definition_of_laplacian, laplacian):
-        masks = room.support_masks(mask, 3, "co_sited")
-        with pytest.raises(ValueError, match="in the masks"):
-            room.laplacian_loss_forward(image, image, masks, "half_pixel")
-
-
-@pytest.mark.parametrize("coefficients, degree", [(1, 1), (4, 2), (16, 4)])
-def test_too_few_coefficients_and_a_fourth_degree_are_refused_by_both(coefficients, degree):
-    values = np.zeros((coefficients, 3, 2)), None, np.ones((3, 2)), np.zeros(3), degree
-    for forward in (plain_harmonics, harmonics_forward):
-        with pytest.raises(ValueError, match="degree"):
-            forward(*values)
 
 
 def test_a_view_with_a_negative_gradient_is_dropped_and_no_frame_is_no_view():

@@ -62,12 +62,9 @@ def directions(position, centre):
 def harmonics_forward(harmonics, residual, position, centre, degree):
     """Equation (B4): display colour (3, N), clamped to at least 0.
 
-    From coefficients (K, 3, N), residual (3, N) or None, positions (3, N) and the centre (3,).
-    Raises: ValueError unless K >= (degree + 1)^2 and the degree is 0 to 3.
+    From coefficients (K, 3, N), K >= (degree + 1)^2, residual (3, N) or None, positions (3, N) and the centre (3,).
     """
     terms = (degree + 1) ** 2
-    if not 0 <= degree <= 3 or len(harmonics) < terms:
-        raise ValueError(f"harmonics: {len(harmonics)} coefficients for degree {degree}")
     y = basis(directions(position, centre)[0], terms)
     colour = 0.5 + np.einsum("kn,kcn->cn", y, harmonics[:terms]) + (0 if residual is None else Y00 * residual)
     saved = HarmonicsSaved(harmonics, residual, position, centre, degree, colour.real < 0)
