@@ -263,9 +263,19 @@ def test_unknown_measures_are_refused_and_lines_are_plain():
     with pytest.raises(InputError, match=f"allowed: {', '.join(MEASURES)}"):
         measured(["beauty"], None, None, "")  # pyright: ignore[reportArgumentType]
     lines = measure_lines(
-        {"depth": {"unit": "mm", "rows": [{"label": "this model", "covered": 0.5}]}, "flicker": {"reason": "no"}}
+        {
+            "depth": {"unit": "mm", "rows": [{"label": "this model", "mean_absolute": 1.25, "covered": 0.5}]},
+            "flicker": {"reason": "no"},
+        }
     )
-    assert lines == ["depth: this model: covered 0.5", "flicker: not measured: no"]
+    assert lines == ["depth: this model: mean error 1.25 mm, covered 50 %", "flicker: not measured: no"]
+    rows = [
+        {"label": "a", "all_frames": 0.5, "held_out": None},
+        {"label": "b", "held_out_psnr": 30.0, "held_out_ssim": 0.9},
+    ]
+    assert measure_lines({"x": {"rows": rows}}) == [
+        "x: a: all frames 0.5 grey levels", "x: b: held-out PSNR 30 dB, held-out SSIM 0.9",
+    ]  # fmt: skip
 
 
 @pytest.mark.data

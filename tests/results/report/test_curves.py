@@ -68,7 +68,7 @@ def test_the_names_of_many_curves_cover_none_of_them():
     values = {"l1": 0.05, "ssim": 0.8, "depth": 0.02, "smoothness": 100.0, "matern_penalty": 1e-4, "laplacian": 0.01}
     rng = np.random.default_rng(0)
     log = [{"iteration": k, **{key: v * rng.uniform(0.7, 1.2) for key, v in values.items()}} for k in range(1, 121)]
-    (chart,) = (c for c in curves.charts(log) if c.title == "Loss terms")
+    (chart,) = (c for c in curves.charts(log) if c.title == "Loss terms, before their weights")
     figure = style.new_figure(4.4, 2.75, constrained=False)
     axes = figure.add_subplot()
     curves.draw_chart(axes, chart, style.LIGHT, title=False)
@@ -121,7 +121,9 @@ def test_no_number_on_an_axis_is_cut_off_at_the_edge(last):
 def test_terms_without_a_positive_value_have_no_chart():
     """A logarithmic axis has no place for them: the chart was empty."""
     assert curves.charts([{"iteration": 1, "depth": 0.0, "ssim": 1.0}]) == []
-    assert [c.title for c in curves.charts([{"iteration": 1, "depth": 0.0, "ssim": 0.5}])] == ["Loss terms"]
+    assert [c.title for c in curves.charts([{"iteration": 1, "depth": 0.0, "ssim": 0.5}])] == [
+        "Loss terms, before their weights"
+    ]
 
 
 def test_more_terms_than_colours_have_dashed_curves(monkeypatch):

@@ -235,6 +235,23 @@ def test_a_frame_without_tissue_is_named():
     assert "excluded from the tissue means (no finite value): covered." in page
 
 
+def test_additional_measurements_have_tables_with_units():
+    depth = {"unit": "mm", "rows": [
+        {"label": "this model", "mean_absolute": 1.25, "covered": 0.5}, {"label": "prior", "mean_absolute": 0.75},
+    ]}  # fmt: skip
+    flicker = {"rows": [{"label": "this model", "all_frames": 0.5, "held_out": None}], "left_out": ["<f4>"]}
+    found = {"depth": depth, "flicker": flicker, "right_view": {"reason": "no <right>"}}
+    page = report_html(made_up_data(evaluation=made_up_data().evaluation | {"measures": found}))
+    words = Reader(page).words
+    start = words.index("Additional measurements")
+    assert [word.replace("\u00a0", " ") for word in words[start + 2 : start + 11]] == [
+        "Depth", "mean error, mm", "covered, %", "this model", "1.25", "50", "prior", "0.75", "–",
+    ]  # fmt: skip
+    assert "all frames, grey levels" in page and "left out: &lt;f4&gt;." in page
+    assert "<b>Right view</b> was not measured: no &lt;right&gt;." in page
+    assert "Additional measurements" not in report_html(made_up_data())
+
+
 def test_text_cannot_break_the_page():
     evil = '<script>alert("x")</script>&"\''
     about = {"source": evil, "notes": [evil], "files_sha256": {evil: evil}}

@@ -17,7 +17,9 @@ tissue are left out. The recorded frames flicker at least by the noise of the ca
 the model itself flickers.
 """
 
+import math
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +39,20 @@ STATIC = 0.5  # px between successive frames: largest median flow of a static pi
 STATIC_HIGH = 1.0  # px: largest 90th percentile of the flow
 LEAST_PIXELS = 100  # with fewer static pixels nothing is reported
 LEVELS = 255.0  # results are given in 8-bit grey levels
+
+LENGTH = "length"
+VALUES = {  # of a row: how it is called, and its unit; the values of "%" are stored as fractions
+    "mean_absolute": ("mean error", LENGTH),
+    "root_mean_square": ("RMS error", LENGTH),
+    "relative": ("relative error", "%"),
+    "covered": ("covered", "%"),
+    "all_frames": ("all frames", "grey levels"),
+    "held_out": ("held-out frames", "grey levels"),
+    "held_out_psnr": ("held-out PSNR", "dB"),
+    "held_out_ssim": ("held-out SSIM", ""),
+    "training_psnr": ("training PSNR", "dB"),
+    "training_ssim": ("training SSIM", ""),
+}
 
 RenderView = Callable[[int, Camera], RenderOut]  # frame number (for the time) and camera -> render
 
@@ -71,6 +87,30 @@ def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str
     return {name: MEASURES[name](model, seen, source, render) for name in names}
 
 
+class ShownValue(NamedTuple):
+    """A value of a row as a reader sees it."""
+
+    head: str
+    number: float
+    unit: str
+
+    @property
+    def title(self) -> str:
+        """Head of a column, with the unit."""
+        return f"{self.head}, {self.unit}" if self.unit else self.head
+
+
+def shown_values(entry: Measured, row: MeasureRow) -> list[ShownValue]:
+    """The finite values of a row, in its order. Lengths have the unit of the measurement."""
+    found = []
+    for key, value in row.items():
+        if isinstance(value, float) and math.isfinite(value):
+            head, unit = VALUES.get(key, (key.replace("_", " "), ""))
+            unit = entry.get("unit", "scene units") if unit == LENGTH else unit
+            found.append(ShownValue(head, 100 * value if unit == "%" else value, unit))
+    return found
+
+
 def measure_lines(found: dict[str, Measured]) -> list[str]:
     """The measurements as lines of text."""
     lines = []
@@ -79,8 +119,8 @@ def measure_lines(found: dict[str, Measured]) -> list[str]:
             lines.append(f"{name}: not measured: {entry['reason']}")
             continue
         for row in entry.get("rows", ()):
-            values = ", ".join(f"{key} {value:.4g}" for key, value in row.items() if isinstance(value, float))
-            lines.append(f"{name}: {row['label']}: {values}")
+            values = (f"{shown.head} {shown.number:.4g} {shown.unit}".rstrip() for shown in shown_values(entry, row))
+            lines.append(f"{name}: {row['label']}: {', '.join(values)}")
         if left_out := entry.get("left_out"):
             lines.append(f"{name}: without tissue and left out: {', '.join(left_out)}")
     return lines

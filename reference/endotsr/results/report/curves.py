@@ -58,7 +58,7 @@ def charts(log: LogEntries, evaluation: EvaluationRecord | None = None) -> list[
     if series(log, "psnr")[0].size:
         found.append(Chart("PSNR of the training view, tissue, dB", lambda a, t: _draw_psnr(a, t, log, evaluation)))
     if any(_positive(log, key) for key in TERMS):
-        found.append(Chart("Loss terms", lambda axes, theme: _draw_terms(axes, theme, log)))
+        found.append(Chart("Loss terms, before their weights", lambda axes, theme: _draw_terms(axes, theme, log)))
     if series(log, "gaussians")[0].size:
         found.append(Chart("Gaussians", lambda axes, theme: _draw_count(axes, theme, log)))
     return found

@@ -10,6 +10,7 @@ from endotsr.results.report import curves, parts
 from endotsr.results.report.data import DECIDING, ReportData
 from endotsr.results.report.held_out import baseline_rows, extrapolated_frames, held_out, mean_of
 from endotsr.results.report.held_out_pictures import pictures
+from endotsr.results.report.measured import measures_html
 from endotsr.results.report.misfits import misfits_html
 from endotsr.results.report.run_text import (
     SHOWN,
@@ -187,7 +188,7 @@ def footer(data: ReportData) -> str:
     )
 
 
-SECTIONS = (headline, moving, held_out, temporal_gap, pictures, training, components, the_run, footer)
+SECTIONS = (headline, moving, held_out, temporal_gap, measures_html, pictures, training, components, the_run, footer)
 
 
 def report_html(data: ReportData) -> str:
