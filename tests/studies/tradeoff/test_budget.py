@@ -67,7 +67,7 @@ def test_an_error_gives_the_fastest_setting_that_keeps_it(result):
 def test_refusal_with_the_reason(result):
     least = min(p["forward"]["high"] for p in result["points"])
     with pytest.raises(
-        InputError, match=r"no measured setting renders 40 Gaussians at 24x19 .* that fast; the fastest"
+        InputError, match=r"no measured setting renders 40 Gaussians at 24x19 .* in its upper quartile; the smallest"
     ):
         frame_advice(result, parse_budget(f"{least * 1e3 * 0.99} ms"))
     without = result | {"fronts": {"forward": [n for n in result["fronts"]["forward"] if n != "exact"]}}

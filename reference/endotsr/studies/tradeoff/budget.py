@@ -92,8 +92,8 @@ def best_point(result: Measurement, budget: Budget) -> Point:
         if not kept:
             least = min(swept, key=lambda p: p["forward"]["high"])
             raise InputError(
-                f"no measured setting renders {_scene(result)} that fast; the fastest is "
-                f"{least['name']} with {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels are faster"
+                f"no measured setting renders {_scene(result)} that fast in its upper quartile; the smallest is of "
+                f"{least['name']}, {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels are faster"
             )
         return min(kept, key=lambda p: (p["error"]["max"], p["forward"]["high"]))
     kept = [p for p in front if p["error"]["max"] <= budget.amount]
