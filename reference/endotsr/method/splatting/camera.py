@@ -12,7 +12,10 @@ from endotsr.method.kernels.arrays import FloatArray
 
 
 class Camera(NamedTuple):
-    """A pinhole camera. Lengths in the units of the sequence, focal lengths and principal point in pixels."""
+    """A pinhole camera. Lengths in the units of the sequence, focal lengths and principal point in pixels.
+
+    Its pose is from world to camera, x' = rotation @ x + translation, with x' to the right, down and forward.
+    """
 
     rotation: FloatArray  # (3, 3) world-to-camera rotation
     translation: FloatArray  # (3,)   world-to-camera translation, scene units

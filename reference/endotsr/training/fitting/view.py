@@ -111,6 +111,19 @@ def view_pass(
     return ViewPass(loss, rendered, render_saved, scene_saved, d_scene, d_exposure, d_pose, camera)
 
 
+def gaussian_gradients(d_scene: RenderGrads, saved: SceneSaved) -> dict[str, FloatArray]:
+    """Gradients with respect to every array of the Gaussians, by field, from those of the deformed scene.
+
+    d_scene   of `render_reverse`, for any function of the images
+    saved     of `scene_at`
+    """
+    gradients, d_offsets = scene_reverse(d_scene, saved)
+    if saved.deformation is not None and d_offsets is not None:
+        fdm = deformation_reverse(d_offsets, saved.deformation)
+        gradients |= {"fdm_weight": fdm.d_fdm_weight, "fdm_centre": fdm.d_fdm_centre, "fdm_width": fdm.d_fdm_width}
+    return gradients
+
+
 def view_gradients(
     gaussians: Gaussians,
     spectral: Spectral,
@@ -144,11 +157,8 @@ def view_gradients(
         gaussians, spectral, targets, weights, config, camera, t, edges,
         exposure=exposure, pose=pose, raster=raster, degree=degree, compositor=compositor,
     )  # fmt: skip
-    loss, terms, scene_saved = found.loss.loss, found.loss.terms, found.scene_saved
-    gradients, d_offsets = scene_reverse(found.d_scene, scene_saved)
-    if scene_saved.deformation is not None and d_offsets is not None:
-        fdm = deformation_reverse(d_offsets, scene_saved.deformation)
-        gradients |= {"fdm_weight": fdm.d_fdm_weight, "fdm_centre": fdm.d_fdm_centre, "fdm_width": fdm.d_fdm_width}
+    loss, terms = found.loss.loss, found.loss.terms
+    gradients = gaussian_gradients(found.d_scene, found.scene_saved)
     if gaussians.motion_coefficients is not None:
         penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
         loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}
