@@ -45,7 +45,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from running_clip import load
 
-from endotsr.clips.opencv import canny_edges
+from endotsr.clips.opencv.filters import canny_edges
 from endotsr.clips.simulator import SimulatorSettings, simulate
 from endotsr.definition import depth as depth_definition
 from endotsr.definition import exposure as exposure_definition

@@ -36,7 +36,7 @@ from endotsr.clips.flow.between import (
     gap_between,
     motion_between,
 )
-from endotsr.clips.opencv import warp_cubic
+from endotsr.clips.opencv.flow import warp_cubic
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.port.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
@@ -242,7 +242,7 @@ assert swing[both] < swing[alone] - 2
 #
 #     Reverse: none; the result is held fixed during training.
 #     """
-#     from endotsr.clips.opencv import warp_cubic
+#     from endotsr.clips.opencv.flow import warp_cubic
 #
 #     earlier, later, flows, images = gap
 #     pair, a = [earlier, later], np.float32(fraction)
@@ -282,7 +282,7 @@ assert swing[both] < swing[alone] - 2
 # ```python
 # def _difference(pair: FloatArray) -> FloatArray:
 #     """(H, W) local mean squared difference of two pictures (2, 3, H, W), at least `ONE_STEP`."""
-#     from endotsr.clips.opencv import gaussian_blur
+#     from endotsr.clips.opencv.filters import gaussian_blur
 #
 #     return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)  # (18.8)
 # ```

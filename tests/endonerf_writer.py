@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.poses import rows_from_cameras
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.errors import InputError

@@ -19,6 +19,7 @@ ALL = (
         "tests/port/judge",
         "tests/results/report",
         "tests/clips/formats",
+        "tests/clips/opencv",
         "tests/clips/sequences",
         "tests/clips/masks",
         "tests/clips/prepare",

@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 BOUND = re.compile(r"([A-Za-z0-9_.-]+)>=([0-9.]+)")
 TESTS = (
-    "tests/clips/sequences/test_opencv.py",
+    "tests/clips/opencv/test_opencv.py",
     "tests/clips/prepare/test_prepare.py",
     "tests/clips/sequences/test_stereo_depth.py",
     "tests/clips/sequences/test_propose_masks.py",

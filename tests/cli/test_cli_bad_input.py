@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tiny import SETTINGS, assert_refused, run_line, train_words, written_folder
 
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.record import SequenceRecord, recorded
 from endotsr.method.splatting.camera import Camera
 from endotsr.training.runs.folder import create_run

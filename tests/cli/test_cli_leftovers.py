@@ -11,7 +11,7 @@ from tiny import assert_refused, run_line, train_words
 
 from endotsr.cli.main import main
 from endotsr.cli.parts import progress
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.prepare.prepare import PrepareSettings, prepare
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.source_options import SourceOptions

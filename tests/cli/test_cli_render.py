@@ -9,7 +9,7 @@ import pytest
 from tiny import assert_refused, render
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.results.report.figures import bytes_image
 from endotsr.results.views import pictures
 from film_reader import read_video

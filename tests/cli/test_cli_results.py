@@ -10,7 +10,7 @@ import pytest
 from tiny import SETTINGS, assert_refused, render
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.method.kernels.threads import use_threads
 from endotsr.results.report.run_text import held_out_table
 from endotsr.results.views.pictures import depth_bytes, depth_step

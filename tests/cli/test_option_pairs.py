@@ -35,7 +35,7 @@ from endotsr.cli.parts.relations import Needs, check_relations
 from endotsr.cli.prepare import PrepareOptions
 from endotsr.cli.render import RenderOptions
 from endotsr.cli.train import TrainOptions
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.errors import InputError
 
 FRAMES = 6

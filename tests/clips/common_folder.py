@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.sequence_file import CameraEntry, DepthEntry, MaskEntry, PoseEntry, SequenceFile
 from endotsr.clips.sequences.sequence_file import write_sequence_file as write_file
 

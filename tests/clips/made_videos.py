@@ -10,8 +10,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import write_png
 
 WIDTH, HEIGHT = 128, 96
 CAMERA = ("--camera", "100", "100", "64", "48")

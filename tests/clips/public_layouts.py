@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from made_videos import picture, write
 
-from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import write_png
 
 WIDTH, HEIGHT, FRAMES = 128, 96, 4
 K = np.array([[100.0, 0, 63.5], [0, 101.0, 47.5], [0, 0, 1]])  # of OpenCV: the middle of the picture

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 
 WIDTH, HEIGHT = 64, 48
 INI = """[StereoLeft]

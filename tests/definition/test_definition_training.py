@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import canny_edges
+from endotsr.clips.opencv.filters import canny_edges
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import (
     Config,

@@ -198,7 +198,7 @@ def clock_jumps(bench: Bench) -> tuple[bool, str]:
 
 def sequence_changes(bench: Bench) -> tuple[bool, str]:
     """A picture of the sequence is replaced while the run trains, and the run is then resumed."""
-    from endotsr.clips.opencv import read_png, write_png
+    from endotsr.clips.opencv.png import read_png, write_png
 
     out, said = bench.fresh(), bench.said
     shutil.rmtree(bench.scratch / "sequence", ignore_errors=True)

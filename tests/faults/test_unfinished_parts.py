@@ -12,7 +12,7 @@ from tiny import assert_refused
 from endotsr.clips.masks import make_masks
 from endotsr.clips.masks.make_masks import enter_masks
 from endotsr.clips.masks.propose_masks import Proposal
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.prepare import make_depth
 from endotsr.clips.prepare.make_depth import write_depth
 from endotsr.clips.prepare.pose_record import as_now

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import decode_png, read_png, write_png
+from endotsr.clips.opencv.png import decode_png, read_png, write_png
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
 from endotsr.untrusted.png import pixels_only

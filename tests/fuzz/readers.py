@@ -20,8 +20,8 @@ import numpy as np
 import recordings
 from PIL import Image
 
-from endotsr.clips.opencv import read_png
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.poses import cameras_of_rows, read_pose_rows
 from endotsr.clips.sequences.record import record_of
 from endotsr.clips.simulator.settings import SimulatorSettings

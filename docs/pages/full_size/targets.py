@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import endotsr
 from endotsr.clips.flow.between import Flows, Gap, flows_between, frame_between, gap_between, motion_between
 from endotsr.clips.flow.tissue_colours import tissue_colours
-from endotsr.clips.opencv import warp_cubic
+from endotsr.clips.opencv.flow import warp_cubic
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.results.evaluation.baselines import neighbours, two_neighbours, unit_image
 from endotsr.training.runs.machine import dated

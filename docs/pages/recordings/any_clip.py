@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.simulator.truth import read_truth
 from pages.store.commands import held_out, loaded, said

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.checks.cost import estimated_cost
 from endotsr.clips.sequences.checks.duration import expected_frames
 from endotsr.config import config_from_dict, with_iterations

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.simulator.frames import SimulatedFrame, make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.clips.masks.mask_shapes import shapes_of
-from endotsr.clips.opencv import area_resize, read_png
+from endotsr.clips.opencv.filters import area_resize
+from endotsr.clips.opencv.png import read_png
 from endotsr.results.report.figures import encode
 from pages.store.commands import said
 from pages.store.program import DOCS, RESULTS

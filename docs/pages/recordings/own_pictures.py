@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import Camera

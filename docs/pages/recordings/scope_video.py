@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.clips.formats.film_file import write_video
-from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.opencv.pictures import read_picture
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 from pages.store import kept

@@ -17,7 +17,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.simulator.folder import write_sequence
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import SCENES, named_scene

@@ -12,8 +12,8 @@ from matplotlib import colormaps
 
 from endotsr.clips.formats.video_file import video_pictures
 from endotsr.clips.masks.propose_masks import overlay
-from endotsr.clips.opencv import read_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.layouts import describe
 from pages.store.commands import said
 from pages.store.program import RESULTS

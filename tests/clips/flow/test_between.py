@@ -12,7 +12,7 @@ from endotsr.clips.flow.between import (
     motion_between,
 )
 from endotsr.clips.flow.between_kernels import STEPS, WHOLE, moved_priors
-from endotsr.clips.opencv import warp_bilinear
+from endotsr.clips.opencv.flow import warp_bilinear
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.splatting.camera import Camera, camera_centre
 

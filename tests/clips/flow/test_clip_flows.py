@@ -7,7 +7,7 @@ import pytest
 
 from endotsr.clips.flow import clip_flows
 from endotsr.clips.flow.clip_flows import STEPS, motion_of
-from endotsr.clips.opencv import dense_flow
+from endotsr.clips.opencv.flow import dense_flow
 
 
 @pytest.fixture

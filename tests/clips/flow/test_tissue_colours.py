@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from endotsr.clips.flow import tissue_colours as module
 from endotsr.clips.flow.tissue_colours import tissue_colours
-from endotsr.clips.opencv import nearest_pixels
+from endotsr.clips.opencv.regions import nearest_known
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.splatting.camera import Camera
 
@@ -82,7 +82,7 @@ def test_excluded_colours_are_never_read(shown, data):
 @pytest.mark.parametrize("seed", range(3))
 def test_the_nearest_pixel_is_nearest_within_two_percent(seed):
     missing = np.random.default_rng(seed).random((40, 60)) < 0.97
-    found = np.array(np.unravel_index(nearest_pixels(missing), missing.shape))
+    found = np.array(np.unravel_index(nearest_known(missing), missing.shape))
     rows, columns = np.mgrid[:40, :60]
     known = np.argwhere(~missing)
     away = lambda y, x: np.hypot(y - rows, x - columns)

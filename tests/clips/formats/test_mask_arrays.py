@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 
 FRAMES, HEIGHT, WIDTH = 5, 24, 32
 TOOL = np.zeros((FRAMES, HEIGHT, WIDTH), bool)

@@ -13,7 +13,8 @@ from endotsr.cli.main import main
 from endotsr.cli.masks import carrying_command
 from endotsr.clips.flow.clip_flows import ClipFlows, motion_of
 from endotsr.clips.masks.carry_masks import LEAST_GAIN, carried_once, carry_masks
-from endotsr.clips.opencv import grown, read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
+from endotsr.clips.opencv.regions import grown_by_disc
 from endotsr.clips.simulator.frames import make_scene, simulated_frames
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.config import with_settings
@@ -52,7 +53,7 @@ def test_the_flow_of_the_inside_serves_the_edge():
     """Dense flow smears the motion of the tool into the tissue: half of it 4 px inside, none outside."""
     motion, masks = sliding(2, step=6)
     smeared = motion.backward[0].copy()
-    inner = ~grown(~masks[1], 4)
+    inner = ~grown_by_disc(~masks[1], 4)
     smeared[0][~masks[1]] = 0
     smeared[0][masks[1] & ~inner] *= 0.5
     moved = carried_once(masks[0].astype(np.float32), smeared) > 0.5
@@ -66,10 +67,10 @@ def test_a_margin_grows_the_mask_and_takes_either_side_in_the_middle():
     still = ClipFlows([np.zeros((2, *SIZE), np.float32)] * 4, [np.zeros((2, *SIZE), np.float32)] * 4)
     one, other = tool(5), tool(15)
     found = carry_masks(still, {0: one, 4: other}, margin=3)
-    np.testing.assert_array_equal(found.excluded[0], grown(one, 3))
-    np.testing.assert_array_equal(found.excluded[2], grown(one | other, 3))  # half way, one side is enough
+    np.testing.assert_array_equal(found.excluded[0], grown_by_disc(one, 3))
+    np.testing.assert_array_equal(found.excluded[2], grown_by_disc(one | other, 3))  # half way, one side is enough
     np.testing.assert_array_equal(carry_masks(still, {0: one, 4: other}).excluded[1], one)  # the nearer side
-    disc = grown(np.pad([[True]], 5), 3)
+    disc = grown_by_disc(np.pad([[True]], 5), 3)
     rows, columns = np.mgrid[-5:6, -5:6]
     np.testing.assert_array_equal(disc, rows**2 + columns**2 <= 9)
 

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 import endotsr
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.poses.views import Views, compose, inverse
 from endotsr.clips.sequences.sequence_file import (
     CameraEntry,

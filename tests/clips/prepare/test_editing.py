@@ -13,7 +13,7 @@ from made_videos import CAMERA, UNEVEN, files, picture, pictures, write
 
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics, StereoCalibration
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.prepare.editing import (
     chosen_frames,
     cropped,

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from endotsr.cli.main import main
 from endotsr.cli.masks import carrying_command
 from endotsr.clips.formats.camera import intrinsics_of_matrix
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.opencv.stereo import rectification_maps
 from endotsr.clips.prepare.prepare import PrepareSettings, prepare
 from endotsr.clips.prepare.straighten import straightener

@@ -8,7 +8,7 @@ import raw_sources
 from input_kinds import Row, calibrated, colmap, common, each, half_excluded, mask, masked, public, raw, trajectory
 from made_videos import HEIGHT, WIDTH
 
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 KITTI = "".join(f"P{k}: 100 0 63.5 {b} 0 100 47.5 0 0 0 1 0\n" for k, b in enumerate((0, -40, 10, -30)))

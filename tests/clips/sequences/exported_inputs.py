@@ -35,7 +35,7 @@ from PIL import Image
 from silent_inputs import in_one_file, of_orb_slam
 from test_stated_depth import true_depth
 
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 

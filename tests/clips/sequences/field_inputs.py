@@ -12,7 +12,7 @@ import yaml
 from endotsr.clips.formats import calibration_fields, matlab_calibrations
 from endotsr.clips.formats.calibrations import calibrated
 from endotsr.clips.formats.inventory import Inventory
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.layouts import describe, nerfstudio
 

@@ -19,8 +19,8 @@ from test_calibrations import K, kalibr, ros
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
-from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 

@@ -83,7 +83,7 @@ from test_stated_depth import true_depth
 from time_inputs import BESIDE_ROWS, TIME_ROWS
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 WRONG = "WRONG IN SILENCE"

@@ -7,7 +7,7 @@ import numpy as np
 from input_kinds import Row, folder_of, half_excluded, mask, masked, rewritten
 from made_videos import HEIGHT, WIDTH, pictures, write
 
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 
 EMPTY = (5, 8)  # frames without an instrument
 

@@ -90,7 +90,7 @@ def marked(value, part=HOLE):
 
 
 def hole_is_empty(folder: Path) -> bool:
-    from endotsr.clips.opencv import read_png
+    from endotsr.clips.opencv.png import read_png
 
     plane = read_png(folder / "o/depth/000002.png")
     return not plane[HOLE].any() and bool((plane[:, 30:] > 0).all())

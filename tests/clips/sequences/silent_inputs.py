@@ -44,7 +44,7 @@ from scipy.spatial.transform import Rotation
 from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 

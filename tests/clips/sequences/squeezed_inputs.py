@@ -8,7 +8,7 @@ from input_kinds import MATRIX, Row, centred, folder_of, prepare, sides, size
 from left_inputs import MOVED
 from made_videos import HEIGHT, WIDTH, pictures
 
-from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.filters import area_resize
 
 
 def squeezed(stacked: bool = False) -> list[np.ndarray]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.sequence_file import CameraEntry, SequenceFile, write_sequence_file
 
 WIDTH, HEIGHT, FRAMES = 240, 192, 12

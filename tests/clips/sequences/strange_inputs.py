@@ -8,7 +8,7 @@ from made_videos import HEIGHT, WIDTH, files, picture, pictures, write
 from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 

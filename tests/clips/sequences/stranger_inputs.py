@@ -32,8 +32,8 @@ from made_videos import pictures, woven
 from odd_inputs import with_camera
 from test_stated_depth import true_depth
 
-from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.sequence_file import FILE_NAME
 from synthetic_folder import write_synthetic_folder
 

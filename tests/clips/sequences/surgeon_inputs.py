@@ -10,7 +10,7 @@ from test_stated_depth import true_depth
 from test_still_parts import FRAMES, tissue, with_text
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 
 WIDE = ("--camera", "250", "250", "128", "96")
 OTHER_ORDER = "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [-0.1, 0.01, {}]\n"

@@ -14,7 +14,7 @@ from test_stereo_depth import slanted_pair, stereo_folder
 from data_folder import data_folder
 from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.cost import estimated_cost
 from endotsr.clips.sequences.checks.duration import Standing, at_start, expected_frames, gaussians_at_end, work_left

@@ -8,7 +8,7 @@ from common_folder import written
 
 from endotsr.clips.flow import clip_flows
 from endotsr.clips.flow.clip_flows import motion_of
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.prepare.editing import cropped
 from endotsr.clips.sequences.clip_pictures import LeftPictures, all_decoded, fingerprint, left_pictures
 from endotsr.clips.sequences.layouts.common import describe_prepared

@@ -10,8 +10,8 @@ from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
 from scipy.spatial.transform import Rotation
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.depth_files import read_plane
 from endotsr.clips.sequences.layouts import describe, layout_of, layouts
 from endotsr.clips.sequences.read import read_sequence

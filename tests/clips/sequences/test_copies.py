@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from common_folder import written
 
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.copies import (
     copied_frames,
     pattern_of,

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.read import read_sequence

@@ -7,7 +7,7 @@ import pytest
 
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.depth_pair import Compared, depth_pair_findings, fit_findings, pair_fit
 from endotsr.clips.sequences.layouts import describe_for_training

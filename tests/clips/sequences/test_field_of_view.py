@@ -9,7 +9,7 @@ from made_videos import files, write
 
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import intrinsics_of_view
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.sequence_file import read_sequence_file

@@ -8,7 +8,7 @@ from test_stereo_depth import slanted_pair, stereo_folder
 
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.flips import FLIPS, DepthTurns, shading_finding, shading_fit, stereo_finding
 from endotsr.clips.sequences.read import read_sequence

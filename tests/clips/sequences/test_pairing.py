@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.pairing import paired
 from endotsr.errors import InputError
 

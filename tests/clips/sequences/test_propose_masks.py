@@ -11,7 +11,7 @@ from made_videos import files, write
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.masks.propose_masks import Proposal, propose_masks
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file

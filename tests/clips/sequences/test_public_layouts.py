@@ -10,7 +10,7 @@ import public_layouts as made
 import pytest
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.layouts import c3vd as c3vd_layout
 from endotsr.clips.sequences.layouts import describe, layout_of, scared
 from endotsr.clips.sequences.layouts.scared import frame_texts

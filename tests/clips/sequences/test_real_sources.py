@@ -5,7 +5,7 @@ import pytest
 
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import SequenceConfig

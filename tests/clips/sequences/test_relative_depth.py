@@ -7,7 +7,7 @@ from common_folder import moving, written
 from test_stated_depth import FRAMES, recording, true_depth
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.prepare.relative_depth import FEWEST, StraightLine, fitted_line
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.layouts import describe

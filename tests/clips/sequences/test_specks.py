@@ -7,7 +7,7 @@ import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, written
 
 from data_folder import data_folder
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.specks import MANY, Specks, speck_count
 from endotsr.clips.simulator.frames import make_scene, simulated_frames

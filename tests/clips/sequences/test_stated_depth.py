@@ -7,7 +7,7 @@ from raw_sources import colmap
 from test_stereo_depth import slanted_pair
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import PAPER, SequenceConfig

@@ -11,7 +11,7 @@ from test_common import write_plane
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.prepare.make_depth import depth_of_values, from_files, write_depth
 from endotsr.clips.prepare.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.clips.sequences.layouts import describe

@@ -10,7 +10,7 @@ from stereo_views import FRAMES, pairs, stereo_clip
 import endotsr
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences import folder_reader
 from endotsr.clips.sequences.checks import check
 from endotsr.clips.sequences.checks.check import check_sequence

@@ -8,8 +8,8 @@ from scipy.ndimage import gaussian_filter
 
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.checks.still_parts import Edges, StillParts, plain_findings
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate

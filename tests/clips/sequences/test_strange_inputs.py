@@ -8,7 +8,7 @@ from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.prepare.stated_depth import bytes_exchanged
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.depth import depth_facts, depth_findings

@@ -5,7 +5,7 @@ from common_folder import moving, written
 from raw_sources import ini, scene_picture
 
 from endotsr.cli.main import main
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 CAMERA = ["--camera", "60", "61", "30", "25"]

@@ -15,7 +15,7 @@ from common_folder import written
 from made_videos import files, pictures
 from rig_inputs import rig
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.layouts import describe, describe_for_training
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.config import SequenceConfig

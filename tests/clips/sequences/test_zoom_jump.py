@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from data_folder import data_folder
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.checks.frames import frame_facts, frame_findings
 from endotsr.clips.simulator.scenes import named_scene
 from endotsr.clips.simulator.simulate import simulate

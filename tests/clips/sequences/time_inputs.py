@@ -10,7 +10,7 @@ from made_videos import pictures
 from rig_inputs import STEP, true_rig
 from silent_inputs import quaternions
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file
 
 UNEVEN = [0, 40, 80, 160, 200, 240, 280, 320, 360, 400, 440, 480]  # milliseconds of twelve pictures; one is missing

@@ -320,7 +320,7 @@ def test_the_right_picture_is_the_left_one_at_its_disparity():
     settings = with_effects(SimulatorSettings(width=160, height=128, frames=3), "stereo")
     frame = next(simulated_frames(make_scene(settings)))
     disparity = 0.89 * 160 * 4.0 / frame.depth
-    from endotsr.clips.opencv import warp_bilinear
+    from endotsr.clips.opencv.flow import warp_bilinear
 
     moved = warp_bilinear(frame.image_right.astype(float), np.stack([-disparity, np.zeros_like(disparity)]))
     seen = np.broadcast_to(frame.tissue, moved.shape)

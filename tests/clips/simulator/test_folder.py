@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endotsr.api import train
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.depth_files import clip_depth
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.simulator import SimulatorSettings, simulate, with_effects

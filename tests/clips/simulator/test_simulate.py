@@ -176,7 +176,7 @@ def test_another_seed_has_another_surface(everything):
 
 
 def test_another_image_size_shows_the_same_tissue(still):
-    from endotsr.clips.opencv import area_resize
+    from endotsr.clips.opencv.filters import area_resize
 
     large = simulate(msgspec.structs.replace(STILL, width=192, height=160, frames=3)).sequence.images[0]
     small = area_resize(large.transpose(1, 2, 0), 48, 40).transpose(2, 0, 1).astype(float)

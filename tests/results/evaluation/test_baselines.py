@@ -5,7 +5,7 @@ import pytest
 from made_up_sequence import made_up
 
 from data_folder import data_folder
-from endotsr.clips.opencv import warp_bilinear
+from endotsr.clips.opencv.flow import warp_bilinear
 from endotsr.errors import InputError
 from endotsr.results.evaluation import baselines
 

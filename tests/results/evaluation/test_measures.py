@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from data_folder import data_folder
-from endotsr.clips.opencv import read_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.simulator.folder import write_sequence

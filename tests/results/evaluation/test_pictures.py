@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endotsr.clips.formats.film_file import write_video
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.errors import InputError

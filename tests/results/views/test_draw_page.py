@@ -12,7 +12,7 @@ from drawing_page import HEIGHT, NAMES, SHIFT, WIDTH, Page, drawing
 
 from endotsr.clips.masks.drawn_masks import key_masks
 from endotsr.clips.masks.mask_shapes import MaskShape
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.errors import InputError
 from endotsr.results.views.draw_page import check_draw_page, draw_page, write_draw_page
 

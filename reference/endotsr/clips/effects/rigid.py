@@ -14,7 +14,7 @@ import numpy as np
 from endotsr.clips.effects.frames import TILE, ReducedFrames, tile_means
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.tracks import FlowTracks, normalised
-from endotsr.clips.opencv import dense_flow, warp_bilinear
+from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 

@@ -18,7 +18,7 @@ from endotsr.clips.effects.frames import ReducedFrames
 from endotsr.clips.effects.noise import Noise
 from endotsr.clips.effects.tracks import matched
 from endotsr.clips.effects.verdict import UNKNOWN, EffectVerdict, Map
-from endotsr.clips.opencv import warp_bilinear
+from endotsr.clips.opencv.flow import warp_bilinear
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 WINDOW = 2.5  # Gaussian radius of the local structure, working pixels

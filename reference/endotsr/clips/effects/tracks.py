@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.effects.frames import ReducedFrames, tile_means
 from endotsr.clips.effects.noise import Noise
-from endotsr.clips.opencv import dense_flow, warp_bilinear
+from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 LOCAL = 6.0  # Gaussian radius of the local brightness and contrast, working pixels

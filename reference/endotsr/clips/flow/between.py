@@ -48,7 +48,7 @@ class Gap(NamedTuple):
 
 def flows_between(sequence: Sequence, earlier: int, later: int) -> Flows:
     """Dense flow between two frames of a sequence, in both directions."""
-    from endotsr.clips.opencv import dense_flow
+    from endotsr.clips.opencv.flow import dense_flow
 
     a, b = sequence.images[earlier], sequence.images[later]
     return Flows(dense_flow(a, b), dense_flow(b, a))
@@ -82,7 +82,7 @@ def frame_between(sequence: Sequence, gap: Gap, fraction: float) -> Frame:
 
     Reverse: none; the result is held fixed during training.
     """
-    from endotsr.clips.opencv import warp_cubic
+    from endotsr.clips.opencv.flow import warp_cubic
 
     earlier, later, flows, images = gap
     pair, a = [earlier, later], np.float32(fraction)
@@ -118,7 +118,7 @@ def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArra
 
 def _difference(pair: FloatArray) -> FloatArray:
     """(H, W) local mean squared difference of two pictures (2, 3, H, W), at least `ONE_STEP`."""
-    from endotsr.clips.opencv import gaussian_blur
+    from endotsr.clips.opencv.filters import gaussian_blur
 
     return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)  # (18.8)
 

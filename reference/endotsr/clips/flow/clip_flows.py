@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import dense_flow
+from endotsr.clips.opencv.flow import dense_flow
 from endotsr.clips.opencv.library import cv2_library
 from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.sequences.clip_pictures import all_decoded, fingerprint

@@ -48,9 +48,9 @@ def tissue_colours(sequence: Sequence, index: int) -> NDArray[np.uint8]:
     nearest = by_nearness(sequence, float(sequence.times[index]))[:NEAREST]
     left = fill_from(sequence, nearest, colours, np.flatnonzero(~sequence.masks[index]))
     if 0 < left.size < height * width:
-        from endotsr.clips.opencv import nearest_pixels
+        from endotsr.clips.opencv.regions import nearest_known
 
         missing = np.zeros(height * width, bool)
         missing[left] = True
-        colours[:, left] = colours[:, nearest_pixels(missing.reshape(height, width)).ravel()[left]]
+        colours[:, left] = colours[:, nearest_known(missing.reshape(height, width)).ravel()[left]]
     return colours.reshape(3, height, width)

@@ -121,7 +121,7 @@ def _project(camera: Camera, position: FloatArray) -> tuple[FloatArray, FloatArr
 
 def _sampled(planes: FloatArray, pixel: FloatArray) -> FloatArray:
     """(C, P) float64 bilinear samples of (C, H, W) at (2, P) columns and rows; outside, the border value."""
-    from endotsr.clips.opencv import sample_bilinear
+    from endotsr.clips.opencv.flow import sample_bilinear
 
     return sample_bilinear(planes.astype(np.float64), *pixel)
 

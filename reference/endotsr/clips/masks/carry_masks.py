@@ -31,7 +31,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.flow.clip_flows import ClipFlows
-from endotsr.clips.opencv import gaussian_blur, grown, warp_mask
+from endotsr.clips.opencv.filters import gaussian_blur
+from endotsr.clips.opencv.flow import warp_mask
+from endotsr.clips.opencv.regions import grown_by_disc
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.untrusted.files import in_threads
@@ -148,11 +150,11 @@ def carried_once(mask: FloatArray, flow: FloatArray) -> FloatArray:
     near = _around(mask > 0, math.ceil(max(flow.max(), -flow.min())) + 1)  # the others take a 0 from where they point
     moved[near] = warp_mask(mask, flow[:, *near], near)
     place = _around(moved > 0.5, REACH)
-    inside = ~grown(moved[place] <= 0.5, INSIDE)
+    inside = ~grown_by_disc(moved[place] <= 0.5, INSIDE)
     if np.count_nonzero(inside) < LEAST_PIXELS:
         return moved
     weight = gaussian_blur(inside.astype(np.float32), SPREAD) + np.float32(1e-4)
-    edge, own = grown(inside, EDGE) & ~inside, flow[:, *place].copy()
+    edge, own = grown_by_disc(inside, EDGE) & ~inside, flow[:, *place].copy()
     for axis in own:
         axis[edge] = (gaussian_blur(axis * inside, SPREAD) / weight)[edge]
     moved[place][edge] = warp_mask(mask, own, place)[edge]
@@ -172,7 +174,7 @@ def _levels(blend: FloatArray | BoolArray) -> NDArray[np.uint8]:
 
 def _excluded(levels: NDArray[np.uint8], margin: int) -> BoolArray:
     # 128 is a blend of exactly 1/2: half-way between two keys, a pixel of one side alone.
-    return levels > 128 if margin == 0 else grown(levels >= 64, margin)
+    return levels > 128 if margin == 0 else grown_by_disc(levels >= 64, margin)
 
 
 def overlap_of(one: BoolArray, other: BoolArray) -> float:

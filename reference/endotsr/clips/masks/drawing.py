@@ -16,7 +16,7 @@ from endotsr.clips.masks.carry_masks import LEAST_AGREEMENT, carried_once, carry
 from endotsr.clips.masks.drawn_masks import DrawnFile, DrawnKey, key_masks
 from endotsr.clips.masks.mask_shapes import LARGEST, MaskShape, Origin, shapes_of
 from endotsr.clips.masks.propose_masks import Proposal
-from endotsr.clips.opencv import sample_bilinear
+from endotsr.clips.opencv.flow import sample_bilinear
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError

@@ -20,7 +20,8 @@ from endotsr.clips.masks.drawn_masks import FORMAT, DrawnFile, DrawnKey, KeyMask
 from endotsr.clips.masks.key_checks import polarity_warnings, refuse_no_tissue
 from endotsr.clips.masks.mask_shapes import shapes_of
 from endotsr.clips.masks.propose_masks import Proposal, overlay, propose_masks
-from endotsr.clips.opencv import area_resize, read_png, write_png
+from endotsr.clips.opencv.filters import area_resize
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.clip import Clip, Picture
 from endotsr.clips.sequences.clip_pictures import left_pictures
 from endotsr.clips.sequences.folder_reader import of_size

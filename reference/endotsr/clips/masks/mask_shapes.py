@@ -114,7 +114,7 @@ def shapes_of(mask: BoolArray, origin: Origin) -> list[MaskShape]:
     The largest comes first, so that a hole is erased before the region inside it is drawn. Regions and holes below
     LEAST_AREA, and outlines of more than MOST_POINTS points, are left out.
     """
-    from endotsr.clips.opencv import outlines
+    from endotsr.clips.opencv.regions import outlines
 
     found = outlines(mask, TOLERANCE)
     kept = [(points, hole) for points, hole in found if 3 <= len(points) <= MOST_POINTS and _area(points) >= LEAST_AREA]

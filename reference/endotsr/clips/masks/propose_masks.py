@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import dense_flow
+from endotsr.clips.opencv.flow import dense_flow
 from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.sequences.field_of_view import DARK, outside_of_view, reduced
-from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 FLOOR = 12.0  # grey levels: the redness of a black pixel is noise
@@ -229,7 +229,7 @@ def _widened(plane: BoolArray) -> BoolArray:
 
 def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:
     """The mask at picture size."""
-    return nearest_pixels(plane, size[1], size[0], "mask")
+    return resized_nearest(plane, size[1], size[0], "mask")
 
 
 def overlay(picture: Picture, excluded: BoolArray, colour: tuple[int, int, int] = (0, 255, 0)) -> Picture:

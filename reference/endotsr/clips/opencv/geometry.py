@@ -1,4 +1,4 @@
-"""Local contrast, growing and shrinking of masks, the pose of points, and matches of features.
+"""Local contrast, the pose of points, and matches of features.
 
 Inputs and outputs are NumPy arrays in this project's conventions: image positions are in pixels with the centre of the
 first pixel at (0.5, 0.5), poses map the axes of the points to the axes of the camera. Every function is deterministic.
@@ -47,18 +47,6 @@ def grey_of(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def equalised(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """The picture (H, W) with its histogram equalised in cells, with limited contrast (CLAHE)."""
     return cv2_library().createCLAHE(CONTRAST, CELLS).apply(np.ascontiguousarray(grey))
-
-
-def grown(mask: BoolArray, margin: int) -> BoolArray:
-    """The mask (H, W) grown by `margin` pixels, in squares."""
-    return cv2_library().dilate(mask.astype(np.uint8), np.ones((2 * margin + 1,) * 2, np.uint8)) > 0
-
-
-def shrunk(mask: BoolArray, margin: int) -> BoolArray:
-    """The mask (H, W) without the pixels within `margin` of a pixel outside it or of the edge of the picture."""
-    cv2 = cv2_library()
-    square = np.ones((2 * margin + 1,) * 2, np.uint8)
-    return cv2.erode(mask.astype(np.uint8), square, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
 
 
 def halved_blurred(plane: Array) -> Array:

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.clips.opencv import decode_png, decoded, opaque, write_encoded
 from endotsr.clips.opencv.library import cv2_library
 from endotsr.clips.opencv.other_kinds import scaled
 from endotsr.clips.opencv.picture_marks import ORIENTATION, marks_of, picture_marks
+from endotsr.clips.opencv.png import decode_png, decoded, opaque, write_encoded
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import Array
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes

@@ -8,7 +8,7 @@ Both are taken over usable pixels alone, so that an instrument hardly leaves a r
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import gaussian_blur
+from endotsr.clips.opencv.filters import gaussian_blur
 from endotsr.clips.opencv.geometry import grey_of, halved_blurred
 from endotsr.clips.poses.pair_kernels import PyramidLevel
 from endotsr.clips.poses.views import Views, known_depth, usable_pixels

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import dense_flow, gaussian_blur, sample_bilinear
+from endotsr.clips.opencv.filters import gaussian_blur
+from endotsr.clips.opencv.flow import dense_flow, sample_bilinear
 from endotsr.clips.opencv.geometry import Features, equalised, features_of, grey_of, matched_features
 from endotsr.clips.poses.views import ViewFrame, Views, known_depth, usable_pixels
 from endotsr.method.kernels.arrays import BoolArray, FloatArray

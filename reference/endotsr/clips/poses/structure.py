@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.poses.chain import LONGEST_GAP
 from endotsr.clips.poses.views import Views, compose, inverse, usable_pixels
 from endotsr.errors import InputError

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import area_resize
-from endotsr.clips.opencv.geometry import grown, shrunk
+from endotsr.clips.opencv.filters import area_resize
+from endotsr.clips.opencv.regions import grown_by_square, shrunk_by_square
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.method.splatting.camera import Camera, CameraPose, scale_camera
 
@@ -60,8 +60,8 @@ def known_depth(depth: NDArray[np.float32]) -> NDArray[np.float32]:
 def usable_pixels(image: NDArray[np.uint8], tissue: BoolArray) -> BoolArray:
     """Tissue that shows texture: without highlights and dark pixels, and without a margin. (3, H, W) to (H, W)."""
     largest, smallest = image.max(axis=0), image.min(axis=0)
-    highlight = grown((smallest > BRIGHT) | (largest >= SATURATED), HALO)
-    return shrunk(tissue & ~highlight & (largest >= DARK), MARGIN)
+    highlight = grown_by_square((smallest > BRIGHT) | (largest >= SATURATED), HALO)
+    return shrunk_by_square(tissue & ~highlight & (largest >= DARK), MARGIN)
 
 
 class ViewFrame(NamedTuple):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.camera import Intrinsics, camera_to_world
 from endotsr.clips.formats.choices import Other
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.clip import REST, Clip
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES

@@ -30,7 +30,7 @@ from endotsr.clips.sequences.sequence_file import (
     read_sequence_file,
     sequence_text,
 )
-from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.clips.sequences.sources import files_of
 from endotsr.errors import InputError
 from endotsr.untrusted.writing import replace_text, replacing_folder
@@ -133,7 +133,7 @@ def depth_of_values(
         _refuse_wide(numbers, values.shape[1], where)
         focal = intrinsics.fx * values.shape[1] / intrinsics.width
         numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
-    depth = nearest_pixels(np.maximum(numbers, 0.0), intrinsics.width, intrinsics.height, where).astype(np.float32)
+    depth = resized_nearest(np.maximum(numbers, 0.0), intrinsics.width, intrinsics.height, where).astype(np.float32)
     depth[~np.isfinite(depth)] = 0.0
     return depth
 

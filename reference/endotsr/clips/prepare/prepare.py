@@ -16,8 +16,8 @@ from endotsr.clips.formats.camera import ARBITRARY, Intrinsics
 from endotsr.clips.formats.choices import Border, DepthOfPoints, Gaps, PictureKind
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.formats.trajectory import filled
-from endotsr.clips.opencv import write_png
 from endotsr.clips.opencv.pictures import write_jpeg
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.prepare.editing import (
     chosen_frames,
     masks_by_time,

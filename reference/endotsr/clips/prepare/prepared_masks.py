@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.clips.formats.choices import Border
-from endotsr.clips.opencv import read_png, write_png
+from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.dark_border import crop_without
 from endotsr.clips.sequences.checks.written import WrittenFrames
 from endotsr.clips.sequences.clip import Clip

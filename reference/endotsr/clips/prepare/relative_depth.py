@@ -22,7 +22,7 @@ from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.checks.depth import light_correlation, light_finding
 from endotsr.clips.sequences.clip import Assumed, Clip
 from endotsr.clips.sequences.depth_files import read_plane
-from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
@@ -104,7 +104,7 @@ def relative_depth(
     assert intrinsics is not None
 
     def relative(i: int) -> FloatArray:
-        return nearest_pixels(read_plane(files[i]).astype(np.float64), intrinsics.width, intrinsics.height, files[i])
+        return resized_nearest(read_plane(files[i]).astype(np.float64), intrinsics.width, intrinsics.height, files[i])
 
     if clip.depth and not clip.depth.assumed:
         return _aligned(clip, relative, source, align)

@@ -98,7 +98,7 @@ def temporal_median(depths: list[NDArray[np.float32]], pictures: list[Picture], 
 
     A neighbouring frame counts where all four bilinear samples have depth.
     """
-    from endotsr.clips.opencv import dense_flow, warp_bilinear
+    from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 
     found = [np.where(depths[middle] > 0, depths[middle], np.nan)]
     for k, (depth, picture) in enumerate(zip(depths, pictures)):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.camera import Intrinsics, intrinsics_of_matrix, opencv_matrix
 from endotsr.clips.formats.files import shortened, visible_files
-from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
 from endotsr.clips.sequences.checks.lens import lens_warnings
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from endotsr.clips.formats.depth_stacks import array_of, plane_of_stack
 from endotsr.clips.formats.inventory import Inventory
 from endotsr.clips.formats.plain_arrays import read_npy, read_pfm
-from endotsr.clips.opencv import area_resize, write_png
+from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.opencv.pictures import TIFF_ENDINGS, no_data, read_picture, read_points
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.clip import grey_plane
 from endotsr.clips.sequences.mask_polarity import sparse_step
 from endotsr.config import SequenceConfig

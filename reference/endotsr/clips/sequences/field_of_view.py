@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.sequences.clip import Picture
-from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.method.kernels.arrays import BoolArray
 
 WORKING = 320  # px, longer side of the working pictures
@@ -59,7 +59,7 @@ class FieldOfView:
             return None
         found = search(self._brightest)
         height, width = self.tissue.shape
-        return nearest_pixels(found, width, height, "mask") if found.any() else None
+        return resized_nearest(found, width, height, "mask") if found.any() else None
 
 
 def reduced(picture: Picture) -> Picture:

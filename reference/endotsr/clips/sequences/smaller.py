@@ -46,7 +46,7 @@ def smaller_frames(
     where: object,
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
     """Pictures (n, 3, H, W), masks and depth (n, H, W) at a smaller size; `memory` and `where` as in `FrameStore`."""
-    from endotsr.clips.opencv import area_resize
+    from endotsr.clips.opencv.filters import area_resize
 
     n = len(images)
     store = FrameStore(n, width, height, memory, where)
@@ -77,7 +77,7 @@ def halved(sequence: Sequence, memory: float) -> Sequence:
     return smaller(sequence, sequence.width // 2, sequence.height // 2, memory, "half size")
 
 
-def nearest_pixels(plane: NDArray, width: int, height: int, where: object) -> NDArray:
+def resized_nearest(plane: NDArray, width: int, height: int, where: object) -> NDArray:
     """A plane (H, W) at another size by nearest-neighbour sampling, which invents no intermediate values.
 
     Raises:  InputError for another aspect ratio.

@@ -17,14 +17,14 @@ from endotsr.clips.formats.depth_stacks import ENDINGS as ARRAY_ENDINGS
 from endotsr.clips.formats.depth_stacks import stack_planes
 from endotsr.clips.formats.files import list_pictures
 from endotsr.clips.formats.trajectory import poses_of_frames, read_trajectory
-from endotsr.clips.opencv import stretched
+from endotsr.clips.opencv.filters import stretched
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.mask_values import levels_of_set, refuse_coded_objects, white_pixels
 from endotsr.clips.sequences.mask_videos import coloured_plane_of, mask_files, plane_of
 from endotsr.clips.sequences.pairing import paired
-from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -133,10 +133,10 @@ def masks_of(files: list[Path | None], excluded_value: str, width: int, height: 
             return None
         if excluded_value == "nonzero":
             checked()
-            return nearest_pixels(numbered(path) == 0, width, height, path)
+            return resized_nearest(numbered(path) == 0, width, height, path)
         white, _ = white_pixels(plane_of(path), levels(), path)
         tissue = ~white if excluded_value == "white" else white
-        return nearest_pixels(tissue, width, height, path)
+        return resized_nearest(tissue, width, height, path)
 
     return Masks(mask, excluded_value=excluded_value, proposed=proposed)
 

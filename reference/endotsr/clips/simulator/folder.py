@@ -130,7 +130,7 @@ def pose_rows(scene: SimulatedScene, far: FloatArray) -> FloatArray:
 
 
 def _write_pictures(folder: Path, i: int, frame: SimulatedFrame) -> None:
-    from endotsr.clips.opencv import write_png
+    from endotsr.clips.opencv.png import write_png
 
     name = f"{i:06d}.png"
     write_png(folder / "images" / name, frame.image.transpose(1, 2, 0))

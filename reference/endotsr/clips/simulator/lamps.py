@@ -92,7 +92,7 @@ def shadow(settings: SimulatorSettings, blocker: Blocker, lamp: FloatArray, view
 
     The cover is sampled where the line from the lamp to the tissue crosses the plane of the instruments.
     """
-    from endotsr.clips.opencv import warp_bilinear
+    from endotsr.clips.opencv.flow import warp_bilinear
 
     camera = blocker.camera
     x, y, z = to_camera(camera, view.point)

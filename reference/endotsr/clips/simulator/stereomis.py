@@ -63,7 +63,7 @@ def write_recording(
 
 def _stacked(folder: Path, scene: SimulatedScene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:
     """The pictures of the video, (2H, W, 3) uint8. Masks and truth are written at the same time."""
-    from endotsr.clips.opencv import write_png
+    from endotsr.clips.opencv.png import write_png
 
     masked = bool(graspers(scene.settings))
     if masked:

@@ -67,7 +67,7 @@ class SceneTruth:
         """The truth of frame i. Raises IndexError outside 0 .. n-1, and InputError for a damaged file."""
         if not 0 <= i < self.settings.frames:
             raise IndexError(f"frame {i} of a scene of {self.settings.frames}")
-        from endotsr.clips.opencv import read_png
+        from endotsr.clips.opencv.png import read_png
 
         size = (self.settings.height, self.settings.width)
         shapes = {"depth": size, "material": (2, *size), "highlight": size}
@@ -81,7 +81,7 @@ class SceneTruth:
 
 def write_frame(folder: Path, i: int, frame: SimulatedFrame) -> None:
     """Write the truth of one frame. The folders `frames` and `instrument` must exist."""
-    from endotsr.clips.opencv import write_png
+    from endotsr.clips.opencv.png import write_png
 
     highlight = np.zeros(frame.depth.shape) if frame.highlight is None else frame.highlight
     np.savez(

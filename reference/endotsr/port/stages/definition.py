@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import canny_edges
+from endotsr.clips.opencv.filters import canny_edges
 from endotsr.config import Config, DensityConfig, LossConfig
 from endotsr.definition import (
     adam,

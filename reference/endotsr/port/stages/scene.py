@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import canny_edges
+from endotsr.clips.opencv.filters import canny_edges
 from endotsr.clips.sequences.sequence import Frame
 from endotsr.config import Config, LossConfig, ModelConfig
 from endotsr.method.equations.laplacian import laplacian_levels

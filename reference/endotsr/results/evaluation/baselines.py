@@ -105,7 +105,7 @@ def flow_interpolation(sequence: Sequence, index: int) -> FloatArray:
     returns   (3, H, W) float32, display units [0, 1]
     Edges     one neighbour: its copy; an image side below 16 px: the blend without flow
     """
-    from endotsr.clips.opencv import dense_flow, warp_bilinear
+    from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 
     near = neighbours(sequence, index)
     before, after = unit_image(sequence, near.before), unit_image(sequence, near.after)

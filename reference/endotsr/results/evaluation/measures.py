@@ -174,7 +174,7 @@ def _with_tissue(sequence: Sequence) -> BoolArray:
 
 def static_pixels(sequence: Sequence) -> BoolArray:
     """(H, W) bool: tissue in every frame that shows any, with small optical flow between successive ones of them."""
-    from endotsr.clips.opencv import dense_flow
+    from endotsr.clips.opencv.flow import dense_flow
 
     shown = _with_tissue(sequence)
     pairs = np.flatnonzero(shown[:-1] & shown[1:])

@@ -114,7 +114,7 @@ def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
     """The left picture warped by its prior depth; holes are 0 and not evaluated."""
     from scipy.ndimage import binary_erosion
 
-    from endotsr.clips.opencv import sample_bilinear
+    from endotsr.clips.opencv.flow import sample_bilinear
 
     depth, mask = sequence.depth[index], sequence.masks[index]
     height, width = mask.shape
@@ -135,7 +135,7 @@ def moved_flow(sequence: Sequence, index: int, baseline: float) -> FloatArray:
     returns   (3, H, W) display units; a hole has the colour of the nearest pixel that is shown, and without any depth
               the picture is not warped
     """
-    from endotsr.clips.opencv import sample_bilinear
+    from endotsr.clips.opencv.flow import sample_bilinear
 
     predicted, depth = flow_interpolation(sequence, index), blended_prior(sequence, index)
     if not (depth > 0).any():
@@ -197,7 +197,7 @@ def _frame(
 def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) -> Callable[[int], NDArray[np.uint8]]:
     """Frame number -> right picture (3, H, W) in the size of the sequence; InputError if unreadable or smaller."""
     from endotsr.clips.formats.files import list_pictures
-    from endotsr.clips.opencv import area_resize
+    from endotsr.clips.opencv.filters import area_resize
     from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
     from endotsr.clips.sequences.clip import colour_picture
     from endotsr.clips.sequences.splits import parse_frame_range

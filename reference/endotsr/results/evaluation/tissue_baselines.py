@@ -60,7 +60,7 @@ def flow_tissue(sequence: Sequence, index: int) -> FloatArray:
     Edges     one neighbour, or an image side below 16 px: as `blend_tissue`
     Raises    InputError if there is no other training frame
     """
-    from endotsr.clips.opencv import dense_flow, warp_bilinear
+    from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 
     near = neighbours(sequence, index)
     if near.before == near.after:

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, NotRequired, Protocol, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import write_png
+from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.sequence import Frame, Sequence
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray

@@ -194,7 +194,7 @@ def _flickers(scene: WindowedScene, frames: WindowFrames) -> Iterator[tuple[bool
 
 def _squares(sequence: Sequence, i: int, shown: dict[int, FloatArray]) -> tuple[float, float] | None:
     """Mean d^2 over the tissue at frame i, of renders and of recorded frames; None with too little tissue."""
-    from endotsr.clips.opencv import dense_flow, warp_bilinear
+    from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 
     seen, sums = sequence.masks[i].copy(), [-2.0 * shown[i].astype(np.float64), -2.0 * unit_image(sequence, i)]
     for j in (i - 1, i + 1):

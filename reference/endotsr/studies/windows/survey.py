@@ -99,7 +99,7 @@ def _shown(clip: Clip, i: int) -> _Shown:
 
 def _reduced(grey: NDArray[np.uint8], tissue: BoolArray) -> tuple[NDArray[np.uint8], BoolArray]:
     """Reduce to working size, at most `WIDEST` columns; a pixel is tissue if all covered pixels are."""
-    from endotsr.clips.opencv import area_resize
+    from endotsr.clips.opencv.filters import area_resize
 
     side = -(-grey.shape[1] // WIDEST)
     width, height = grey.shape[1] // side, grey.shape[0] // side
@@ -108,7 +108,7 @@ def _reduced(grey: NDArray[np.uint8], tissue: BoolArray) -> tuple[NDArray[np.uin
 
 def _between(before: _Shown, shown: _Shown) -> dict[str, float | str]:
     """`motion` and `cut` between two successive frames."""
-    from endotsr.clips.opencv import dense_flow, warp_bilinear
+    from endotsr.clips.opencv.flow import dense_flow, warp_bilinear
 
     jump = _jump(before, shown)
     if np.count_nonzero(before.mask & shown.mask) < LEAST_PIXELS:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import canny_edges
+from endotsr.clips.opencv.filters import canny_edges
 from endotsr.clips.sequences.sequence import Frame, Sequence
 from endotsr.config import Config, LossConfig
 from endotsr.method.equations.calibration import Calibration, ViewRms, calibrate, calibration_views, rms

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.poses.views import ViewFrame, reduced_camera, side_of
 from endotsr.clips.sequences.checks.flips import NARROW, agreed_disparity
 from endotsr.clips.sequences.checks.kinds import Finding, finding

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import dense_flow
+from endotsr.clips.opencv.flow import dense_flow
 from endotsr.clips.opencv.geometry import grey_of
 from endotsr.clips.poses.views import ViewFrame, side_of
 from endotsr.clips.sequences.checks.kinds import Finding, finding

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv import area_resize
+from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.field_of_view import FieldOfView
-from endotsr.clips.sequences.smaller import nearest_pixels
+from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -64,7 +64,7 @@ class StillParts:
             return []
         outside = self._view.outside()
         height, width = self._sum.shape
-        seen = self._tissue if outside is None else self._tissue & ~nearest_pixels(outside, width, height, "mask")
+        seen = self._tissue if outside is None else self._tissue & ~resized_nearest(outside, width, height, "mask")
         mean = Edges(self._sum / self._frames, self._slopes / self._frames, _inner(seen), self._size[1] / width)
         return _border_findings(mean, where) or plain_findings(mean, where) or _burnt_in_findings(mean, where)
 
@@ -159,7 +159,7 @@ def _working(picture: NDArray[np.uint8]) -> FloatArray:
 
 def _reduced(tissue: BoolArray, grey: FloatArray) -> BoolArray:
     height, width = grey.shape
-    return np.asarray(nearest_pixels(tissue, width, height, "mask"), bool)
+    return np.asarray(resized_nearest(tissue, width, height, "mask"), bool)
 
 
 def _slopes(grey: FloatArray) -> FloatArray:

@@ -7,17 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from endotsr.clips.opencv import (
-    area_resize,
-    canny_edges,
-    dense_flow,
-    grown,
-    read_png,
-    warp_bilinear,
-    warp_cubic,
-    write_png,
-)
+from endotsr.clips.opencv.filters import area_resize, canny_edges
+from endotsr.clips.opencv.flow import dense_flow, warp_bilinear, warp_cubic
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.opencv.png import read_png, write_png
+from endotsr.clips.opencv.regions import grown_by_disc
 from endotsr.errors import InputError
 
 RNG = np.random.default_rng(1)
@@ -91,7 +85,7 @@ def test_area_resize_is_the_mean_of_what_is_covered():
 
 
 def test_opencv_is_imported_on_first_use_only():
-    code = "import sys, endotsr.clips.opencv, endotsr.clips.sequences.read; sys.exit('cv2' in sys.modules)"
+    code = "import sys, endotsr.clips.opencv.regions, endotsr.clips.sequences.read; sys.exit('cv2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -149,8 +143,8 @@ def test_a_grown_mask_holds_the_pixels_within_the_radius(pixels):
     y, x = np.nonzero(mask)
     rows, columns = np.indices(mask.shape)
     squared = ((rows[..., None] - y) ** 2 + (columns[..., None] - x) ** 2).min(axis=2)
-    np.testing.assert_array_equal(grown(mask, pixels), squared <= pixels**2)
-    assert not grown(np.zeros((5, 5), bool), pixels).any()
+    np.testing.assert_array_equal(grown_by_disc(mask, pixels), squared <= pixels**2)
+    assert not grown_by_disc(np.zeros((5, 5), bool), pixels).any()
 
 
 def test_the_bicubic_warp_is_the_kernel_of_keys_with_three_quarters():
