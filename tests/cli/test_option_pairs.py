@@ -30,7 +30,7 @@ from endotsr.cli.parts.comparison import EvaluateOptions
 from endotsr.cli.parts.fields import fields_of
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import given_names, parse
-from endotsr.cli.parts.related_options import EVALUATE, PERMISSIONS, RELATIONS
+from endotsr.cli.parts.related_options import EVALUATE, RELATIONS
 from endotsr.cli.parts.relations import Needs, check_relations
 from endotsr.cli.prepare import PrepareOptions
 from endotsr.cli.render import RenderOptions
@@ -39,6 +39,8 @@ from endotsr.clips.opencv.png import write_png
 from endotsr.errors import InputError
 
 FRAMES = 6
+# Options that only permit something: without an occasion they change nothing.
+PERMISSIONS = {"prepare": ("replace", "trust-depth", "gaps"), "depth": ("replace", "trust-depth")}
 
 
 class Outcome(NamedTuple):

@@ -24,6 +24,11 @@ def write_expected(golden, cases, folder):
             write_npy(folder / case.name / f"{name}.npy", golden.array(case, output.file))
 
 
+def short_version(golden):
+    """major.minor of the vectors, as a claim names them."""
+    return ".".join(golden.manifest.version.split(".")[:2])
+
+
 def command(script=THREE):
     """The command of a port in Python."""
     return f'"{sys.executable}" "{script}" {{requests}} {{outputs}}'

@@ -72,7 +72,7 @@ def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
 
     assert options.pictures is not None
     weights = load_lpips_weights(options.lpips)
-    sequence = shown_sequence("evaluate", options.run, options.sequence, options.settings)
+    sequence = shown_sequence(options.run, options.sequence, options.settings)
     found = find_pictures(options.pictures, sequence)
     print(f"{options.pictures}: {counted(len(found.files), 'picture')}, paired {found.pairing}")
     metrics = measure_pictures(found, sequence, options.label, weights)

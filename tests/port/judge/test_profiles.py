@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from made_up_ports import write_expected
+from made_up_ports import short_version, write_expected
 
 from endotsr.cli import golden as golden_command
 from endotsr.cli.golden import run
@@ -60,7 +60,7 @@ def test_a_whole_port_claims_every_profile(golden, answered):
 def test_a_profile_alone_has_its_last_level(golden, answered, name):
     report = judge(golden, answered, "float32", profile=name, again=answered)
     assert report.passed and report.level == CLAIMS[name] and said(report) == {name: CLAIMS[name]}
-    assert report.claim == f"golden {golden.short_version}, {PROFILES[name].title}, level {report.level}, float32"
+    assert report.claim == f"golden {short_version(golden)}, {PROFILES[name].title}, level {report.level}, float32"
 
 
 def test_a_forward_renderer_claims_its_images(golden, port):

@@ -80,7 +80,7 @@ class EvaluateOptions:
         return Path(self.methods[0]) if self.methods else None
 
 
-def shown_sequence(command: str, run: Path | None, source: str | None, settings: ShownSettings) -> "Sequence":
+def shown_sequence(run: Path | None, source: str | None, settings: ShownSettings) -> "Sequence":
     """The sequence of `run` (at `source`, if it has moved), or the sequence `source` with these settings.
 
     Raises: InputError if neither is given, or for settings together with a run.
@@ -90,10 +90,10 @@ def shown_sequence(command: str, run: Path | None, source: str | None, settings:
 
     if run is not None:
         if settings != SHOWN:
-            raise InputError(f"{command}: --sequence.* with {run} is not allowed: the settings of a run are fixed")
+            raise InputError(f"evaluate: --sequence.* with {run} is not allowed: the settings of a run are fixed")
         return load_run_sequence(open_run(run), source)
     if source is None:
-        raise InputError(f"{command}: --sequence is missing: the sequence of the pictures, or a run folder")
+        raise InputError("evaluate: --sequence is missing: the sequence of the pictures, or a run folder")
     return load_sequence(source, msgspec.structs.replace(PAPER, sequence=settings.sequence), SimulatorSettings())
 
 
@@ -162,7 +162,7 @@ def _metrics(
 
     if sequence is None:
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
-        sequence = shown_sequence("evaluate", run, asked.sequence, asked.settings)
+        sequence = shown_sequence(run, asked.sequence, asked.settings)
     weights = load_lpips_weights(asked.lpips)
     metrics = measure_pictures(find_pictures(path, sequence), sequence, label, weights)
     if said := metrics["pictures"]["doubt"]:

@@ -196,11 +196,5 @@ RELATIONS: dict[str, tuple[Relation, ...]] = {
     "tradeoff": TRADEOFF,
     "golden run": (Needs(("name",), ("certificate",), "it is the name of the port in the certificate"),),
 }
-# Options that only permit something: without an occasion they change nothing.
-PERMISSIONS = {
-    "prepare": ("replace", "trust-depth", "gaps"),
-    "depth": ("replace", "trust-depth"),
-    "masks": ("replace",),
-}
 # Of a command: follows from its options, and the command checks it.
 FACTS = {"prepare": "layout", "export": "format", "evaluate": "run", "tradeoff": "folder"}

@@ -17,7 +17,6 @@ from endotsr.untrusted.files import open_regular
 LARGEST_FILE = 1 << 40  # bytes
 LARGEST_HEADER = 1 << 28  # bytes of the boxes that describe the tracks
 DEEPEST = 12  # levels of boxes
-BY_FFMPEG = "FFmpeg reads it"
 CROP = "a part of the picture is to be cut off, which calibrations and other programs may or may not have done: use"
 CROP_REMEDY = f"{CROP} a file without this mark, and prepare --crop"
 SPHERE = "the pictures are those of a sphere: use a perspective video"
@@ -84,7 +83,7 @@ ELEMENTS = {
     0xEC: "Void", 0xBF: "CRC-32", 0x1F43B675: "CLUSTER",
 }  # fmt: skip
 WITH_BOXES = ("moov", "trak", "mdia", "minf", "stbl", "stsd", "edts")  # boxes that hold boxes
-STSD, SAMPLE_ENTRY, FULL_BOX = 16, 86, 12  # bytes before the inner boxes
+STSD, SAMPLE_ENTRY = 16, 86  # bytes before the inner boxes
 VIDEO_HANDLER = b"vide"
 
 

@@ -22,7 +22,7 @@ from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
-KEY_FRAMES, MOST_KEY_FRAMES = 5, 60  # frames of a first page
+MOST_KEY_FRAMES = 60  # of a first page
 PROPOSED = 3  # further frames of a later page
 STEP, MOST_COLUMNS = 16, 48  # px between the nodes of the grid of motion, at least, and nodes across
 

@@ -245,11 +245,11 @@ def stated_poses(
     return poses, ["; ".join([f"{options.trajectory.name}: {how}", f"positions in {unit}", *trajectory.notes])]
 
 
-def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:
-    """`mm` or `arbitrary`, by the stated units of trajectory and depth. Raises InputError if they contradict."""
+def unit_of(options: SourceOptions) -> str:
+    """`mm` or `arbitrary`, by the units of trajectory (default: m) and depth. Raises InputError if they contradict."""
     stated = []
     if options.trajectory is not None:
-        stated.append(options.trajectory_unit or otherwise)
+        stated.append(options.trajectory_unit or "m")
     if options.depth is not None:
         stated.append(options.depth_unit)
     if len({unit == ARBITRARY for unit in stated}) > 1:

@@ -167,8 +167,7 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
 
     Reverse: `covariance_reverse`; the gradient is orthogonal to the quaternion and scales with 1/|q|.
     Edges:   the zero quaternion is the identity with zero gradient; with a largest entry below 1e-20, the gradient
-             is that of q lengthened until it is 1e-20; a clipped log-scale has zero gradient (`covariance_degenerate`
-             counts zeros and clipped).
+             is that of q lengthened until it is 1e-20; a clipped log-scale has zero gradient.
     Oracle:  scipy.spatial.transform.Rotation; `endotsr.definition.covariance`.
     """
     n = quaternion.shape[1]
@@ -184,12 +183,6 @@ def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrad
     d_out = np.empty((7, n), saved.quaternion.dtype)
     parallel_for(_reverse_kernel, n, *saved, d_shape.rotation.reshape(9, n), d_shape.scale, d_out)
     return CovarianceGrads(d_out[:4], d_out[4:])
-
-
-def covariance_degenerate(quaternion: FloatArray, log_scale: FloatArray) -> tuple[int, int]:
-    """Number of zero quaternions and number of clipped log-scales."""
-    zero = int(np.sum(~np.any(quaternion != 0, axis=0)))
-    return zero, int(np.sum(np.abs(log_scale) > LOG_SCALE_LIMIT))
 
 
 def covariance_matrix(shape: Shape) -> FloatArray:

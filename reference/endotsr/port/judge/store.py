@@ -31,11 +31,6 @@ class Golden(NamedTuple):
     manifest: Manifest
     cases: list[Case]
 
-    @property
-    def short_version(self) -> str:
-        """major.minor, as in a claim."""
-        return ".".join(self.manifest.version.split(".")[:2])
-
     def array(self, case: Case, file: str) -> NDArray:
         """An input or an expected output by its path within the case."""
         return _loaded(self.folder / "cases" / case.family / case.case / file)

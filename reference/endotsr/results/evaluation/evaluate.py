@@ -48,17 +48,15 @@ def evaluate_frames(
     indices: Iterable[int],
     render_frame: RenderFrame,
     lpips_weights: LpipsWeights | None = None,
-    seen: TimesSeen | None = None,
 ) -> FramesMeasured:
     """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
 
     render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
     lpips_weights   None: LPIPS is None
-    seen            from `times_seen`; adds `psnr_seen` and `psnr_seen_twice`
 
     Raises   ValueError naming the frame if the shapes of render and frame differ
     """
-    return evaluate_methods(sequence, indices, {MODEL: render_frame}, lpips_weights, seen)[MODEL]
+    return evaluate_methods(sequence, indices, {MODEL: render_frame}, lpips_weights)[MODEL]
 
 
 def evaluate_methods(
@@ -69,6 +67,8 @@ def evaluate_methods(
     seen: TimesSeen | None = None,
 ) -> dict[str, FramesMeasured]:
     """`evaluate_frames` for several methods, which share the feature maps of the true frames.
+
+    seen   from `times_seen`; adds `psnr_seen` and `psnr_seen_twice`
 
     Methods are rendered one after the other, and two renders are measured at a time.
     """

@@ -197,7 +197,7 @@ def describe_euroc(path: Path, options: SourceOptions) -> Clip:
         pictures=pictures_from_files(files, right),
         masks=stated_masks(options, files, width, height),
         depth=stated_depth(options, files),
-        unit=unit_of(options, "m"),
+        unit=unit_of(options),
         intrinsics=camera.intrinsics,
         calibration=camera.calibration,
         baseline=camera.baseline,

@@ -151,7 +151,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
         pictures=pictures_from_files(left, right, stereo),
         masks=stated_masks(options, left, width, height),
         depth=stated_depth(options, left),
-        unit=unit_of(options, "m"),
+        unit=unit_of(options),
         intrinsics=camera.intrinsics,
         calibration=camera.calibration,
         baseline=camera.baseline,

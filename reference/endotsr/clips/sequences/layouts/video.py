@@ -74,7 +74,7 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
         pictures=partial(_pictures, path, right, quarters, stereo, right_first),
         masks=stated_masks(options, facts.count, width, height),
         depth=stated_depth(options, facts.count),
-        unit=unit_of(options, "m"),
+        unit=unit_of(options),
         intrinsics=camera.intrinsics,
         calibration=camera.calibration,
         baseline=camera.baseline,
