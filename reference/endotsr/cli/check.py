@@ -46,10 +46,10 @@ def run(words: list[str]) -> int:
     checked = check_sequence(Path(options.sequence), options.settings, _speed(options.settings))
     for finding in checked.findings:
         print(f"{finding.level}: {finding.code}: {finding.line}")
-    cost = checked.facts.get("cost")
-    if cost:
+    facts = checked.facts
+    if cost := facts.get("cost"):
         print(
-            f"{counted(checked.facts['frames'], 'frame')} of {checked.facts['width']}x{checked.facts['height']}:"
+            f"{counted(facts.get('frames', 0), 'frame')} of {facts.get('width')}x{facts.get('height')}:"
             f" training needs about {cost['total_bytes'] / 1e9:.1f} GB and {in_words(60 * cost['command_minutes'])}"
             f" with the evaluation, {in_words(60 * cost['minutes'])} of them for the iterations,"
             f" and ends with about {cost['gaussians']} Gaussians"
@@ -57,7 +57,7 @@ def run(words: list[str]) -> int:
     print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")
     if options.json is not None:
         findings = [finding._asdict() for finding in checked.findings]
-        write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
+        write_json(options.json, {"source": checked.source, "findings": findings, "facts": facts})
     if options.html is not None:
         replace_text(options.html, check_page(checked))
     return 1 if checked.refused else 0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.files import check_pairing, list_pictures
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.checks.kinds import Finding, finding, tried
 from endotsr.clips.sequences.clip import Depth, Masks, Picture, PicturePair, colour_picture, grey_plane
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.mask_values import levels_of_set
@@ -34,11 +34,7 @@ class FolderReader:
 
     def tried(self, make: Callable[[], T], code: str, where: object) -> T | None:
         """The value, or None with a fault."""
-        try:
-            return make()
-        except InputError as error:
-            self.faults.append(finding(code, where, " ".join(str(error).split())))
-            return None
+        return tried(self.faults, make, code, where)
 
     def list_pictures(self, left: str, right: str) -> None:
         """List the pictures, and the right ones if there is a folder for them."""

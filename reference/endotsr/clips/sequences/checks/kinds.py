@@ -3,9 +3,13 @@
 The code of a kind is its name in `--json` and is stable across versions.
 """
 
-from typing import Literal, NamedTuple
+from collections.abc import Callable
+from typing import Literal, NamedTuple, TypeVar
+
+from endotsr.errors import InputError
 
 Level = Literal["refusal", "warning", "note"]
+T = TypeVar("T")
 
 REFUSED = "training refuses it"
 LEAVE_OUT = "leave the frame out: endotsr prepare CLIP --out CLIP --replace --drop FRAME"
@@ -253,6 +257,17 @@ def finding(code: str, where: object, what: str, frame: int | None = None) -> Fi
     """A finding of a kind in `KINDS`, for a file or folder and optionally a frame."""
     kind = KINDS[code]
     return Finding(kind.level, code, str(where), frame, what, kind.why, kind.remedy)
+
+
+def tried(
+    findings: list[Finding], make: Callable[[], T], code: str, where: object, frame: int | None = None
+) -> T | None:
+    """The value that a reader makes; None if it raises InputError, whose text becomes one more finding."""
+    try:
+        return make()
+    except InputError as error:
+        findings.append(finding(code, where, " ".join(str(error).split()), frame))
+        return None
 
 
 def worst_first(findings: list[Finding]) -> list[Finding]:
