@@ -16,7 +16,7 @@ import msgspec
 from endotsr.clips.flow.clip_flows import motion_of
 from endotsr.clips.masks.carry_masks import carry_masks
 from endotsr.clips.masks.drawn_masks import DrawnFile, key_masks
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from pages.recordings.masked_clips import MARGIN, SIZE, pictures_of, quality, scene_frames
 from pages.store.program import RESULTS, Program
 from pages.store.tables import noted, where

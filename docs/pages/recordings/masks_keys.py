@@ -19,8 +19,8 @@ from endotsr.clips.masks.propose_masks import propose_masks
 from endotsr.clips.sequences.clip import Picture
 from endotsr.clips.sequences.clip_pictures import left_pictures
 from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.results.report import style
 from endotsr.results.report.tables import markdown

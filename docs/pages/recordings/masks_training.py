@@ -17,8 +17,8 @@ import numpy as np
 import endotsr
 from endotsr.clips.flow.clip_flows import motion_of
 from endotsr.clips.masks.carry_masks import carry_masks
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.results.evaluation.metrics import psnr_tissue
 from pages.store import kept

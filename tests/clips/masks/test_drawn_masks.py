@@ -14,7 +14,7 @@ from endotsr.clips.masks.drawn_masks import FORMAT, MOST_POINTS, key_masks, read
 from endotsr.clips.masks.mask_shapes import MaskShape, filled, inside_polygon, near_line, shapes_of
 from endotsr.clips.masks.propose_masks import Proposal
 from endotsr.clips.sequences.clip import Clip
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.errors import InputError
 
 WIDTH, HEIGHT = 50, 40

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from endotsr.clips.sequences.splits import (
-    blocks,
-    end_of_clip,
-    every_eighth,
-    split_frames,
-    time_stamps,
-)
+from endotsr.clips.sequences.splits import blocks, end_of_clip, every_eighth, split_frames
 from endotsr.errors import InputError
 
 
@@ -55,7 +49,3 @@ def test_too_few_frames_are_refused():
         split_frames(2, "every_eighth", 8)
     training, held_out = split_frames(3, "every_eighth", 8)
     assert list(training) == [0, 2] and list(held_out) == [1]
-
-
-def test_time_never_reaches_one():
-    assert list(time_stamps(4)) == [0.0, 0.25, 0.5, 0.75]

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.effects.frames import TILE, ReducedFrames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 NORMAL_MAD = 0.6745  # median of |x| of a standard normal

@@ -18,7 +18,7 @@ from endotsr.clips.masks.mask_shapes import LARGEST, MaskShape, Origin, shapes_o
 from endotsr.clips.masks.propose_masks import Proposal
 from endotsr.clips.opencv.flow import sample_bilinear
 from endotsr.clips.sequences.clip import Clip, Picture
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 

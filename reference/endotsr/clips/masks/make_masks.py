@@ -27,9 +27,9 @@ from endotsr.clips.sequences.clip_pictures import left_pictures
 from endotsr.clips.sequences.folder_reader import of_size
 from endotsr.clips.sequences.layouts.common import describe_prepared
 from endotsr.clips.sequences.masks import mask_levels, threshold_masks
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, read_sequence_file, sequence_text
 from endotsr.clips.sequences.sources import PROPOSAL
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray
 from endotsr.untrusted.files import in_threads

@@ -17,7 +17,8 @@ from endotsr.clips.sequences.clip import Clip, Masks, Picture, PicturePair
 from endotsr.clips.sequences.crop import crop_within
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import stated_masks
-from endotsr.clips.sequences.splits import evenly_spaced, parse_frame_range
+from endotsr.clips.sequences.splits import parse_frame_range
+from endotsr.clips.sequences.times import evenly_spaced
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.untrusted.names import counted

@@ -17,8 +17,8 @@ from endotsr.clips.formats.choices import Other
 from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.clip import REST, Clip
 from endotsr.clips.sequences.layouts import describe
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
 from endotsr.untrusted.names import counted

@@ -12,7 +12,7 @@ from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.opencv.pictures import TIFF_ENDINGS, no_data, read_picture, read_points
 from endotsr.clips.opencv.png import write_png
 from endotsr.clips.sequences.clip import grey_plane
-from endotsr.clips.sequences.mask_polarity import sparse_step
+from endotsr.clips.sequences.sampling import sparse_step
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.sequences.clip import Picture
+from endotsr.clips.sequences.sampling import reduced_to
 from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.method.kernels.arrays import BoolArray
 
@@ -64,9 +64,7 @@ class FieldOfView:
 
 def reduced(picture: Picture) -> Picture:
     """The picture with its longer side reduced to `WORKING`."""
-    height, width = picture.shape[:2]
-    factor = min(1.0, WORKING / max(height, width))
-    return area_resize(picture, max(1, round(width * factor)), max(1, round(height * factor)))
+    return reduced_to(picture, WORKING)
 
 
 def brightness(picture: Picture) -> NDArray[np.float32]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.files import shortened
 from endotsr.clips.sequences.masks import ALLOW, LEAST_TISSUE_FRACTION
+from endotsr.clips.sequences.sampling import sparse_step
 from endotsr.errors import InputError
 
 LEAST_MISSING_FRACTION = 0.01  # of all pixels; less missing depth is no evidence of polarity
@@ -140,11 +141,6 @@ def check_single_masks(
         if frames.any():
             notes.append(f"{what}: mask {shortened([Path(names[i]).name for i in np.flatnonzero(frames)])}")
     return notes
-
-
-def sparse_step(height: int) -> int:
-    """The step between sampled rows and columns that leaves 128 to 255 rows of a picture with so many or more."""
-    return max(1, height // 128)
 
 
 def _too_little_tissue(fractions: NDArray[np.floating]) -> dict[int, str]:

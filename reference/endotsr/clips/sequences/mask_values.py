@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.depth_stacks import ENDINGS
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.errors import InputError
 
 MOST_SOFT_FRACTION = 0.05  # of a frame; a picture with more pixels between black and white is not a mask

@@ -29,7 +29,8 @@ from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_m
 from endotsr.clips.sequences.masks import check_tissue_fraction, tissue_masks
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.smaller import smaller, trained_size
-from endotsr.clips.sequences.splits import normalised_times, selected_frames, split_frames
+from endotsr.clips.sequences.splits import selected_frames, split_frames
+from endotsr.clips.sequences.times import normalised_times
 from endotsr.clips.sequences.world import fitting_world, moved_cameras, world_note
 from endotsr.config import PERCENTILES, SequenceConfig, enclose_median
 from endotsr.errors import InputError

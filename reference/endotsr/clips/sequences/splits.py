@@ -1,12 +1,10 @@
-"""The split into training and held-out frames, and the normalised time of a frame.
+"""The range of frames that is selected, and its split into training and held-out frames.
 
-In: the number of selected frames (a frame range is applied before the split), and the times of frames that are not
-evenly spaced. Out: normalised times, and the split as ascending frame numbers (train (n_train,), test (n_test,)). The
-split counts frames. It does not depend on their pictures or times.
+In: the number of frames. Out: a range, and the split as ascending frame numbers (train (n_train,), test (n_test,)). A
+range is applied before the split. The split counts frames. It does not depend on their pictures or times.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
@@ -16,44 +14,6 @@ from endotsr.untrusted.names import counted
 LEAST_FRAMES = 3
 LEAST_TRAINING_FRAMES = 2
 LEAST_BLOCK_PERIOD = 24
-UNEVEN, ROUNDING = 0.1, 1.1e-3  # tolerance of even spacing: of the mean step; rounding of containers, seconds
-
-
-def time_stamps(count: int) -> NDArray[np.float64]:
-    """t_i = i / n for i = 0 .. n-1 (ruling: 1 is never reached). Shape (n,)."""
-    return np.arange(count) / count
-
-
-def normalised_times(times: NDArray[np.float64] | None, count: int) -> NDArray[np.float64]:
-    """Normalised times of possibly uneven frames: t_i = (s_i - s_0) / (s_{n-1} - s_0) (n - 1) / n.
-
-    times    (n,) strictly ascending, in any unit; None: evenly spaced
-    returns  (n,) from 0 to (n - 1) / n
-
-    Edges:   evenly spaced times give i / n to rounding; None gives it exactly (`time_stamps`).
-    """
-    if times is None or count < 2:
-        return time_stamps(count)
-    return (times - times[0]) / (times[-1] - times[0]) * ((count - 1) / count)
-
-
-def evenly_spaced(times: NDArray[np.float64]) -> bool:
-    """Whether all frames are within a tenth of a step, or the rounding of containers, of an even grid."""
-    if len(times) < 3:
-        return True
-    step = (times[-1] - times[0]) / (len(times) - 1)
-    off = np.abs(times - times[0] - step * np.arange(len(times))).max()
-    return bool(off <= max(UNEVEN * step, ROUNDING))
-
-
-def even_frames(count: int, most: int) -> list[int]:
-    """`most` evenly spaced frames of `count`, the first and the last one included; one frame is the middle one.
-
-    Edges:   all frames if there are at most `most`.
-    """
-    if most == 1:
-        return [count // 2]
-    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)).tolist()
 
 
 def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:

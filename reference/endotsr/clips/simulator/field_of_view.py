@@ -12,7 +12,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from endotsr.clips.sequences.splits import time_stamps
+from endotsr.clips.sequences.times import time_stamps
 from endotsr.clips.simulator.bleeding import CENTRE as BLOOD_CENTRE
 from endotsr.clips.simulator.cameras import make_cameras
 from endotsr.clips.simulator.instrument import graspers, wrist_at

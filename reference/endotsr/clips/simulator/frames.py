@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.splits import time_stamps
+from endotsr.clips.sequences.times import time_stamps
 from endotsr.clips.simulator.cameras import make_cameras, open_span, shutter_times, vignette
 from endotsr.clips.simulator.coarse import see_coarsely, views_during
 from endotsr.clips.simulator.gain import camera_gain, to_display

@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import IN_MEMORY, Sequence
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.clips.sequences.checks.duration import MOST_REFERENCES, MOST_TIMES
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.kernels.constants import Y00
 from endotsr.method.splatting.camera import Camera, project

@@ -7,6 +7,7 @@ import numpy as np
 from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.crop import Crop
+from endotsr.clips.sequences.sampling import longest_run
 from endotsr.clips.sequences.world import FAR_FROM_ORIGIN
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import Camera, camera_centre, degrees_between
@@ -59,9 +60,7 @@ def _repeated_finding(cameras: list[Camera], where: str) -> list[Finding]:
     equal = np.array([a == b for a, b in pairwise(numbers)])
     if not equal.any() or equal.all():
         return []
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]])))
-    longest = int(np.diff(ends)[::2].argmax())
-    first, last = int(ends[2 * longest]), int(ends[2 * longest + 1])
+    first, last = longest_run(equal)
     if last - first < REPEATED:
         return []
     identity = bool((cameras[first].rotation == np.eye(3)).all() and not cameras[first].translation.any())

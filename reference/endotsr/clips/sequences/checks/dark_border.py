@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.field_of_view import WORKING, FieldOfView
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.method.kernels.arrays import BoolArray
 
 LEAST = 0.02  # of the pixels

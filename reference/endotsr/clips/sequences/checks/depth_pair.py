@@ -14,7 +14,7 @@ from endotsr.clips.poses.views import ViewFrame, reduced_camera, side_of
 from endotsr.clips.sequences.checks.flips import NARROW, agreed_disparity
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.clip import Clip, Picture
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.view_frames import with_planes
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray

@@ -14,8 +14,8 @@ from endotsr.clips.opencv.flow import dense_flow
 from endotsr.clips.opencv.geometry import grey_of
 from endotsr.clips.poses.views import ViewFrame, side_of
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import Sequence
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.method.kernels.arrays import BoolArray
 

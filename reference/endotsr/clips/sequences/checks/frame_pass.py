@@ -32,7 +32,7 @@ from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.mask_values import MaskLevels
 from endotsr.clips.sequences.masks import tissue_masks
 from endotsr.clips.sequences.pairing import matching_files
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray

@@ -18,9 +18,9 @@ from endotsr.clips.sequences.checks.copies import SAME, copy_findings, return_fi
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
-from endotsr.clips.sequences.splits import evenly_spaced
+from endotsr.clips.sequences.sampling import small_picture
+from endotsr.clips.sequences.times import evenly_spaced, usual_rate
 
-SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
 FROZEN = 0.5  # as SAME, from the first frame of a clip to any other; encoders refine a still picture
 WOVEN, PART = 1.15, 0.3  # of `FrameFacts.comb`, above which a picture is interlaced; part of the pictures
@@ -49,17 +49,6 @@ def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
     small = small_picture(picture)
     clipped = float((small == 255).all(axis=2).mean())
     return FrameFacts(name, small, clipped, _comb(picture), _comb(picture.transpose(1, 0, 2)))
-
-
-def small_picture(picture: NDArray[np.uint8]) -> NDArray[np.int16]:
-    """Every eighth pixel (h, w, 3) of a picture (H, W, 3); of one below 64 pixels, every second or each."""
-    step = sampling_step(picture)
-    return picture[::step, ::step].astype(np.int16)
-
-
-def sampling_step(picture: NDArray[np.uint8]) -> int:
-    """Pixels between the rows and columns of a small picture."""
-    return max(1, min(SMALL, min(picture.shape[:2]) // 8))
 
 
 def _comb(picture: NDArray[np.uint8]) -> float:
@@ -159,7 +148,7 @@ def time_findings(times: NDArray[np.float64] | None, where: str) -> list[Finding
 def rate_findings(times: NDArray[np.float64] | None, rate: float | None, where: str) -> list[Finding]:
     """A warning on a frame rate that no camera has; `times` (n,) in seconds come before the stated `rate`."""
     if times is not None and len(times) > 1:
-        rate = float(1 / np.median(np.diff(times)))
+        rate = usual_rate(times)
     if rate is None or SLOWEST <= rate <= FASTEST:
         return []
     return [finding("frame-rate", where, f"{rate:.3g} frames a second, {1 / rate:.3g} s between two")]

@@ -15,8 +15,8 @@ Depth that is missing where the masks exclude shows its moment by its holes.
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.sequences.checks.frames import sampling_step, small_picture
 from endotsr.clips.sequences.checks.kinds import Finding, finding
+from endotsr.clips.sequences.sampling import sampling_step, small_picture
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.untrusted.names import counted

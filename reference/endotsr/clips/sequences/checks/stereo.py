@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from endotsr.clips.opencv.geometry import Features, features_of, grey_of, matched_features
 from endotsr.clips.poses.views import side_of, usable_pixels
 from endotsr.clips.sequences.checks.copies import SAME, steps_between
-from endotsr.clips.sequences.checks.frames import small_picture
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.checks.late import lag_in_words
 from endotsr.clips.sequences.clip import Clip, Picture
-from endotsr.clips.sequences.splits import even_frames
+from endotsr.clips.sequences.sampling import even_frames, longest_run, small_picture
 from endotsr.clips.sequences.view_frames import frame_of
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -110,12 +109,9 @@ def frozen_finding(left: FloatArray, right: FloatArray, names: list[str], where:
     left, right   (n - 1,) steps between frames, grey levels
     """
     still = (right < SAME) & (left > MOVES)
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
-    begins, lengths = ends[::2], ends[1::2] - ends[::2]
-    if not still.any() or (lengths.max() < LEAST_STEPS and still.mean() < PART):
+    first, last = longest_run(still)
+    if not still.any() or (last - first < LEAST_STEPS and still.mean() < PART):
         return []
-    first = int(begins[lengths.argmax()])
-    last = first + int(lengths.max())
     what = (
         f"the right view repeats its picture in {still.sum()} of {len(still)} steps, from {names[first]} to"
         f" {names[last]} without a break, while the left one changes by {np.median(left[still]):.1f} grey levels"

@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.field_of_view import FieldOfView
+from endotsr.clips.sequences.sampling import even_frames, reduced_to
 from endotsr.clips.sequences.smaller import resized_nearest
-from endotsr.clips.sequences.splits import even_frames
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
 WORKING, SAMPLED, FEWEST = 640, 32, 6  # columns of the pictures that are looked at; frames of a clip, and of a finding
@@ -151,10 +150,7 @@ def loaded_still_findings(images: NDArray[np.uint8], masks: BoolArray, where: st
 
 def _working(picture: NDArray[np.uint8]) -> FloatArray:
     """The grey picture, its longer side reduced to `WORKING`."""
-    height, width = picture.shape[:2]
-    factor = min(1.0, WORKING / max(height, width))
-    small = area_resize(picture, max(1, round(width * factor)), max(1, round(height * factor)))
-    return small.mean(axis=2, dtype=np.float32)
+    return reduced_to(picture, WORKING).mean(axis=2, dtype=np.float32)
 
 
 def _reduced(tissue: BoolArray, grey: FloatArray) -> BoolArray:

@@ -33,6 +33,7 @@ from endotsr.clips.sequences.sources import (
     stated_masks,
     unit_of,
 )
+from endotsr.clips.sequences.times import usual_rate
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
@@ -188,7 +189,6 @@ def describe_euroc(path: Path, options: SourceOptions) -> Clip:
     seconds = np.array([row.stamp for row in left], np.float64) * 1e-9
     poses = _poses(body, options, seconds, notes)
     times = np.array([row.stamp - left[0].stamp for row in left], np.float64) * 1e-9
-    rate = float(1 / np.median(np.diff(times))) if len(times) > 1 else None
     inside = {body: LAYOUT.reads, **dict.fromkeys((body / name for name in (*CAMERAS, TRUTH)), (LIST, SENSOR, "data"))}
     return Clip(
         layout="euroc",
@@ -202,7 +202,7 @@ def describe_euroc(path: Path, options: SourceOptions) -> Clip:
         calibration=camera.calibration,
         baseline=camera.baseline,
         poses=poses,
-        rate=rate,
+        rate=usual_rate(times),
         times=times,
         inside=together(inside, folders_of([*files, *right])),
         notes=[*picture_notes([*files, *right]), *notes, *camera.notes],

@@ -32,6 +32,7 @@ from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.clips.sequences.layouts import Layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import depth_of, masks_of, pictures_from_files, replaced, size_of, stated_masks
+from endotsr.clips.sequences.times import usual_rate
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
@@ -135,6 +136,7 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
     order, times = time_order(files), _times(entries, options.rate, file, notes)
     if times is not None:
         order = np.argsort(times, kind="stable").tolist()
+        times = times[order].astype(np.float64)
     files, entries = [files[i] for i in order], [entries[i] for i in order]
     width, height = size_of(files)
     cameras = [read_intrinsics(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)]
@@ -159,8 +161,8 @@ def describe_nerfstudio(path: Path, options: SourceOptions) -> Clip:
         unit=ARBITRARY if unit == ARBITRARY else "mm",
         intrinsics=shared_intrinsics(cameras, file, notes),
         poses=[_pose(entry, options, factor, f"{file}: frame {i}") for i, entry in enumerate(entries)],
-        rate=options.rate or _rate(times),
-        times=None if times is None else np.sort(times).astype(np.float64),
+        rate=options.rate or (None if times is None else usual_rate(times)),
+        times=times,
         read_here=_places(entries, data),
         inside=_inside(file, files, masked, planes, _places(entries, data)),
         notes=[f"{file.name}: {counted(len(files), 'frame')}, unit of lengths {known}", *notes],
@@ -202,11 +204,6 @@ def _times(entries: list[Keys], rate: float | None, file: Path, notes: list[str]
     else:
         notes.append(f"time: read as seconds, {times.max():g} s in all; --source-rate states the mean rate instead")
     return times
-
-
-def _rate(times: FloatArray | None) -> float | None:
-    """Frames per second of the times of the frames, in any order; None without."""
-    return None if times is None or len(times) < 2 else float(1 / np.median(np.diff(np.sort(times))))
 
 
 def _cloud(folder: Path, data: Keys, file: Path, notes: list[str]) -> FloatArray | None:

@@ -32,6 +32,7 @@ from endotsr.clips.sequences.sources import (
     stated_poses,
     unit_of,
 )
+from endotsr.clips.sequences.times import usual_rate
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 
@@ -142,7 +143,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     gaps = [found.line for found in gap_findings(left)] + _in_turn(left) + squeezed_note(width, height, stereo)
     clock, lists = _clock(path, left, options.rate)
     times = None if clock is None else clock - clock[0]
-    rate = options.rate if clock is None else float(1 / np.median(np.diff(clock)))
+    rate = options.rate if clock is None else usual_rate(clock)
     poses, notes = stated_poses(options, len(left), rate, times, _numbers(left), clock)
     return Clip(
         layout="pictures",

@@ -29,6 +29,7 @@ from endotsr.clips.sequences.sources import (
     stated_depth,
     stated_masks,
 )
+from endotsr.clips.sequences.times import usual_rate
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
 from endotsr.method.splatting.camera import CameraPose
@@ -155,7 +156,7 @@ def describe_tum(path: Path, options: SourceOptions) -> Clip:
         unit="mm",
         intrinsics=camera.intrinsics,
         poses=poses,
-        rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
+        rate=usual_rate(times),
         times=times if steps.size and (steps > 0).all() else None,
         read_here=tuple(file.name.lower() for file in [*given, *([settings] if settings else [])]),
         inside=together(folders_of(files), folders_of(planes, DEPTH_ENDINGS)),
