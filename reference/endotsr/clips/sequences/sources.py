@@ -17,15 +17,15 @@ from endotsr.clips.formats.depth_stacks import ENDINGS as ARRAY_ENDINGS
 from endotsr.clips.formats.depth_stacks import stack_planes
 from endotsr.clips.formats.files import list_pictures
 from endotsr.clips.formats.trajectory import poses_of_frames, read_trajectory
-from endotsr.clips.opencv.filters import stretched
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.clips.sequences.clip import Clip, Depth, Masks, Picture, PicturePair, colour_picture
+from endotsr.clips.sequences.clip import Clip, Depth, Masks, PicturePair, colour_picture
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.clips.sequences.mask_values import levels_of_set, refuse_coded_objects, white_pixels
 from endotsr.clips.sequences.mask_videos import coloured_plane_of, mask_files, plane_of
 from endotsr.clips.sequences.pairing import paired
 from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.clips.sequences.source_options import SourceOptions
+from endotsr.clips.sequences.stored_pairs import split_pair
 from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import FloatArray
 from endotsr.method.splatting.camera import CameraPose
@@ -34,9 +34,6 @@ from endotsr.untrusted.json import read_json, text
 PROPOSAL = "proposal.json"  # next to a folder of masks that a program proposed
 MASK_ENDINGS = (*PICTURE_ENDINGS, *ARRAY_ENDINGS)
 LARGEST_MARK = 1 << 16  # bytes of this file
-# Pairs whose views are squeezed: how they are arranged, and the factors that restore width and height.
-SQUEEZED = {"half_side_by_side": ("side_by_side", 2, 1), "half_stacked": ("stacked", 1, 2)}
-WIDEST = 2.2  # width over height, above which a view of a stacked pair is probably squeezed
 
 
 def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
@@ -52,49 +49,6 @@ def size_of(files: list[Path]) -> tuple[int, int]:
     """Width and height of the first picture. Raises InputError."""
     height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
     return width, height
-
-
-def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
-    """Left and right of one stored picture: side by side (left half first), stacked (left on top), or none.
-
-    Squeezed views are restored to their width or height.
-
-    Raises:  InputError for a picture without two equal halves.
-    """
-    height, width = picture.shape[:2]
-    if stereo == "none":
-        return PicturePair(picture)
-    if stereo in SQUEEZED:
-        arrangement, *factors = SQUEEZED[stereo]
-        pair = split_pair(picture, arrangement, where)
-        return PicturePair(*(stretched(view, *factors) for view in pair if view is not None))
-    if (width if stereo == "side_by_side" else height) % 2:
-        side = "width" if stereo == "side_by_side" else "height"
-        raise InputError(f"{where}: {width}x{height} pixels: a {stereo} pair has an even {side}")
-    if stereo == "side_by_side":
-        return PicturePair(picture[:, : width // 2], picture[:, width // 2 :])
-    return PicturePair(picture[: height // 2], picture[height // 2 :])
-
-
-def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
-    """The size of one picture of a stored pair."""
-    if stereo in SQUEEZED:
-        arrangement, across, down = SQUEEZED[stereo]
-        width, height = halves(width, height, arrangement)
-        return across * width, down * height
-    return (width // 2 if stereo == "side_by_side" else width), (height // 2 if stereo == "stacked" else height)
-
-
-def squeezed_note(width: int, height: int, stereo: str) -> list[str]:
-    """A note on the views of a pair whose shape indicates that they are squeezed to half their width or height."""
-    if stereo == "side_by_side" and width < height:
-        shape, side = "higher than wide", "width"
-    elif stereo == "stacked" and width > WIDEST * height:
-        shape, side = f"{width / height:.3g} times as wide as high", "height"
-    else:
-        return []
-    restored = f"if the views are squeezed to half their {side}, --stereo half_{stereo} restores it"
-    return [f"each view of {width}x{height} pixels is {shape}: {restored}"]
 
 
 def pictures_from_files(

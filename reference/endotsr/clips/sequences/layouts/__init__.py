@@ -4,7 +4,6 @@ Every file in this folder defines a value `LAYOUT` and is registered automatical
 order of `rank`: unambiguous ones first, a plain folder of pictures last.
 """
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -15,8 +14,6 @@ from typing import NamedTuple
 
 from endotsr.clips.formats.calibration_formats import HALF_A_PIXEL
 from endotsr.clips.formats.camera import ARBITRARY, MILLIMETRES
-from endotsr.clips.formats.files import shortened
-from endotsr.clips.formats.video_file import LARGEST_FILE, VIDEO_ENDINGS
 from endotsr.clips.opencv.pictures import PICTURE_ENDINGS
 from endotsr.clips.sequences.clip import Clip
 from endotsr.clips.sequences.depth_files import DEPTH_ENDINGS
@@ -24,11 +21,10 @@ from endotsr.clips.sequences.poses import POSE_FILES
 from endotsr.clips.sequences.sequence_file import DEPTH, IMAGES, MASKS
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import MASK_ENDINGS
+from endotsr.clips.sequences.unknown_source import what_it_is
 from endotsr.clips.sequences.unread import folders_of, together, unread
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.untrusted.files import open_regular
-from endotsr.untrusted.names import counted, plain_line
 
 # Statements of a user that only some layouts read; the other options depend on these.
 STATEMENTS = (
@@ -58,16 +54,7 @@ def layouts() -> tuple[Layout, ...]:
     return tuple(sorted(found, key=lambda layout: (layout.rank, layout.name)))
 
 
-ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
-OTHER_PICTURES = (".heic", ".heif", ".avif", ".jp2", ".j2k", ".jxl", ".gif", ".tga", ".ppm", ".pgm", ".dng", ".psd",
-                  ".exr", ".hdr", ".pnm", ".pbm")  # fmt: skip
-ARRAYS = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".pkl", ".bag")
-AS_PICTURES = "frames in arrays are not read; write each as a png picture"
-JPEG_NAMES = (".jfif", ".jpe", ".jif")  # of pictures that a browser saved
-DICOM_ENDINGS = (".dcm", ".dicom", "")  # recorders also write names without an ending
-EXPORT_DICOM = "export it as a video or as PNG pictures before, for example with the program that shows it"
 PARTS_OF_ENDONERF = (IMAGES, DEPTH, MASKS, "gt_masks", *POSE_FILES)
-OTHER_VIDEOS = (".gif", ".apng", ".y4m", ".ogv", ".ogg", ".ivf", ".mjpeg", ".mjpg", ".yuv")
 
 
 def layout_of(path: Path, name: str = "auto") -> Layout:
@@ -87,50 +74,7 @@ def layout_of(path: Path, name: str = "auto") -> Layout:
         if layout.recognises(path):
             return layout
     known = "; ".join(f"{layout.name} ({layout.about})" for layout in layouts())
-    raise InputError(f"{path}: no known layout{_held(path)}; allowed: {known}")
-
-
-def is_dicom(path: Path) -> bool:
-    """Whether a file is a regular one that has the mark of DICOM behind its preamble."""
-    try:
-        with open_regular(path, LARGEST_FILE) as file:
-            return file.read(132)[128:] == b"DICM"
-    except (OSError, InputError):
-        return False
-
-
-def _held(path: Path) -> str:
-    """What a path in no known layout is, where a remedy follows from it."""
-    if path.is_file():
-        ending = path.suffix.lower()
-        if is_dicom(path):
-            return f": a DICOM file; {EXPORT_DICOM}"
-        if ending in ARRAYS:
-            return f": {AS_PICTURES}"
-        said = ": a video in a format that is not read; convert it to mp4" if ending in OTHER_VIDEOS else ""
-        return ": an archive; unpack it first" if ending in ARCHIVES else said
-    dicom = sum(is_dicom(file) for file in path.iterdir() if file.suffix.lower() in DICOM_ENDINGS)
-    if dicom:
-        return f": it holds {counted(dicom, 'DICOM file')}; {EXPORT_DICOM}"
-    endings = Counter(file.suffix.lower() for file in path.iterdir() if file.is_file() and file.suffix)
-    ending, count = endings.most_common(1)[0] if endings else ("", 0)
-    if ending in OTHER_PICTURES:
-        return f": it holds {count} files that end in {ending}; convert them to png"
-    if ending in ARRAYS:
-        return f": it holds {counted(count, 'file')} of the ending {ending}; {AS_PICTURES}"
-    if ending in ARCHIVES:
-        return f": it holds {counted(count, 'archive')} of the ending {ending}; unpack first"
-    if ending in JPEG_NAMES:
-        return f": it holds {count} files that end in {ending}; let their names end in .jpg"
-    videos = sorted(plain_line(file.name) for file in path.iterdir() if file.suffix.lower() in VIDEO_ENDINGS)
-    if len(videos) == 1:
-        return f": it holds {videos[0]}, which `endotsr prepare {path / videos[0]} --out FOLDER` converts"
-    if videos:
-        return f": it holds {shortened(videos)}; give the video itself, and join the parts of one recording before"
-    if not any(path.iterdir()):
-        return ": the folder is empty"
-    folders = sorted(plain_line(folder.name) for folder in path.iterdir() if folder.is_dir())
-    return f": it holds the folders {shortened(folders)}; give the one with the pictures" if folders else ""
+    raise InputError(f"{path}: no known layout{what_it_is(path)}; allowed: {known}")
 
 
 def describe(path: Path, options: SourceOptions = NOTHING) -> Clip:

@@ -22,16 +22,15 @@ from endotsr.clips.sequences.layouts import STATEMENTS, Layout
 from endotsr.clips.sequences.source_options import SourceOptions
 from endotsr.clips.sequences.sources import (
     files_of,
-    halves,
     pictures_from_files,
     size_of,
-    squeezed_note,
     stated_camera,
     stated_depth,
     stated_masks,
     stated_poses,
     unit_of,
 )
+from endotsr.clips.sequences.stored_pairs import squeezed_note, view_size
 from endotsr.clips.sequences.times import usual_rate
 from endotsr.clips.sequences.unread import folders_of, together
 from endotsr.errors import InputError
@@ -138,7 +137,7 @@ def describe_pictures(path: Path, options: SourceOptions) -> Clip:
     stereo = "none" if options.stereo == "auto" else options.stereo
     if right and stereo != "none":
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
-    width, height = halves(*size_of(left), stereo)
+    width, height = view_size(*size_of(left), stereo)
     camera = stated_camera(options, width, height, path)
     gaps = [found.line for found in gap_findings(left)] + _in_turn(left) + squeezed_note(width, height, stereo)
     clock, lists = _clock(path, left, options.rate)

@@ -18,17 +18,8 @@ from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.layouts import STATEMENTS, Layout
 from endotsr.clips.sequences.layouts.pictures import SIDE
 from endotsr.clips.sequences.source_options import SourceOptions
-from endotsr.clips.sequences.sources import (
-    SQUEEZED,
-    halves,
-    split_pair,
-    squeezed_note,
-    stated_camera,
-    stated_depth,
-    stated_masks,
-    stated_poses,
-    unit_of,
-)
+from endotsr.clips.sequences.sources import stated_camera, stated_depth, stated_masks, stated_poses, unit_of
+from endotsr.clips.sequences.stored_pairs import SQUEEZED, split_pair, squeezed_note, view_size
 from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
 
@@ -55,7 +46,7 @@ def describe_video(path: Path, options: SourceOptions) -> Clip:
     quarters = _quarter_turns(facts, options, path)
     across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
     stereo, right_first, views = chosen_views(facts.views, "none" if right else options.stereo, path, facts.pixel_shape)
-    width, height = halves(across, down, stereo)
+    width, height = view_size(across, down, stereo)
     if right is not None:
         _check_right(facts, video_facts(right), path, right)
     rate, times = _clock(facts, options, path)
