@@ -9,20 +9,18 @@ import pytest
 from endotsr.cli.parts import progress
 from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.waiting import in_words, waiting_line
-from endotsr.clips.sequences.checks.duration import (
+from endotsr.clips.sequences.forecast.seconds import (
     PAGES,
     Beside,
     TimedCommand,
     assumed_unit,
-    at_start,
     estimated_seconds,
     evaluation_units,
     frames_of,
-    iteration_work,
     vector_factor,
     visited,
-    work_left,
 )
+from endotsr.clips.sequences.forecast.work import at_start, iteration_work, work_left
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.training.fitting.records import Making

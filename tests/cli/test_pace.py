@@ -8,7 +8,8 @@ import pytest
 
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.train import config_of_minutes
-from endotsr.clips.sequences.checks.duration import at_start, vector_factor, work_left
+from endotsr.clips.sequences.forecast.seconds import vector_factor
+from endotsr.clips.sequences.forecast.work import at_start, work_left
 from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PRESETS, QUICK, lengthened, with_settings

@@ -2,7 +2,7 @@
 
 import pytest
 
-from endotsr.clips.sequences.checks.duration import Beside
+from endotsr.clips.sequences.forecast.seconds import Beside
 from endotsr.training.runs import speed
 
 

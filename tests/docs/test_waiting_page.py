@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from pages.bench import waiting, waiting_text
 
-from endotsr.clips.sequences.checks.duration import TimedCommand, estimated_seconds, expected_frames
+from endotsr.clips.sequences.forecast.seconds import TimedCommand, estimated_seconds, expected_frames
 from endotsr.config import PRESETS, with_iterations
 
 RECORD = waiting.PROGRAM.read()

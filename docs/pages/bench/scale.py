@@ -1,11 +1,11 @@
 """Tabulate and draw the minutes and the memory of a training against the number of frames, for every preset.
 
 Nothing is trained. The numbers are the estimates printed by `endotsr check` and at the start of a training
-(`clips/sequences/checks/cost.py`), with the timed trainings of docs/results/minutes.json for comparison.
+(`clips/sequences/forecast/cost.py`), with the timed trainings of docs/results/minutes.json for comparison.
 """
 
-from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
-from endotsr.clips.sequences.checks.duration import expected_frames
+from endotsr.clips.sequences.forecast.cost import Cost, estimated_cost
+from endotsr.clips.sequences.forecast.seconds import expected_frames
 from endotsr.clips.sequences.splits import every_eighth
 from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.results.report.style import BLUE, GREEN, ORANGE, legend, name_axes, new_figure, plain_axes, save

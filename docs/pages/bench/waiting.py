@@ -19,7 +19,8 @@ from typing import Any
 from unittest import mock
 
 from endotsr.cli.parts import progress, waiting
-from endotsr.clips.sequences.checks.duration import COMPILATION, Standing, TimedCommand, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.forecast.seconds import COMPILATION, TimedCommand, assumed_unit, estimated_seconds
+from endotsr.clips.sequences.forecast.work import Standing
 from endotsr.method.kernels.vectors import REGISTER
 from endotsr.results.evaluation.metrics import psnr
 from endotsr.results.report import live_page

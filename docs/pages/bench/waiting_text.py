@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from endotsr.clips.sequences.checks import duration as forecasts
+from endotsr.clips.sequences.forecast import seconds as forecasts
 from endotsr.config import PRESETS, with_iterations
 from endotsr.results.report.style import BLUE, GREEN, INK, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.results.report.tables import duration, markdown

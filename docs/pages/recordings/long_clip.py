@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.opencv.png import read_png
-from endotsr.clips.sequences.checks.cost import estimated_cost
-from endotsr.clips.sequences.checks.duration import expected_frames
+from endotsr.clips.sequences.forecast.cost import estimated_cost
+from endotsr.clips.sequences.forecast.seconds import expected_frames
 from endotsr.config import config_from_dict, with_iterations
 from endotsr.results.report.tables import markdown
 from endotsr.training.runs.machine import dated

@@ -12,7 +12,7 @@ from endotsr.errors import InputError
 from endotsr.untrusted.names import counted
 
 if TYPE_CHECKING:
-    from endotsr.clips.sequences.checks.duration import Speed
+    from endotsr.clips.sequences.forecast.seconds import Speed
 
 
 @dataclass
@@ -65,7 +65,7 @@ def run(words: list[str]) -> int:
 
 def _speed(settings: Config) -> "Speed":
     """The speed of the last training on this machine with the threads of the settings, else the assumed one."""
-    from endotsr.clips.sequences.checks.duration import Speed, assumed_unit, vector_factor
+    from endotsr.clips.sequences.forecast.seconds import Speed, assumed_unit, vector_factor
     from endotsr.method.kernels.threads import use_threads
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.training.runs.speed import remembered_beside, remembered_unit

@@ -25,7 +25,7 @@ from endotsr.training.runs.records import RunRecord
 from endotsr.untrusted.names import counted
 
 if TYPE_CHECKING:
-    from endotsr.clips.sequences.checks.duration import Standing
+    from endotsr.clips.sequences.forecast.work import Standing
     from endotsr.clips.sequences.sequence import Sequence
 
 SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
@@ -214,7 +214,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 
 def config_of_minutes(options: TrainOptions, sequence: "Sequence", config: Config, threads: int) -> tuple[Config, str]:
     """The settings for the requested minutes, from a few timed iterations, and a line on them."""
-    from endotsr.clips.sequences.checks.duration import GAUSSIANS, at_start, iteration_work, vector_factor
+    from endotsr.clips.sequences.forecast.seconds import vector_factor
+    from endotsr.clips.sequences.forecast.work import GAUSSIANS, at_start, iteration_work
     from endotsr.training.fitting.compile_ahead import compile_ahead
     from endotsr.training.runs.pace import paced_for, seconds_of_unit
 
@@ -258,7 +259,7 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
 
 def _reached(folder: RunFolder, config: Config) -> "Standing":
     """The progress of a run, as far as its records tell it."""
-    from endotsr.clips.sequences.checks.duration import at_start
+    from endotsr.clips.sequences.forecast.work import at_start
     from endotsr.training.runs.log import last_entry
 
     first, entry = at_start(config), last_entry(folder.log) or {}
@@ -284,7 +285,7 @@ def _progress(
 
     from endotsr.cli.parts.waiting import waiting_line
     from endotsr.clips.formats.files import has_truth
-    from endotsr.clips.sequences.checks.duration import TimedCommand, frames_of, vector_factor
+    from endotsr.clips.sequences.forecast.seconds import TimedCommand, frames_of, vector_factor
     from endotsr.results.evaluation.lpips import lpips_file
     from endotsr.results.report.live_page import LIVE_PAGE, LivePage
     from endotsr.training.fitting.compile_ahead import done_before

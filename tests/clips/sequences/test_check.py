@@ -16,9 +16,10 @@ from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
-from endotsr.clips.sequences.checks.cost import estimated_cost
-from endotsr.clips.sequences.checks.duration import Standing, at_start, expected_frames, gaussians_at_end, work_left
 from endotsr.clips.sequences.checks.guard import MOST, SAID_ALREADY
+from endotsr.clips.sequences.forecast.cost import estimated_cost
+from endotsr.clips.sequences.forecast.seconds import expected_frames
+from endotsr.clips.sequences.forecast.work import Standing, at_start, gaussians_at_end, work_left
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME
 from endotsr.clips.simulator.settings import SimulatorSettings

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from endotsr.clips.sequences.checks.duration import (
+from endotsr.clips.sequences.forecast.seconds import (
     Beside,
-    Standing,
     TimedCommand,
     estimated_seconds,
     evaluation_units,
-    expected_gaussians,
     start_units,
 )
+from endotsr.clips.sequences.forecast.work import Standing, expected_gaussians
 from endotsr.results.report.tables import duration
 from endotsr.training.fitting.records import LogEntry
 from endotsr.training.runs.time_left import TimeLeft

@@ -1,13 +1,13 @@
 """What a person waits for in `endotsr train`, in one line before the first iteration, also of a resumed training."""
 
-from endotsr.clips.sequences.checks.duration import (
+from endotsr.clips.sequences.forecast.seconds import (
     COMPILATION,
     MEASURED_SPEEDS,
-    Standing,
     TimedCommand,
     assumed_unit,
     estimated_seconds,
 )
+from endotsr.clips.sequences.forecast.work import Standing
 from endotsr.results.report.tables import duration
 from endotsr.untrusted.names import counted
 

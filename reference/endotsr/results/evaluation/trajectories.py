@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.clips.sequences.checks.duration import MOST_REFERENCES, MOST_TIMES
+from endotsr.clips.sequences.forecast.seconds import MOST_REFERENCES, MOST_TIMES
 from endotsr.clips.sequences.sampling import even_frames
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray

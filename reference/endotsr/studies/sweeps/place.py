@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import NamedTuple
 
-from endotsr.clips.sequences.checks.cost import estimated_cost
-from endotsr.clips.sequences.checks.duration import expected_frames
+from endotsr.clips.sequences.forecast.cost import estimated_cost
+from endotsr.clips.sequences.forecast.seconds import expected_frames
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import Config, with_settings
 from endotsr.errors import InputError

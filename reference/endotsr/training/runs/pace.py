@@ -8,13 +8,8 @@ of the machine is measured on the clip itself, with a few iterations of a model 
 import statistics
 import time
 
-from endotsr.clips.sequences.checks.duration import (
-    TimedCommand,
-    estimated_seconds,
-    frames_of,
-    iteration_work,
-    vector_factor,
-)
+from endotsr.clips.sequences.forecast.seconds import TimedCommand, estimated_seconds, frames_of, vector_factor
+from endotsr.clips.sequences.forecast.work import iteration_work
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError

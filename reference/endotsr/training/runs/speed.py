@@ -1,6 +1,6 @@
 """The speed of this machine, remembered between trainings beside the compiled kernels.
 
-A training stores its seconds per unit of work (`clips/sequences/checks/duration.py`) by its number of threads: of the
+A training stores its seconds per unit of work (`clips/sequences/forecast/work.py`) by its number of threads: of the
 iterations if it timed at least LEAST_ITERATIONS, of the initial motion and of the evaluation; each on frames of at
 least LEAST_PIXELS. Forecasts read them; no result depends on them.
 """
@@ -9,7 +9,7 @@ import contextlib
 import json
 from pathlib import Path
 
-from endotsr.clips.sequences.checks.duration import Beside
+from endotsr.clips.sequences.forecast.seconds import Beside
 from endotsr.errors import InputError
 from endotsr.untrusted.json import number, read_json
 from endotsr.untrusted.writing import replace_text

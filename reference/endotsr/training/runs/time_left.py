@@ -9,16 +9,8 @@ from collections import deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from endotsr.clips.sequences.checks.duration import (
-    PIXELS,
-    Standing,
-    TimedCommand,
-    coarse_end,
-    gap_units,
-    iteration_work,
-    visited,
-    work_left,
-)
+from endotsr.clips.sequences.forecast.seconds import TimedCommand, gap_units, visited
+from endotsr.clips.sequences.forecast.work import PIXELS, Standing, coarse_end, iteration_work, work_left
 from endotsr.training.fitting.records import NOTHING_MADE, Making
 
 LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # number of timed iterations

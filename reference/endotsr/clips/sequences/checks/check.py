@@ -13,12 +13,9 @@ from numpy.typing import NDArray
 from endotsr.clips.formats.files import has_truth
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import baseline_findings, camera_findings
-from endotsr.clips.sequences.checks.cost import Cost, estimated_cost
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import depth_findings, light_finding, usual_depth
 from endotsr.clips.sequences.checks.depth_steps import scale_finding
-from endotsr.clips.sequences.checks.duration import ASSUMED as ASSUMED_SPEED
-from endotsr.clips.sequences.checks.duration import Frames, Speed, expected_frames, frames_of
 from endotsr.clips.sequences.checks.flips import shading_finding
 from endotsr.clips.sequences.checks.frame_pass import FramePass
 from endotsr.clips.sequences.checks.frames import (
@@ -32,6 +29,9 @@ from endotsr.clips.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.split_tissue import split_findings
 from endotsr.clips.sequences.clip import Clip
+from endotsr.clips.sequences.forecast.cost import Cost, estimated_cost
+from endotsr.clips.sequences.forecast.seconds import ASSUMED as ASSUMED_SPEED
+from endotsr.clips.sequences.forecast.seconds import Frames, Speed, expected_frames, frames_of
 from endotsr.clips.sequences.frame_store import FrameStore
 from endotsr.clips.sequences.layouts import describe_for_training
 from endotsr.clips.sequences.mask_polarity import check_polarity, check_single_masks

@@ -2,15 +2,8 @@
 
 from typing import NamedTuple
 
-from endotsr.clips.sequences.checks.duration import (
-    ASSUMED,
-    PIXELS,
-    Frames,
-    Speed,
-    TimedCommand,
-    estimated_seconds,
-    gaussians_at_end,
-)
+from endotsr.clips.sequences.forecast.seconds import ASSUMED, Frames, Speed, TimedCommand, estimated_seconds
+from endotsr.clips.sequences.forecast.work import PIXELS, gaussians_at_end
 from endotsr.clips.sequences.frame_store import PIXEL_BYTES
 from endotsr.config import Config
 from endotsr.method.kernels.memory import memory_limit
