@@ -24,10 +24,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.port.judge.case_verdict import judge_case
 from endotsr.port.judge.command import run_port, write_requests
 from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden, golden_folder, in_precision, read_golden
-from endotsr.port.judge.verdict import Report, conclude, judge, judge_case
+from endotsr.port.judge.verdict import conclude, judge
 from endotsr.port.reference import stored
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated

@@ -2,8 +2,8 @@
 
 import pytest
 
+from endotsr.port.judge.case_verdict import judge_case
 from endotsr.port.judge.store import golden_folder, read_golden
-from endotsr.port.judge.verdict import judge_case
 
 GOLDEN = read_golden(golden_folder())
 CASES = [case for case in GOLDEN.cases if case.answers > 1]

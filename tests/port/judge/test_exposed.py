@@ -12,9 +12,10 @@ from made_up_ports import case_of
 
 from endotsr.definition import train, view
 from endotsr.definition.exposure import ExposureGrads, exposure_forward, exposure_reverse
+from endotsr.port.judge.case_verdict import judge_case
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.judge.profiles import of_profile
-from endotsr.port.judge.verdict import conclude, judge, judge_case
+from endotsr.port.judge.verdict import conclude, judge
 from endotsr.port.reference import stored
 from endotsr.port.stages.definition import definition_stages
 

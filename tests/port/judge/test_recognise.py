@@ -5,8 +5,8 @@ import pytest
 
 from endotsr.port.judge.diagnose import PARTS, first_wrong, order_of
 from endotsr.port.judge.recognise import Evidence, Suspect, contradicted, pair_of
+from endotsr.port.judge.records import CaseReport, OutputReport, Report
 from endotsr.port.judge.report import answer
-from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
 
 
 def suspect(evidence):

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.port.judge.command import run_port, write_requests
+from endotsr.port.judge.records import CaseReport, Report
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
-from endotsr.port.judge.verdict import CaseReport, Report, judge
+from endotsr.port.judge.verdict import judge
 
 HERE, DOCS = Path(__file__).parent, Path(__file__).parents[3] / "docs"
 RESULT, PAGE = DOCS / "results" / "golden_programs.json", DOCS / "who_computes_what.md"

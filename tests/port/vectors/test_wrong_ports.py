@@ -7,7 +7,8 @@ from made_up_ports import case_of, write_expected
 
 import make
 from endotsr.port.contract import all_operations
-from endotsr.port.judge.verdict import conclude, judge_case
+from endotsr.port.judge.case_verdict import judge_case
+from endotsr.port.judge.verdict import conclude
 from makers.copies import Edit, changed_text
 from makers.registry import all_wrong_ports
 from makers.wrong import Question, answer_wrongly, answers

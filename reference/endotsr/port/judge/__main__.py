@@ -16,10 +16,11 @@ from endotsr.port.judge.certificate import NAMED, port_of, read_certificate
 from endotsr.port.judge.command import refuse_folders
 from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.profiles import PROFILES
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.report import as_table, write_report
 from endotsr.port.judge.runs import called_often
 from endotsr.port.judge.store import Golden, golden_folder, read_golden
-from endotsr.port.judge.verdict import Report, judge
+from endotsr.port.judge.verdict import judge
 from endotsr.port.judge.verify import summary, verified
 
 NO_SEARCH = "the line of the definition that your port computes is searched by `endotsr golden` of the package endotsr"

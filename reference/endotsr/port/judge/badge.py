@@ -5,8 +5,8 @@ from pathlib import Path
 
 from endotsr.port.judge.certificate import Certificate, Port, certified, obstacle, write_certificate
 from endotsr.port.judge.profiles import PROFILES
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import Report
 from endotsr.untrusted.writing import replace_text
 
 LEFT = "endotsr golden"

@@ -5,8 +5,9 @@ from pathlib import Path
 
 from endotsr.port.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
 from endotsr.port.judge.format import Precision
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import Report, asked_of, judge, without_claim
+from endotsr.port.judge.verdict import asked_of, judge, without_claim
 
 
 def called(

@@ -19,8 +19,8 @@ from endotsr import __version__
 from endotsr.errors import INVISIBLE, InputError
 from endotsr.port.judge.format import MOST_RUNS, Level, Precision, _Strict, read_struct, to_json
 from endotsr.port.judge.profiles import PROFILES, WITHOUT, ProfileClaim, claim_text
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import Report
 from endotsr.untrusted.writing import replace_text
 
 LONGEST = 500  # characters of a text

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.port.judge.case_verdict import judge_case
 from endotsr.port.judge.format import Case, Precision
 from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.records import CaseReport
 from endotsr.port.judge.store import Golden, golden_folder, in_precision, read_golden
-from endotsr.port.judge.verdict import CaseReport, judge_case
 
 Answer = Callable[[str, dict[str, NDArray], dict[str, Any]], Mapping[str, NDArray | float] | None]
 

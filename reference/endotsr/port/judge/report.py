@@ -16,8 +16,8 @@ from endotsr.port.judge.format import LEVELS
 from endotsr.port.judge.npy import Refused, read_plain
 from endotsr.port.judge.profiles import lines_of
 from endotsr.port.judge.recognise import Suspect
+from endotsr.port.judge.records import CaseReport, OutputReport, Report
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import CaseReport, OutputReport, Report
 from endotsr.untrusted.writing import replace_file, replace_text
 
 MOST_LINES = 60  # refused outputs in the table

@@ -18,8 +18,9 @@ from endotsr.port.judge.command import KEPT, run_port
 from endotsr.port.judge.compare import largest
 from endotsr.port.judge.format import BITS, MOST_RUNS, Case, Precision
 from endotsr.port.judge.npy import Refused, read_plain
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import Report, asked_of, judge, without_claim
+from endotsr.port.judge.verdict import asked_of, judge, without_claim
 
 
 class RunDifference(NamedTuple):

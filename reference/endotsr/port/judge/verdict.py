@@ -1,27 +1,18 @@
 """The judge: compares a folder of outputs with the golden cases. Every state of the folder has a verdict."""
 
-import difflib
-import os
-from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
-
-import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.port.judge.compare import Verdict, judged, misses
+from endotsr.port.judge.case_verdict import MISSING, head_of, judge_case
 from endotsr.port.judge.diagnose import diagnosis, first_wrong
-from endotsr.port.judge.format import BITS, LEVELS, Case, Output, Precision
+from endotsr.port.judge.format import BITS, LEVELS, Precision
 from endotsr.port.judge.needles import Off, only_needles
-from endotsr.port.judge.npy import Refused, read_plain, read_text
+from endotsr.port.judge.npy import Refused, read_text
 from endotsr.port.judge.profiles import (
     PROFILES,
     REVERSE,
     WITHOUT,
     Graded,
-    ProfileClaim,
     claim_text,
     complete_level,
     last_level,
@@ -29,121 +20,15 @@ from endotsr.port.judge.profiles import (
     profile_claims,
     without_reverse,
 )
-from endotsr.port.judge.recognise import (
-    NAMED,
-    Evidence,
-    Suspect,
-    Taken,
-    evidence_of,
-    merged,
-    pair_of,
-    suspects_of,
-)
-from endotsr.port.judge.relate import relations
+from endotsr.port.judge.recognise import merged, pair_of, suspects_of
+from endotsr.port.judge.records import CaseReport, Report
+from endotsr.port.judge.second_run import not_repeated, repeated
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.trajectory import FirstWrong, first_wrong_iteration
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations omitted by the port, one per line
 INSIDE = "inside"  # in that file: the port cannot write arrays inside its operations
 NO_REVERSE = "reverse"  # in that file: the port has no reverse pass
 FORWARD_ALONE = 1  # the last level without gradients that is followed by one with them
-LARGEST_RELATED = 20_000  # largest number of entries of an output that is searched for relations
-MISSING = "missing"  # the array reader's reason for a missing file
-MOST_FILES = 1000  # files of a case's folder that are searched for a misnamed output
-RESEMBLES = 0.6  # smallest similarity of two names, from 0 to 1
-
-Status = Literal["passed", "refused", "missing", "not ported"]
-
-
-class OutputReport(msgspec.Struct, kw_only=True):
-    """Verdict on one output."""
-
-    name: str
-    level: int
-    status: Status
-    reason: str
-    distance: float | None = None
-    index: tuple[int, ...] = ()
-    got: float | None = None
-    expected: float | None = None
-    forms: list[str] = []
-    """relations to the expected array, satisfied to the tolerance, the most specific first"""
-
-
-class CaseReport(msgspec.Struct, kw_only=True):
-    """Verdict on one case."""
-
-    name: str
-    title: str
-    operation: str = ""
-    """empty for the comparison of two runs"""
-    options: tuple[str, ...] = ()
-    """operations of the options that the case uses"""
-    level: int
-    status: Status
-    outputs: list[OutputReport] = []
-    looks_like: list[str] = []
-    """mistakes that explain the refusals of this case, best first"""
-    made_for: list[str] = []
-    answer: int = 0
-    """the one of several legal answers with which it was compared"""
-    first_wrong: str = ""
-    """of a trajectory: the first wrong iteration, its wrong outputs, and the place to look at"""
-    events: list[str] = []
-    """events at this iteration or the one before"""
-    evidence: dict[str, Evidence] = {}
-    """by mistake; not part of the JSON report, whose suspects have the sums"""
-
-
-class Report(msgspec.Struct, kw_only=True):
-    """The report of the judge."""
-
-    version: str
-    precision: str
-    asked_level: int
-    level: int
-    """highest level that is complete, -1 = none; also of a port that fails"""
-    without: tuple[str, ...]
-    """operations that the port declares as omitted"""
-    claim: str
-    levels: dict[int, tuple[int, int]]
-    """passed and requested outputs by level"""
-    cases: list[CaseReport]
-    suspects: list[Suspect]
-    notes: list[str]
-    pair: tuple[str, ...] = ()
-    """two known mistakes that together explain every refused output, if none does alone"""
-    diagnosis: list[str] = []
-    """the first wrong operation and the relations of its outputs to the expected ones; empty if nothing is refused"""
-    causes: list[str] = []
-    """changes of the definition that reproduce the port's outputs of that operation; see port.search"""
-    inside: list[str] = []
-    """the first wrong array inside that operation, among the port's intermediate arrays; see port.search.inside"""
-    needles: list[str] = []
-    """if needles alone are wrong: how far, and how to mend it"""
-    failures: list[str] = []
-    """failures of the port as a program"""
-    profile: str = ""
-    """the profile that was asked for, "" = every case"""
-    profiles: list[ProfileClaim] = []
-    """what is right, by profile"""
-    seconds: float = 0.0
-    """of the calls of the port"""
-    runs: int = 1
-    """calls of the port that were judged; the second call of level 5 belongs to the first"""
-
-    first_wrong: str = ""
-    """the first operation with a refused output"""
-
-    @property
-    def passed(self) -> bool:
-        """Whether the requested level is complete."""
-        return self.level >= self.asked_level
-
-    @property
-    def accepted(self) -> bool:
-        """Whether no judged case is refused or missing, as asked of a part, and the port itself did not fail."""
-        return not self.failures and all(case.status in ("passed", "not ported") for case in self.cases)
 
 
 def judge(
@@ -161,14 +46,14 @@ def judge(
     forward = not profile and NO_REVERSE in left_out(outputs)[0]
     golden = without_reverse(golden) if forward else golden
     reports = [
-        CaseReport(**_head(case), status="not ported")
+        CaseReport(**head_of(case), status="not ported")
         if case.parts & set(without)
         else judge_case(golden, case, outputs, precision, level)
         for case in golden.cases
         if case.level <= level
     ]
     if level >= BITS and (again or not only):  # a part has no claim, and so needs no second run
-        reports.append(_not_repeated() if again is None else _repeated(golden, outputs, again, without))
+        reports.append(not_repeated() if again is None else repeated(golden, outputs, again, without))
     report = conclude(golden, reports, precision, level, notes, without, profile)
     if forward and not only and level > FORWARD_ALONE:
         report.notes.append(_forward_note(without))
@@ -295,174 +180,3 @@ def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[st
 def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:
     all_of = [o for r in reports for o in r.outputs if o.level == level]
     return sum(o.status == "passed" for o in all_of), len(all_of)
-
-
-def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, level: int = 5) -> CaseReport:
-    """The verdict on one case; never raises for any content of `outputs`."""
-    folder = outputs / case.family / case.case
-    taken: dict[str, NDArray | Refused] = {}
-    for name, asked in case.outputs.items():
-        if asked.level <= level:
-            try:
-                taken[name] = _taken(folder / f"{name}.npy", outputs, asked, precision)
-            except Refused as refusal:
-                taken[name] = refusal
-    _name_strays(folder, taken)
-    tries = [_held_against(golden, case, taken, precision, answer) for answer in range(case.answers)]
-    best = min(range(case.answers), key=lambda k: misses((o.level, o.status == "passed") for o in tries[k][0]))
-    found, seen = tries[best]
-    _relate(golden, case, found, seen, precision)
-    evidence = evidence_of(case, seen, precision)
-    where = _first_wrong(case, found)
-    scores = {flag: one.score for flag, one in evidence.items() if one.score >= NAMED}
-    return CaseReport(
-        **_head(case), status=_together(found), outputs=found,
-        looks_like=sorted(scores, key=lambda flag: (-scores[flag], -len(evidence[flag].agrees))),
-        made_for=list(case.flags), answer=best, first_wrong=where.text, events=where.events, evidence=evidence,
-    )  # fmt: skip
-
-
-def _head(case: Case) -> dict[str, Any]:
-    """The fields of a report that are those of its case."""
-    return {name: getattr(case, name) for name in ("name", "title", "operation", "options", "level")}
-
-
-def _name_strays(folder: Path, taken: dict[str, NDArray | Refused]) -> None:
-    """Add to each missing output a similarly named file of its folder that is not an output."""
-    missing = [name for name, got in taken.items() if isinstance(got, Refused) and str(got) == MISSING]
-    try:
-        files = [entry.name for entry in islice(os.scandir(folder), MOST_FILES)] if missing else []
-    except OSError:
-        return
-    strays = [name.removesuffix(".npy") for name in sorted(files) if name.removesuffix(".npy") not in taken]
-    for name in missing:
-        for stray in difflib.get_close_matches(name, strays, 1, RESEMBLES):
-            taken[name] = Refused(f"{MISSING}; {f'{stray}.npy'[:60]!a} is there and is no output of this case")
-
-
-def _relate(
-    golden: Golden, case: Case, found: list[OutputReport], seen: dict[str, Taken], precision: Precision
-) -> None:
-    """Record the relations of the refused outputs."""
-    refused = [(o, seen[o.name]) for o in found if o.status == "refused" and seen[o.name].got is not None]
-    if not refused:
-        return
-    others = golden.inputs(case) | {name: one.expected for name, one in seen.items()}
-    for output, taken in refused:
-        rule, got = case.outputs[output.name].compare, taken.got
-        if got is None or rule.kind == "identical" or got.size > LARGEST_RELATED:
-            continue
-        tolerance = rule.float64 if precision == "float64" else rule.float32
-        rest = {name: array for name, array in others.items() if name != output.name}
-        output.forms = [r.text for r in relations(got, taken.expected, rule.scale, tolerance, rest)]
-
-
-def _held_against(
-    golden: Golden, case: Case, taken: dict[str, NDArray | Refused], precision: Precision, answer: int
-) -> tuple[list[OutputReport], dict[str, Taken]]:
-    """Verdicts on all outputs against one of the legal answers, and the outputs as evidence of mistakes."""
-    found: list[OutputReport] = []
-    seen: dict[str, Taken] = {}
-    for name, got in taken.items():
-        asked = case.outputs[name]
-        expected = golden.array(case, asked.answer(answer))
-        if isinstance(got, Refused):
-            status: Status = "missing" if str(got).startswith(MISSING) else "refused"
-            found.append(OutputReport(name=name, level=asked.level, status=status, reason=str(got)))
-            seen[name] = Taken(status, None, expected)
-            continue
-        verdict = judged(got, expected, asked.compare, precision, asked.order)
-        if verdict.passed and asked.compare.kind == "identical":
-            verdict = _identical(got, taken.get(asked.compare.to), asked.compare.to)
-        found.append(_report(name, asked, verdict))
-        seen[name] = Taken(found[-1].status, got, expected)
-    return found, seen
-
-
-def _first_wrong(case: Case, found: list[OutputReport]) -> FirstWrong:
-    """The first wrong iteration of a trajectory."""
-    along = [o for o in found if case.outputs[o.name].order == "iteration"]
-    wrong = {o.name: o.index[0] + 1 for o in along if o.index}
-    absent = [o.name for o in along if o.status != "passed" and not o.index]
-    return first_wrong_iteration(wrong, [o.name for o in along], case.settings, absent)
-
-
-def _together(found: list[OutputReport]) -> Status:
-    kinds = {o.status for o in found}
-    return "refused" if "refused" in kinds else "missing" if "missing" in kinds else "passed"
-
-
-def _taken(path: Path, root: Path, asked: Output, precision: Precision) -> NDArray:
-    """The output as an array of the requested shape and kind. Raises Refused."""
-    count = int(np.prod(asked.shape))
-    got = read_plain(path, root, largest=8 * max(count, 1))
-    if got.shape != asked.shape:
-        raise Refused(f"shape {got.shape}; expected {asked.shape}")
-    kinds = {"real": "f", "integer": "iu", "boolean": "bu"}[asked.dtype]
-    if got.dtype.kind not in kinds:
-        raise Refused(f"dtype {got.dtype}; expected {asked.dtype}")
-    if asked.dtype == "real" and precision == "float64" and got.dtype.itemsize < 8:
-        raise Refused(f"dtype {got.dtype}; expected float64")
-    return got
-
-
-def _identical(got: NDArray, other: NDArray | Refused | None, name: str) -> Verdict:
-    """Whether an output has the bits of another one; if not, with the first entry that differs."""
-    if not isinstance(other, np.ndarray):
-        return Verdict(False, f"{name}, whose bits it must have, is not there", 0.0, (), np.nan, np.nan)
-    if other.dtype != got.dtype or other.shape != got.shape:
-        reason = f"{got.dtype} {got.shape}; {name} is {other.dtype} {other.shape}"
-        return Verdict(False, reason, 0.0, (), np.nan, np.nan)
-    bits = [np.ascontiguousarray(a).reshape(-1).view(np.uint8).reshape(a.size, -1) for a in (got, other)]
-    unequal = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
-    if not unequal.size:
-        return Verdict(True, "same bits", 0.0)
-    worst = tuple(int(k) for k in np.unravel_index(int(unequal[0]), got.shape))
-    return Verdict(False, f"bits differ from {name}", 0.0, worst, float(got[worst]), float(other[worst]))
-
-
-def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:
-    shown = {} if verdict.passed or not verdict.reason else {
-        "index": verdict.worst, "got": _plain(verdict.got), "expected": _plain(verdict.expected)
-    }  # fmt: skip
-    status: Status = "passed" if verdict.passed else "refused"
-    return OutputReport(
-        name=name, level=asked.level, status=status, reason=verdict.reason, distance=verdict.distance, **shown
-    )
-
-
-def _plain(value: float) -> float | None:
-    return value if np.isfinite(value) else None
-
-
-def _not_repeated() -> CaseReport:
-    """The report without a second run: level 5 is not complete."""
-    reason = "no second run: give it with --again"
-    return _again([OutputReport(name="second run", level=5, status="missing", reason=reason)])
-
-
-def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:
-    """Bitwise comparison of all outputs of two runs."""
-    found = []
-    for case in golden.cases:
-        if case.parts & set(without):
-            continue
-        for name, asked in case.outputs.items():
-            files = [folder / case.family / case.case / f"{name}.npy" for folder in (first, second)]
-            limit = 8 * max(int(np.prod(asked.shape)), 1)
-            try:
-                a, b = (read_plain(path, root, limit) for path, root in zip(files, (first, second)))
-                same = a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-                status, reason = ("passed", "same bits") if same else ("refused", "other bits in the second run")
-            except Refused as refusal:
-                status, reason = "missing", str(refusal)
-            report = OutputReport(name=f"{case.name}/{name}", level=5, status=status, reason=reason)  # type: ignore[arg-type]
-            found.append(report)
-    return _again(found)
-
-
-def _again(found: list[OutputReport]) -> CaseReport:
-    return CaseReport(
-        name="determinism/again", title="A second run gives the same bits", level=5, status=_together(found),
-        outputs=found, made_for=["sums_in_any_order"],
-    )  # fmt: skip

@@ -11,9 +11,9 @@ from endotsr import __version__
 from endotsr.errors import InputError
 from endotsr.port.judge.call import called
 from endotsr.port.judge.certificate import Certificate, certified, manifest_hash, port_of
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.runs import called_often
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import Report
 
 COMPARED = (
     "claim",

@@ -13,9 +13,9 @@ from endotsr.port.judge.compare import scale_of
 from endotsr.port.judge.diagnose import made_of
 from endotsr.port.judge.format import FLIP_BUDGET, Case
 from endotsr.port.judge.npy import Refused, read_plain
+from endotsr.port.judge.records import CaseReport
 from endotsr.port.judge.relate import FITS
 from endotsr.port.judge.store import Golden, in_precision
-from endotsr.port.judge.verdict import CaseReport
 from endotsr.port.search.places import executed
 from endotsr.port.stages.definition import definition_stages
 from endotsr.port.stages.stage import Inputs, Outputs, Settings, Stage, tidy

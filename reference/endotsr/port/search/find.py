@@ -10,8 +10,9 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.port.judge.format import Precision
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import Golden
-from endotsr.port.judge.verdict import INSIDE, Report, judge, left_out
+from endotsr.port.judge.verdict import INSIDE, judge, left_out
 from endotsr.port.search.cases import Answered
 from endotsr.port.search.changes import SECONDS, search
 from endotsr.port.search.trial import Hit, Trial

@@ -40,8 +40,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 import hand_port
 
 from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.store import golden_folder, read_golden
-from endotsr.port.judge.verdict import Report, judge
+from endotsr.port.judge.verdict import judge
 from endotsr.training.runs.files import write_json
 from endotsr.training.runs.machine import dated
 

@@ -18,9 +18,10 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "injected"))
 import inject
 
 from endotsr.port.judge.npy import write_npy
+from endotsr.port.judge.records import Report
 from endotsr.port.judge.report import answer
 from endotsr.port.judge.store import Golden, golden_folder, in_precision, read_golden
-from endotsr.port.judge.verdict import Report, judge
+from endotsr.port.judge.verdict import judge
 from endotsr.port.reference import stored
 from endotsr.port.search.find import explain
 from makers.copies import Edit, changed_copy
