@@ -47,6 +47,8 @@ MAKERS = {
     f"{PACKAGE}port/judge/profiles.py": (OPERATIONS,),
     f"{PACKAGE}port/stages/": (OPERATIONS,),
 }
+# Recordings as users have them, which the commands read through several rooms.
+INPUTS = ("tests/clips/sequences/inputs", "tests/clips/sequences/layouts")
 # Beginning of a changed path -> tests beside those of its room.
 MORE = {
     f"{PACKAGE}definition/": ("tests/definition", "tests/test_specification.py", "tests/docs/test_live.py"),
@@ -58,8 +60,8 @@ MORE = {
         "tests/docs/test_equation_map.py",
     ),
     f"{PACKAGE}clips/sequences/": ("tests/docs/test_generated_pages.py",),
-    f"{PACKAGE}clips/formats/": ("tests/clips/sequences", "tests/docs/test_generated_pages.py"),
-    f"{PACKAGE}clips/prepare/": ("tests/clips/sequences",),
+    f"{PACKAGE}clips/formats/": (*INPUTS, "tests/docs/test_generated_pages.py"),
+    f"{PACKAGE}clips/prepare/": INPUTS,
     f"{PACKAGE}config.py": ("tests/test_specification.py", "tests/cli/test_cli_options.py", "tests/port/vectors"),
     f"{PACKAGE}training/fitting/records.py": ("tests/results/report",),
     "tests/fuzz/": ("tests/fuzz",),
@@ -117,7 +119,7 @@ def tests_of(path: str) -> list[str]:
     found = [name for start, names in MORE.items() if path.startswith(start) for name in names]
     if path.startswith(PACKAGE):
         parts = Path(path.removeprefix(PACKAGE)).parts[:-1]
-        for depth in (2, 1):
+        for depth in (3, 2, 1):
             folder = "/".join(("tests", *parts[:depth]))
             if len(parts) >= depth and (ROOT / folder).is_dir():
                 return [folder, *found]

@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, settings
 
 HERE = Path(__file__).parent
 # Helpers of these folders are used in other folders too.
-sys.path[:0] = [str(HERE), str(HERE / "clips"), str(HERE / "method" / "splatting")]
+FOLDERS = ("clips", "clips/sequences/inputs", "method/splatting")
+sys.path[:0] = [str(HERE), *(str(HERE / name) for name in FOLDERS)]
 sys.path += [str(HERE.parent / name) for name in ("golden", "docs", "notebooks")]  # not installed
 
 # No deadline: the first call of a kernel compiles it. Fixtures hold nothing that an example changes.

@@ -24,8 +24,8 @@ BOUND = re.compile(r"([A-Za-z0-9_.-]+)>=([0-9.]+)")
 TESTS = (
     "tests/clips/opencv/test_opencv.py",
     "tests/clips/prepare/test_prepare.py",
-    "tests/clips/sequences/test_stereo_depth.py",
-    "tests/clips/sequences/test_propose_masks.py",
+    "tests/clips/prepare/test_stereo_depth.py",
+    "tests/clips/masks/test_propose_masks.py",
     "tests/cli/test_cli_any_clip.py",
     "tests/method/kernels/test_vectors.py",
     "tests/method/kernels/test_exponential.py",

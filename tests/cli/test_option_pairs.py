@@ -12,14 +12,11 @@ import inspect
 import io
 import itertools
 import shutil
-import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "clips" / "sequences"))
 from made_videos import CAMERA, HEIGHT, WIDTH, picture, write
 from raw_sources import colmap
 

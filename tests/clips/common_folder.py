@@ -50,3 +50,15 @@ def moving(offset=(0.0, 0.0, 0.0), step=2.0) -> list[list[float]]:
         [1.0, 0.0, 0.0, -(offset[0] + step * i), 0.0, 1.0, 0.0, -offset[1], 0.0, 0.0, 1.0, -offset[2]]
         for i in range(FRAMES)
     ]
+
+
+def write_plane(path: Path, plane: np.ndarray) -> None:
+    if path.suffix == ".npy":
+        np.save(path, plane)
+    elif path.suffix == ".pfm":
+        header = f"Pf\n{plane.shape[1]} {plane.shape[0]}\n-1.0\n".encode()
+        path.write_bytes(header + plane[::-1].astype("<f4").tobytes())
+    else:
+        from PIL import Image
+
+        Image.fromarray(plane).save(path)

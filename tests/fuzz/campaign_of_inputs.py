@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any
 
 # The writers of good files are those of the tests of sequences.
-sys.path[:0] = [str(Path(__file__).parents[1] / "clips"), str(Path(__file__).parents[1] / "clips" / "sequences")]
+CLIPS = Path(__file__).parents[1] / "clips"
+sys.path[:0] = [str(CLIPS), str(CLIPS / "sequences" / "inputs")]
 
 import mutate  # noqa: E402
 from readers import CORPUS, READERS, Reader  # noqa: E402

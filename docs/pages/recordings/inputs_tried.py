@@ -1,4 +1,4 @@
-"""Run the inputs of `tests/clips/sequences/inputs_tried.py`; write the table of those that were read wrongly before.
+"""Run the inputs of `inputs_tried.py` of the tests; write the table of those that were read wrongly before.
 
     python docs/make.py recordings.inputs_tried measure
 
@@ -24,7 +24,7 @@ LONGEST = 160  # characters of a message
 
 def measured(options: argparse.Namespace) -> dict[str, Any]:
     """The outcome of every row of `inputs_tried.py`, run now."""
-    sys.path.insert(0, str(DOCS.parent / "tests" / "clips" / "sequences"))
+    sys.path.insert(0, str(DOCS.parent / "tests" / "clips" / "sequences" / "inputs"))
     inputs_tried: Any = import_module("inputs_tried")  # of the tests; this module is `pages.recordings.inputs_tried`
     found = {}
     for row in inputs_tried.ROWS:

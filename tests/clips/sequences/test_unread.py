@@ -2,14 +2,11 @@
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import public_layouts
+import pytest
 import raw_sources
 from common_folder import written
 from made_videos import files, pictures

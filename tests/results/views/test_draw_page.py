@@ -3,7 +3,6 @@
 import html
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -214,12 +213,11 @@ def test_the_page_needs_nothing_else():
 
 
 def test_the_commands_draw_carry_and_draw_again(tmp_path, capsys):
+    from common_folder import written
+
     from endotsr.api import load_sequence
     from endotsr.cli.main import main
     from endotsr.clips.sequences.sequence_file import read_sequence_file
-
-    sys.path.insert(0, str(Path(__file__).parents[2] / "clips" / "sequences"))
-    from common_folder import written
 
     folder, page, keys = tmp_path / "clip", tmp_path / "draw.html", tmp_path / "keys.json"
     written(folder)

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import numpy as np
+from depth_folders import true_depth
 from input_kinds import CAMERA, Row, common, depth_files, folder_of, named, pair, prepare
 from made_videos import HEIGHT, WIDTH, files, picture, pictures, write
-from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png, write_png

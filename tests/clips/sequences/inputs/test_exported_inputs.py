@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from depth_folders import true_depth
 from exported_inputs import of_all_frames
 from made_videos import HEIGHT, WIDTH
-from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics

@@ -2,11 +2,11 @@
 
 import json
 
-import msgspec
 import numpy as np
 import pytest
 from common_folder import FRAMES, written
 from made_videos import files, write
+from scoped_scenes import scene, through_a_scope
 
 from data_folder import data_folder
 from endotsr.cli.main import main
@@ -15,16 +15,7 @@ from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
-from endotsr.clips.simulator.frames import make_scene, simulated_frames
-from endotsr.clips.simulator.scenes import named_scene
 from endotsr.config import PAPER, SequenceConfig
-
-
-def scene(name, **changes):
-    """Pictures and true masks of a small scene."""
-    settings = msgspec.structs.replace(named_scene(name), width=160, height=128, frames=5, **changes)
-    frames = list(simulated_frames(make_scene(settings)))
-    return [frame.image.transpose(1, 2, 0) for frame in frames], [frame.excluded for frame in frames]
 
 
 def iou(found, true):
@@ -67,19 +58,6 @@ def test_without_colour_there_is_no_proposal():
     pictures = [np.repeat(picture[..., :1], 3, axis=2) for picture in scene("pulling")[0]]
     assert "is not distinguishable" in propose_masks(pictures).reason
     assert not propose_masks([]).found
-
-
-def through_a_scope(pictures, seed=7):
-    """The pictures in a round field of view: a dark, noisy border with a bright text in it, as a recorder writes it."""
-    rng, (height, width) = np.random.default_rng(seed), pictures[0].shape[:2]
-    row, column = np.mgrid[:height, :width]
-    inside = (row - height / 2) ** 2 + (column - width / 2) ** 2 < (0.42 * height) ** 2
-    found = []
-    for picture in pictures:
-        made = np.where(inside[..., None], picture, rng.integers(0, 9, (height, width, 1))).astype(np.uint8)
-        made[4:10, 4:30] = 200  # the name of the hospital
-        found.append(made)
-    return found, inside
 
 
 @pytest.mark.parametrize("name", ["pulling", "still"])

@@ -12,7 +12,7 @@ from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png
 from endotsr.clips.sequences import folder_reader
-from endotsr.clips.sequences.checks import check
+from endotsr.clips.sequences.checks import frame_pass
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.stereo import frozen_finding, late_finding, pair_findings, row_finding, row_matches
 from endotsr.clips.sequences.layouts import describe_for_training
@@ -116,8 +116,8 @@ def with_depth(tmp_path):
 
 
 def test_check_reads_every_picture_of_a_pair_once(with_depth, monkeypatch):
-    read, real = Counter(), check.read_picture
-    for module in (check, folder_reader):
+    read, real = Counter(), frame_pass.read_picture
+    for module in (frame_pass, folder_reader):
         monkeypatch.setattr(module, "read_picture", lambda file: read.update([file.parent.name]) or real(file))
     check_sequence(with_depth, PAPER)
     assert read["images"] == read["images_right"] == 6

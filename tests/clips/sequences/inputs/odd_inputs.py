@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import public_layouts
 import raw_sources
+from depth_folders import true_depth
 from input_kinds import (
     Row,
     blank,
@@ -34,8 +35,7 @@ from input_kinds import (
 from made_videos import WIDTH, picture, pictures
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
-from test_stated_depth import true_depth
-from test_stereo_depth import slanted_pair
+from stereo_pairs import slanted_pair
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv.pictures import write_jpeg

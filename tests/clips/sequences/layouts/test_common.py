@@ -1,12 +1,11 @@
 """The common format: what is written is read, units and axes are exact, and every wrong file has one line."""
 
 import re
-from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
-from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
+from common_folder import FRAMES, HEIGHT, WIDTH, moving, write_plane, written
 from scipy.spatial.transform import Rotation
 
 from endotsr.cli.main import main
@@ -137,18 +136,6 @@ def test_a_scale_factor_of_pfm_is_refused(tmp_path, factor, accepted):
         return
     with pytest.raises(InputError, match=r"a\.pfm: .*scale factor .*; allowed: 1 or -1"):
         read_plane(tmp_path / "a.pfm")
-
-
-def write_plane(path: Path, plane: np.ndarray) -> None:
-    if path.suffix == ".npy":
-        np.save(path, plane)
-    elif path.suffix == ".pfm":
-        header = f"Pf\n{plane.shape[1]} {plane.shape[0]}\n-1.0\n".encode()
-        path.write_bytes(header + plane[::-1].astype("<f4").tobytes())
-    else:
-        from PIL import Image
-
-        Image.fromarray(plane).save(path)
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("um", 1e-3), ("cm", 10.0), ("m", 1000.0)])

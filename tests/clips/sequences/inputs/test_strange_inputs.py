@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from common_folder import written
+from depth_folders import true_depth
 from strange_inputs import given, keys, matched, textured
-from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics

@@ -6,8 +6,10 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import one_view
 import raw_sources
-import test_relative_depth as one_view
+from depth_folders import recording as with_depth
+from depth_folders import true_depth
 from input_kinds import (
     MATRIX,
     Row,
@@ -41,8 +43,6 @@ from made_videos import pictures
 from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 from scipy.spatial.transform import Rotation
-from test_stated_depth import recording as with_depth
-from test_stated_depth import true_depth
 
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.layouts import describe

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+from depth_folders import true_depth
 from input_kinds import OPENCV, Row, calibrated, folder_of, prepare, video
 from made_videos import HEIGHT, WIDTH, files, picture, pictures
 from scipy.ndimage import zoom
-from test_stated_depth import true_depth
-from test_still_parts import FRAMES, tissue, with_text
+from still_text import FRAMES, tissue, with_text
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png, write_png

@@ -1,7 +1,7 @@
 """Inputs as users have them, made up with real codecs, and what each command does with them.
 
-    python tests/clips/sequences/inputs_tried.py            the table in Markdown
-    python tests/clips/sequences/inputs_tried.py WORD       the rows whose kind holds the word
+    python tests/clips/sequences/inputs/inputs_tried.py            the table in Markdown
+    python tests/clips/sequences/inputs/inputs_tried.py WORD       the rows whose kind holds the word
 
 An outcome is `right` (the numbers that were written are those of the input), `told` (right, and a printed line names
 what was done or assumed), `refused` (exit code 1 or 2 and one line), or `WRONG IN SILENCE`. `test_inputs_tried.py`
@@ -18,10 +18,12 @@ from pathlib import Path
 import av
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2]))
-import test_relative_depth as one_view
+sys.path.insert(0, str(Path(__file__).parents[3]))
+import one_view
 from careless_inputs import CARELESS_ROWS
+from depth_folders import WRONG as NO_LENGTHS
+from depth_folders import true_depth
 from exported_inputs import EXPORTED_ROWS
 from input_kinds import (
     MATRIX,
@@ -71,15 +73,13 @@ from matlab_inputs import MATLAB_ROWS
 from odd_inputs import ODD_ROWS
 from raw_sources import stereomis
 from rig_inputs import RIG_ROWS
+from scoped_scenes import scene, through_a_scope
 from silent_inputs import SILENT_ROWS
 from squeezed_inputs import SQUEEZED_ROWS
 from strange_inputs import STRANGE_ROWS
 from stranger_inputs import STRANGER_ROWS
 from stream_inputs import STREAM_ROWS
 from surgeon_inputs import SURGEON_ROWS
-from test_propose_masks import scene, through_a_scope
-from test_stated_depth import WRONG as NO_LENGTHS
-from test_stated_depth import true_depth
 from time_inputs import BESIDE_ROWS, TIME_ROWS
 
 from endotsr.cli.main import main
@@ -197,7 +197,7 @@ def view_is_kept(folder: Path) -> bool:
 
 def exported(name: str, *words: str):
     def make(folder: Path) -> list[str]:
-        sys.path.insert(0, str(Path(__file__).parents[2] / "results" / "export"))
+        sys.path.insert(0, str(Path(__file__).parents[3] / "results" / "export"))
         from made_up_model import moving_scene
 
         from endotsr.results.export.files import export

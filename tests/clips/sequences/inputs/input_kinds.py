@@ -10,14 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[3]))
 import public_layouts
 import raw_sources
+from calibration_files import kalibr, ros
 from common_folder import written
+from depth_folders import recording as with_depth
+from depth_folders import true_depth
 from made_videos import CAMERA, HEIGHT, WIDTH, files, pictures, write
-from test_calibrations import K, kalibr, ros
-from test_stated_depth import recording as with_depth
-from test_stated_depth import true_depth
+from public_layouts import K
 
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.opencv.png import read_png, write_png

@@ -4,7 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 from common_folder import moving, written
-from test_stated_depth import FRAMES, recording, true_depth
+from depth_folders import FRAMES, true_depth
+from one_view import clip, error, given, relative, sparse
 
 from endotsr.cli.main import main
 from endotsr.clips.opencv.png import read_png, write_png
@@ -14,40 +15,6 @@ from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.clips.sequences.sequence_file import PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.config import PAPER
-
-
-def relative(i):
-    """An affine map of 1 / z, another one in every frame."""
-    return (1800 + 100 * i) / true_depth(i) - 3 + 2 * i
-
-
-def clip(folder, values=relative, kind="npy"):
-    """A prepared clip without depth, and the files of r; returns both."""
-    words = recording(folder, values, "relative", kind)
-    assert main(words[:-2]) == 0
-    return folder / "o", folder / "relative"
-
-
-def given(where, files, *words):
-    return main(["depth", str(where), "--given", str(files), "--kind", "relative", *words])
-
-
-def sparse(where, count=60, wrong=0.0):
-    """Enter true depth at a few pixels a frame; a part of it is wrong by a third."""
-    rng = np.random.default_rng(2)
-    (where.parent / "sparse").mkdir()
-    for i in range(FRAMES):
-        plane = np.zeros(true_depth(i).size)
-        chosen = rng.choice(plane.size, count, replace=False)
-        plane[chosen] = true_depth(i).reshape(-1)[chosen] * np.where(rng.random(count) < wrong, 1.33, 1.0)
-        np.save(where.parent / "sparse" / f"{i:06d}.npy", plane.reshape(true_depth(i).shape).astype(np.float32))
-    assert main(["depth", str(where), "--given", str(where.parent / "sparse"), "--kind", "depth"]) == 0
-
-
-def error(where):
-    """The largest relative error of the depth of every frame."""
-    read = describe(where).depth
-    return max(np.abs(read(i) / true_depth(i) - 1).max() for i in range(FRAMES))
 
 
 def test_a_line_is_found_though_a_third_of_the_points_is_wrong():

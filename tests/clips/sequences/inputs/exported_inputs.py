@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import raw_sources
+from depth_folders import true_depth
 from input_kinds import (
     Row,
     calibrated,
@@ -33,7 +34,6 @@ from made_videos import HEIGHT, files, picture, pictures, write
 from odd_inputs import marked, with_camera
 from PIL import Image
 from silent_inputs import in_one_file, of_orb_slam
-from test_stated_depth import true_depth
 
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.sequence_file import read_sequence_file

@@ -4,6 +4,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from depth_folders import true_depth
 from input_kinds import (
     MATRIX,
     Row,
@@ -30,7 +31,6 @@ from input_kinds import (
 )
 from made_videos import pictures, woven
 from odd_inputs import with_camera
-from test_stated_depth import true_depth
 
 from endotsr.clips.opencv.pictures import write_jpeg
 from endotsr.clips.opencv.png import read_png, write_png

@@ -3,8 +3,8 @@
 import msgspec
 import numpy as np
 import pytest
-from test_stated_depth import recording
-from test_stereo_depth import slanted_pair, stereo_folder
+from depth_folders import recording
+from stereo_pairs import slanted_pair, stereo_folder
 
 from data_folder import data_folder
 from endotsr.cli.main import main
@@ -91,7 +91,7 @@ def test_texture_without_light_of_the_scope_says_nothing(name, seed):
 
 
 def test_prepare_refuses_and_check_warns(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("test_stated_depth.lit_picture", lambda i: lit(relief(i)))
+    monkeypatch.setattr("depth_folders.lit_picture", lambda i: lit(relief(i)))
     words = recording(tmp_path, lambda i: relief(i)[::-1])
     assert main(words) == 2
     error = capsys.readouterr().err

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from common_folder import moving, written
 from raw_sources import write_video
-from test_stereo_depth import slanted_pair, stereo_folder
+from stereo_pairs import slanted_pair, stereo_folder
 
 from data_folder import data_folder
 from endonerf_writer import write_endonerf

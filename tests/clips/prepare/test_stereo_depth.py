@@ -1,46 +1,23 @@
 """`endotsr depth`: a simulated pair gives its true depth, holes stay holes, other programs' files are read exactly."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from common_folder import FRAMES, HEIGHT, WIDTH, written
-from scipy.ndimage import gaussian_filter, map_coordinates
-from test_common import write_plane
+from common_folder import FRAMES, HEIGHT, WIDTH, write_plane, written
+from stereo_pairs import BASELINE, LENS, slanted_pair, stereo_folder, texture
 
 from data_folder import data_folder
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics
-from endotsr.clips.opencv.png import read_png, write_png
+from endotsr.clips.opencv.png import read_png
 from endotsr.clips.prepare.make_depth import depth_of_values, from_files, write_depth
 from endotsr.clips.prepare.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.clips.sequences.layouts import describe
 from endotsr.clips.sequences.read import read_sequence
-from endotsr.clips.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
+from endotsr.clips.sequences.sequence_file import FILE_NAME, read_sequence_file
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 
-LENS = Intrinsics(300.0, 310.0, 80.0, 60.0, 160, 120)
-BASELINE = 4.0
 SETTINGS = StereoSettings(nearest=25.0, farthest=120.0)
-PLANE = (22.0, -0.02, 0.03)  # disparity = a + b column + c row: a slanted plane
-
-
-def texture(column, row, seed=0):
-    """A picture without repeats, sampled anywhere."""
-    noise = gaussian_filter(np.random.default_rng(seed).uniform(0, 255, (160, 260, 3)), (1.2, 1.2, 0))
-    noise = (noise - noise.min()) / np.ptp(noise) * 255
-    places = [np.asarray(row) + 20, np.asarray(column) + 50]
-    planes = [map_coordinates(noise[:, :, k], places, order=3, mode="nearest") for k in range(3)]
-    return np.clip(np.rint(np.stack(planes, axis=2)), 0, 255).astype(np.uint8)
-
-
-def slanted_pair(seed=0):
-    """Left and right pictures of a slanted plane, and its true disparity in the left one."""
-    column, row = np.meshgrid(np.arange(160.0), np.arange(120.0))
-    a, b, c = PLANE
-    there = (column + a + c * row) / (1 - b)  # the left column that the right column shows
-    return texture(column, row, seed), texture(there, row, seed), a + b * column + c * row
 
 
 @pytest.mark.parametrize("smooth", [True, False])
@@ -141,19 +118,6 @@ def test_disparity_of_another_size_and_sign():
         depth_of_values(np.ones((24, 16)), "depth", 1.0, intrinsics, 4.0, "x")
     with pytest.raises(InputError, match="baseline"):
         depth_of_values(small, "disparity", 1.0, intrinsics, None, "x")
-
-
-def stereo_folder(folder: Path) -> None:
-    """The slanted plane as a sequence of pairs."""
-    written(folder, depth=False, masks=False, right=True)
-    for i, (left, right, _) in enumerate(slanted_pair(i) for i in range(FRAMES)):
-        write_png(folder / "images" / f"{i:06d}.png", left)
-        write_png(folder / "images_right" / f"{i:06d}.png", right)
-    fx, fy, cx, cy, width, height, _ = LENS
-    camera = CameraEntry(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=BASELINE)
-    from endotsr.clips.sequences.sequence_file import SequenceFile, write_sequence_file
-
-    write_sequence_file(SequenceFile(format="endotsr-sequence-1", frames=FRAMES, camera=camera), folder)
 
 
 def test_the_command_makes_a_sequence_that_can_be_trained_on(tmp_path, capsys):
