@@ -25,6 +25,18 @@ def test_every_line_is_counted_in_its_room():
     assert lines["method.losses"] == sum(len(file.read_text(encoding="utf-8").splitlines()) for file in losses)
 
 
+@pytest.mark.parametrize("room", ["clips/opencv", "clips/sequences", "clips/sequences/checks"])
+def test_the_index_of_a_room_names_its_modules(room):
+    """The indented lines of the docstring: names, then two spaces or the end of the line, then what they hold."""
+    folder = house.ROOT / "reference" / "endotsr" / room
+    text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text(encoding="utf-8"))) or ""
+    lines = [line[4:] for line in text.splitlines() if line.startswith("    ") and line[4:5].strip()]
+    named = [name for line in lines for name in line.split("  ")[0].rstrip(",").split(", ")]
+    inside = {path.stem for path in folder.glob("[!_]*.py")}
+    inside |= {path.parent.name for path in folder.glob("*/__init__.py")}
+    assert sorted(named) == sorted(inside)
+
+
 def test_imports_run_down_only():
     """Between rooms; import-linter checks the storeys (`lint-imports`, in `pyproject.toml`)."""
     assert house.upward() == []

@@ -14,7 +14,7 @@ from endotsr.clips.formats.camera import Intrinsics, intrinsics_of_matrix, openc
 from endotsr.clips.formats.files import shortened, visible_files
 from endotsr.clips.opencv.filters import area_resize
 from endotsr.clips.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
-from endotsr.clips.sequences.checks.lens import lens_warnings
+from endotsr.clips.prepare.lens import lens_warnings
 from endotsr.clips.sequences.clip import Clip, Picture, PicturePair
 from endotsr.clips.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.errors import InputError

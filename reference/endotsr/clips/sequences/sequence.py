@@ -101,6 +101,10 @@ class Sequence:
         known = depth[depth > 0]
         return float(np.median(known)) if known.size else None
 
+    def picture(self, index: int) -> NDArray[np.uint8]:
+        """The picture of frame `index` as readers have it, (H, W, 3) RGB."""
+        return np.ascontiguousarray(self.images[index].transpose(1, 2, 0))
+
     def frame(self, index: int, dtype: DTypeLike = np.float32) -> Frame:
         """Frame `index` with image and depth in `dtype`; image = 8-bit value / 255.
 

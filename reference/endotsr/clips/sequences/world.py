@@ -40,7 +40,7 @@ def fitting_world(centres: FloatArray, depth: NDArray[np.float32], arbitrary: bo
 
     Edges:  no depth at all -> unchanged.
     """
-    usual = usual_depth(depth)
+    usual = sampled_median(depth)
     if usual is None:
         return World(np.zeros(3), 1.0)
     middle = (centres.min(axis=0) + centres.max(axis=0)) / 2
@@ -48,7 +48,7 @@ def fitting_world(centres: FloatArray, depth: NDArray[np.float32], arbitrary: bo
     return World(middle if far else np.zeros(3), USUAL_DEPTH / usual if arbitrary else 1.0)
 
 
-def usual_depth(depth: NDArray[np.float32]) -> float | None:
+def sampled_median(depth: NDArray[np.float32]) -> float | None:
     """The median depth among 100,000 to 200,000 pixels over all frames; None without depth.
 
     Smaller sequences, and those with depth at none of these pixels, count whole.

@@ -6,11 +6,11 @@ import pytest
 
 from data_folder import data_folder
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.prepare.lens import lens_warnings
 from endotsr.clips.sequences.checks.copies import steps_between
 from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
-from endotsr.clips.sequences.checks.lens import lens_warnings
 from endotsr.clips.sequences.checks.masks import mask_findings
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
 from endotsr.clips.sequences.checks.scenes import halves_finding

@@ -9,11 +9,11 @@ from strange_inputs import given, keys, matched, textured
 from endotsr.cli.main import main
 from endotsr.clips.formats.camera import Intrinsics
 from endotsr.clips.opencv.png import read_png, write_png
+from endotsr.clips.prepare.lens import folded_fraction
 from endotsr.clips.prepare.stated_depth import bytes_exchanged
 from endotsr.clips.sequences.checks.cameras import intrinsics_findings
 from endotsr.clips.sequences.checks.depth import depth_facts, depth_findings
 from endotsr.clips.sequences.checks.frames import rate_findings
-from endotsr.clips.sequences.checks.lens import folded_fraction
 
 
 @pytest.mark.parametrize(

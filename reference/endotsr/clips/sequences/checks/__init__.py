@@ -1,1 +1,22 @@
-"""Checks of a sequence before training: all faults in one pass, each finding with its remedy."""
+"""Checks of a sequence before training: all faults in one pass, each finding with its remedy.
+
+    kinds                       every kind of finding, with level, reason and remedy
+    check, frame_pass           `endotsr check`: what follows from all frames, and the pass that reads them
+    guard                       the checks on frames that a training holds in memory
+    written                     the checks on frames that `endotsr prepare` writes
+
+    frames                      pictures of a clip, one after another; it calls the next five
+    clock_names, copies, exchanged, colours, scenes
+                                names of pictures, repeated and exchanged frames, other light, other scenes and views
+    still_parts, dark_border    what stands still in pictures that move, and dark borders
+    masks, polarity, specks     masks against their neighbours, against the pictures, and masks of noise
+    depth, depth_rims           values of the depth, and depth interpolated across holes
+    depth_steps, flips          depth against the motion and the light of the pictures
+    depth_pair, stereo          depth against stereo pairs, and the two views of a pair
+    late                        masks and depth of other moments than their pictures
+    cameras, agreement          poses and calibration, and whether the poses explain the pictures
+    split_tissue                tissue on both sides of the split
+
+A check that needs frames one after another is a class with `add` and `findings`: `frame_pass` keeps one, and `guard`
+and `written` fill another from the frames that they have.
+"""

@@ -6,11 +6,11 @@ In: what is found of the field of view while the frames of a clip pass by. Out: 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.field_of_view import WORKING, FieldOfView
 from endotsr.clips.sequences.sampling import even_frames
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray
 
 LEAST = 0.02  # of the pixels
@@ -30,11 +30,11 @@ def border_findings(view: FieldOfView, where: str) -> list[Finding]:
     return [finding("dark-border", where, what + crop_without(border))]
 
 
-def loaded_border_findings(images: NDArray[np.uint8], masks: BoolArray, where: str) -> list[Finding]:
-    """`border_findings` of images (n, 3, H, W) and masks (n, H, W), True = tissue, of which a sample is looked at."""
+def loaded_border_findings(sequence: Sequence, where: str) -> list[Finding]:
+    """`border_findings` of a sequence in memory, of which a sample is looked at."""
     view = FieldOfView()
-    for i in even_frames(len(images), SAMPLED):
-        view.add(np.ascontiguousarray(images[i].transpose(1, 2, 0)), masks[i])
+    for i in even_frames(sequence.count, SAMPLED):
+        view.add(sequence.picture(i), sequence.masks[i])
     return border_findings(view, where)
 
 

@@ -62,7 +62,7 @@ def loaded_steps(sequence: Sequence) -> list[DepthStep]:
     """The steps of a sequence in memory."""
     steps = DepthSteps(sequence.count)
     for i in range(sequence.count):
-        steps.add(i, sequence.images[i].transpose(1, 2, 0), sequence.depth[i], sequence.masks[i])
+        steps.add(i, sequence.picture(i), sequence.depth[i], sequence.masks[i])
     return steps.found
 
 

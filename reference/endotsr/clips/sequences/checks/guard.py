@@ -42,8 +42,8 @@ def guarded(
     images, folder = [clip.images[i] for i in frames], str(clip.where)
     found = gap_findings(images) + time_findings(None if clip.times is None else clip.times[list(frames)], folder)
     found += frame_findings([picture for picture, _ in facts], str(images[0].parent))
-    found += loaded_border_findings(sequence.images, sequence.masks, str(images[0].parent))
-    found += loaded_still_findings(sequence.images, sequence.masks, str(images[0].parent))
+    found += loaded_border_findings(sequence, str(images[0].parent))
+    found += loaded_still_findings(sequence, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
         found += loaded_late_findings(sequence, str(clip.masks.files[0].parent), str(clip.depth.files[0].parent))

@@ -66,8 +66,8 @@ class LateParts:
 def loaded_late_findings(sequence: Sequence, masks: str, depth: str) -> list[Finding]:
     """`LateParts.findings` of a sequence in memory."""
     parts = LateParts()
-    for image, tissue, prior in zip(sequence.images, sequence.masks, sequence.depth):
-        parts.add(image.transpose(1, 2, 0), tissue, prior)
+    for i in range(sequence.count):
+        parts.add(sequence.picture(i), sequence.masks[i], sequence.depth[i])
     return parts.findings(masks, depth)
 
 

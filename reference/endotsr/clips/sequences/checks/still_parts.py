@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.field_of_view import FieldOfView
 from endotsr.clips.sequences.sampling import even_frames, reduced_to
+from endotsr.clips.sequences.sequence import Sequence
 from endotsr.clips.sequences.smaller import resized_nearest
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
@@ -140,11 +141,11 @@ def _border(slope: FloatArray, seen: BoolArray, axis: int) -> tuple[float, int]:
     return best
 
 
-def loaded_still_findings(images: NDArray[np.uint8], masks: BoolArray, where: str) -> list[Finding]:
-    """The findings on images (n, 3, H, W) and masks (n, H, W), True = tissue."""
-    parts = StillParts(len(images))
-    for i in even_frames(len(images), SAMPLED):
-        parts.add(i, np.ascontiguousarray(images[i].transpose(1, 2, 0)), masks[i])
+def loaded_still_findings(sequence: Sequence, where: str) -> list[Finding]:
+    """`StillParts.findings` of a sequence in memory."""
+    parts = StillParts(sequence.count)
+    for i in even_frames(sequence.count, SAMPLED):
+        parts.add(i, sequence.picture(i), sequence.masks[i])
     return parts.findings(where)
 
 

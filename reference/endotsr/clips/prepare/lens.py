@@ -1,8 +1,7 @@
-"""Whether a lens model is one-to-one over the picture.
+"""Warnings on a lens model: whether it is one-to-one over the picture, and whether its coefficients are in order.
 
-In: camera matrix and distortion coefficients of OpenCV. Out: the fraction of the picture beyond the radius at which the
-model turns back. Straightened pictures show parts of the source twice there: the coefficients are wrong, in another
-order, or of another lens.
+In: camera matrix and distortion coefficients of OpenCV. Out: warnings. Beyond the radius at which the model turns back,
+straightened pictures show parts of the source twice: the coefficients are wrong, in another order, or of another lens.
 """
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from endotsr.method.kernels.arrays import FloatArray
 
 STEPS = 1000  # radii between the axis and the farthest corner
+TANGENTIAL = 0.03  # a guess: the one real calibration at hand has 0
 
 
 def folded_fraction(matrix: FloatArray, distortion: FloatArray, width: int, height: int) -> float:
@@ -30,9 +30,6 @@ def folded_fraction(matrix: FloatArray, distortion: FloatArray, width: int, heig
         seen = r * above / below
     turned = np.flatnonzero(~(np.diff(seen) > 0))
     return float((radius > r[turned[0]]).mean()) if turned.size else 0.0
-
-
-TANGENTIAL = 0.03  # a guess: the one real calibration at hand has 0
 
 
 def _tangential_warnings(distortion: FloatArray) -> list[str]:
