@@ -100,3 +100,8 @@ def path_error_up_to_scale(poses, true):
     flip = np.diag([1, 1, np.sign(np.linalg.det(u @ v))])
     factor = np.trace(flip @ np.diag(s)) / np.square(a).sum()
     return float(np.sqrt(np.square(factor * a @ (u @ flip @ v).T - b).sum(1).mean())), float(factor)
+
+
+def without_pose(poses):
+    """Frames without a pose."""
+    return [k for k, pose in enumerate(poses) if pose is None]

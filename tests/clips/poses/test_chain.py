@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from moving_clip import centres, moving_views, path_error
+from moving_clip import centres, moving_views, path_error, without_pose
 
 from endotsr.clips.poses.chain import LONGEST_GAP, chained
 from endotsr.clips.poses.estimate import estimated
@@ -23,7 +23,7 @@ def with_mask(frames):
 
 def test_the_path_is_found():
     found = estimated(VIEWS)
-    assert found.without == [] and found.moves.answer == "moving"
+    assert without_pose(found.poses) == [] and found.moves.answer == "moving"
     assert path_error(found.poses, TRUE) < 0.15
     assert found.left < 0.25 * found.still and found.agreeing > 0.9
     length = np.linalg.norm(np.diff(centres(TRUE), axis=0), axis=1).sum()
@@ -32,14 +32,14 @@ def test_the_path_is_found():
 
 def test_masked_frames_are_bridged_and_the_track_is_picked_up():
     found = estimated(with_mask([5, 6, 7]))
-    assert found.without == [5, 6, 7]
-    kept = [k for k in range(VIEWS.count) if k not in found.without]
+    assert without_pose(found.poses) == [5, 6, 7]
+    kept = [k for k in range(VIEWS.count) if k not in without_pose(found.poses)]
     assert path_error([found.poses[k] for k in kept], [TRUE[k] for k in kept]) < 0.2
 
 
 def test_the_first_frames_may_be_masked():
     found = chained(matcher_of(with_mask([0, 1])))
-    assert found.without == [0, 1] and found.last == VIEWS.count - 1
+    assert without_pose(found.poses) == [0, 1] and found.last == VIEWS.count - 1
 
 
 def test_a_gap_that_is_too_long_is_refused_with_its_frames():
@@ -53,7 +53,7 @@ def test_a_gap_that_is_too_long_is_refused_with_its_frames():
 def test_noise_after_a_cut_has_no_pose():
     images = VIEWS.images.copy()
     images[7:] = np.random.default_rng(0).integers(0, 255, images[7:].shape, dtype=np.uint8)
-    assert chained(matcher_of(VIEWS._replace(images=images))).without == list(range(7, VIEWS.count))
+    assert without_pose(chained(matcher_of(VIEWS._replace(images=images))).poses) == list(range(7, VIEWS.count))
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])
@@ -62,7 +62,7 @@ def test_another_scene_after_a_cut_is_not_registered_to_the_first(seed):
     other = moving_views(seed=seed)[0]
     planes = [np.concatenate([one, two[:4]]) for one, two in zip(VIEWS[:3], other[:3], strict=True)]
     matcher = matcher_of(Views(*planes, VIEWS.camera))
-    assert chained(matcher).without == [14, 15, 16, 17]
+    assert without_pose(chained(matcher).poses) == [14, 15, 16, 17]
     assert matcher.by_flow(13, 14).count > 60 and not matcher.by_flow(13, 14).related
     assert matcher.by_flow(12, 13).support > 0.7 and matcher.by_flow(0, 7).related
     assert all({pair.source, pair.target} <= set(range(14)) for pair in pairs_that_move(matcher) if pair.source < 14)
@@ -83,7 +83,7 @@ def test_depth_that_is_not_finite_is_no_depth():
     depth = VIEWS.depth.copy()
     depth[:, ::2] = np.nan
     depth[:, 1, :] = -5
-    assert chained(matcher_of(VIEWS._replace(depth=depth))).without == []
+    assert without_pose(chained(matcher_of(VIEWS._replace(depth=depth))).poses) == []
     with pytest.raises(InputError, match="no frame has depth"):
         estimated(VIEWS._replace(depth=np.full_like(depth, np.nan)))
 

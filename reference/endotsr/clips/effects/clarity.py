@@ -11,7 +11,7 @@ has no sharp frame for comparison. A frame without tissue shows neither, and no 
 import numpy as np
 
 from endotsr.clips.effects.frames import ReducedFrames, without_gaps
-from endotsr.clips.effects.noise import Noise
+from endotsr.clips.effects.noise import NORMAL_MAD, Noise
 from endotsr.clips.effects.verdict import Curve, EffectVerdict
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
@@ -20,6 +20,8 @@ BLUR = np.log(2.0)  # fall of the log sharpness below the local median
 SMOKE_FALL = np.log(1.5)
 SMOKE_RISE = 0.05  # of the dark channel, display units
 SCATTER = 4.0  # for blur, a fall must also exceed this many deviations (MAD) of the frames
+SQUARES, CHANNELS = 20.0, 3.0  # of the weights 4 -1 -1 -1 -1 of the Laplacian; averaged to grey
+MEASURABLE = 0.1  # least energy, of that of the noise
 NEIGHBOURS = 4  # frames on either side: slow changes, such as of the view, are not blur
 
 
@@ -35,7 +37,7 @@ def clarity_verdicts(sequence: Sequence, clip: ReducedFrames, noise: Noise) -> t
     fall = _local_median(sharpness) - sharpness
     slow_fall = np.percentile(sharpness[seen], 75) - sharpness
     rise = dark - np.percentile(dark[seen], 25)
-    spread = SCATTER * float(np.median(np.abs(fall - np.median(fall)))) / 0.6745
+    spread = SCATTER * float(np.median(np.abs(fall - np.median(fall)))) / NORMAL_MAD
     score = np.where(seen, np.minimum(rise / SMOKE_RISE, slow_fall / SMOKE_FALL), 0.0)
     smoke = _verdict("smoke", score, 1.0, "times the threshold", "rise of the dark channel with a fall of sharpness",
                      clip, {"dark channel": dark})  # fmt: skip
@@ -60,12 +62,12 @@ def _measures(image: np.ndarray, mask: np.ndarray, sigma: float) -> tuple[float,
         return np.nan, np.nan
     grey = image.mean(axis=0, dtype=np.float32) / np.float32(255)
     curved = 4 * grey[1:-1, 1:-1] - grey[:-2, 1:-1] - grey[2:, 1:-1] - grey[1:-1, :-2] - grey[1:-1, 2:]
-    energy = float((curved[inner] ** 2).mean()) - 20.0 * sigma**2 / 3.0
+    energy = float((curved[inner] ** 2).mean()) - SQUARES * sigma**2 / CHANNELS
     bright = float(grey[1:-1, 1:-1][inner].mean())
-    least = 0.1 * 20.0 * sigma**2 / 3.0 + 1e-8  # energy below a tenth of the noise energy is not measurable
-    return float(np.log(max(energy, least) / max(bright, 1e-3) ** 2)), float(
-        np.percentile(image.min(axis=0)[mask], 10)
-    ) / 255
+    least = MEASURABLE * SQUARES * sigma**2 / CHANNELS + 1e-8
+    sharpness = float(np.log(max(energy, least) / max(bright, 1e-3) ** 2))
+    dark = float(np.percentile(image.min(axis=0)[mask], 10)) / 255
+    return sharpness, dark
 
 
 def _local_median(course: FloatArray) -> FloatArray:
@@ -85,10 +87,8 @@ def _verdict(
 ) -> EffectVerdict:
     bad = np.flatnonzero(score >= threshold)
     statistic = float(score.max()) if score.size else 0.0
-    word = {"smoke": "smoke", "blur": "blur"}[effect]
-    reason = (
-        f"{len(bad)} of {clip.count} training frames show {word}." if bad.size else f"No training frame shows {word}."
-    )
-    kind, curve = word if bad.size else "none", Curve(", ".join(lines), "time", clip.times, lines)
+    reason = f"{len(bad)} of {clip.count} training frames show {effect}."
+    reason = reason if bad.size else f"No training frame shows {effect}."
+    kind, curve = effect if bad.size else "none", Curve(", ".join(lines), "time", clip.times, lines)
     details = {"frames": bad.tolist()}
     return EffectVerdict(effect, bool(bad.size), kind, statistic, threshold, unit, test, 0.01, reason, details, curve)

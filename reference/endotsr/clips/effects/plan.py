@@ -221,7 +221,7 @@ def apply_plan(plan: Plan, config: Config) -> tuple[Config, list[str]]:
     """The configuration with the changes of the plan, and one line for each."""
     lines = []
     for change in plan.changes:
-        value, before = _word(change.value), _word(change.before)
+        value, before = shown_value(change.value), shown_value(change.before)
         if change.given:
             lines.append(f"{change.key} = {before} is kept as given; the plan has {value}: {change.reason}")
             continue
@@ -230,7 +230,8 @@ def apply_plan(plan: Plan, config: Config) -> tuple[Config, list[str]]:
     return config, lines
 
 
-def _word(value: Any) -> str:
+def shown_value(value: Any) -> str:
+    """The value of a setting, as TOML has it."""
     return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 

@@ -40,11 +40,6 @@ class Chain(NamedTuple):
     key: int  # keyframe
     last: int  # last frame with a pose
 
-    @property
-    def without(self) -> list[int]:
-        """Frames without a pose."""
-        return [k for k, pose in enumerate(self.poses) if pose is None]
-
 
 def chained(
     matcher: Matcher, on_frame: Callable[[Chain], object] = lambda chain: None, begun: Chain | None = None

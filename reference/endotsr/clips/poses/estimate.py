@@ -41,11 +41,6 @@ class PathEstimate(NamedTuple):
     own: float  # median motion of the tissue beside the rigid one, between frames at most `APART` apart
 
     @property
-    def without(self) -> list[int]:
-        """Frames without a pose."""
-        return [k for k, pose in enumerate(self.poses) if pose is None]
-
-    @property
     def agreeing(self) -> float:
         """Mean fraction of the matches that agree, over the frames."""
         found = [link.agreeing for link in self.links if link is not None]

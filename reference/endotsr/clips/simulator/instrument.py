@@ -75,8 +75,7 @@ def wrist_at(settings: SimulatorSettings, grasper: Grasper, t: float) -> FloatAr
 
 def _aspect(settings: SimulatorSettings) -> FloatArray:
     """The scaling from a picture with height / width = 0.8 to this one."""
-    scale = np.array([1.0, settings.height / settings.width])
-    return np.array([1.0, scale[1] / 0.8])
+    return np.array([1.0, settings.height / settings.width / 0.8])
 
 
 def _blurred(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
@@ -180,7 +179,8 @@ def _segment(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -
 def _sheen(side: FloatArray) -> FloatArray:
     """Brightness across a round, polished bar, side in [-1, 1]."""
     profile = np.sqrt(np.clip(1 - side**2, 0.0, 1.0))
-    return 0.25 + 0.6 * profile + 1.2 * np.exp(-(((side - 0.25) / 0.16) ** 2))
+    line = np.exp(-(((side - 0.25) / 0.16) ** 2))  # the mirror image of the lamp, to one side of the middle
+    return 0.25 + 0.6 * profile + 1.2 * line
 
 
 def _turned(vector: FloatArray, angle: float) -> FloatArray:

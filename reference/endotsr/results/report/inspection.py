@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.clips.effects.inspect import Inspection
-from endotsr.clips.effects.plan import Plan
+from endotsr.clips.effects.plan import Plan, shown_value
 from endotsr.clips.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.results.report import curves, figures, parts, tables
 from endotsr.results.report.style import Theme
@@ -37,7 +37,7 @@ def inspection_text(inspection: Inspection, plan: Plan) -> str:
     lines = [head, found, *(f"rate: {rate}" for rate in rates)]
     lines.append("plan:" if plan.changes else "plan: nothing to switch off")
     lines += [
-        f"  {c.key} = {_value(c.value)} (now {_value(c.before)}){_saving(c.time, c.memory)}: {c.reason}"
+        f"  {c.key} = {shown_value(c.value)} (now {shown_value(c.before)}){_saving(c.time, c.memory)}: {c.reason}"
         for c in plan.changes
     ]
     lines += [f"  {key} is kept: {reason}" for key, reason in plan.kept]
@@ -57,10 +57,6 @@ def _rate(inspection: Inspection, cycles: float, harmonics: int) -> str:
     per_minute = inspection.per_minute(cycles)
     minute = f", {per_minute:.0f} per minute" if per_minute is not None else ""
     return f"{cycles:.3g} cycles per sequence{minute}, {counted(harmonics, 'harmonic')}"
-
-
-def _value(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
 def _headline(title: str, inspection: Inspection, plan: Plan) -> str:
@@ -111,7 +107,7 @@ def _false_positives(verdict: EffectVerdict) -> str:
 
 def _plan(plan: Plan) -> str:
     rows = [
-        [f"<code>{parts.text(c.key)}</code>", _value(c.before), f"<b>{_value(c.value)}</b>", f"{c.time:.0%}",
+        [f"<code>{parts.text(c.key)}</code>", shown_value(c.before), f"<b>{shown_value(c.value)}</b>", f"{c.time:.0%}",
          f"{c.memory:.0%}", parts.text(f"Set explicitly, kept. {c.reason}" if c.given else c.reason)]
         for c in plan.changes
     ]  # fmt: skip

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from endotsr.studies.bench.clock import SPLAT, StageClock, spread
 from endotsr.studies.bench.records import CaseTimes, Densification, ViewCounts
 from endotsr.training.scene import workload
 from endotsr.training.scene.gaussians import Gaussians, arrays
+
+if TYPE_CHECKING:
+    from endotsr.training.fitting.state import TrainingConstants, TrainingState
 
 Precision = Literal["float32", "float64"]
 
@@ -84,7 +87,7 @@ def measure(case: BenchCase) -> CaseTimes:
     }
 
 
-def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
+def prepare(case: BenchCase, config: Config) -> tuple["TrainingState", "TrainingConstants"]:
     """State and constants of a case at the timed iteration, with the pyramid supports of every frame."""
     from endotsr.training.fitting.state import bench_state, training_constants
 
@@ -126,7 +129,9 @@ def trained_gaussians(path: Path, config: Config) -> Gaussians:
     return scene._replace(**workload.temporal(np.random.default_rng(SEED), opacity.size, config, sigma))
 
 
-def time_iterations(state: Any, constants: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
+def time_iterations(
+    state: "TrainingState", constants: "TrainingConstants", repeats: int
+) -> tuple[float, list[dict[str, float]]]:
     """Repeat the same iteration of the schedule, after warm-up.
 
     returns  seconds of the first iteration, with compilation or loading of compiled code; and for each repeat the
@@ -152,7 +157,7 @@ def representative(config: Config) -> int:
     return start + config.density.interval // 2
 
 
-def _view(state: Any, constants: Any) -> ViewCounts:
+def _view(state: "TrainingState", constants: "TrainingConstants") -> ViewCounts:
     """Visible Gaussians, entries of the tile lists and blended pairs of the first training view."""
     from endotsr.method.splatting.render import render_forward
     from endotsr.studies.bench.pairs import count_pairs
@@ -166,7 +171,7 @@ def _view(state: Any, constants: Any) -> ViewCounts:
     return {"visible": int(saved.order.size), "listed": listed, "blended": count_pairs(saved).blended}
 
 
-def _densification(state: Any, constants: Any, repeats: int) -> Densification | None:
+def _densification(state: "TrainingState", constants: "TrainingConstants", repeats: int) -> Densification | None:
     """Time of the densification within an iteration. It changes the scene, hence few repeats."""
     from endotsr.training.fitting.trainer import training_step
 

@@ -12,13 +12,16 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from endotsr.config import PAPER, Config, with_settings
 from endotsr.method.kernels.machine import usable_cores
 from endotsr.method.kernels.target import compiled_for
+
+if TYPE_CHECKING:
+    from endotsr.training.fitting.state import TrainingConstants, TrainingState
 
 READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # referenced until this process ends, which does not wait for them
@@ -80,7 +83,7 @@ def rehearse(config: Config) -> None:
     rehearse_densification(constants, state)
 
 
-def _small(config: Config) -> tuple[Any, Any]:
+def _small(config: Config) -> tuple["TrainingConstants", "TrainingState"]:
     """Constants and state of a few Gaussians and pixels, with the dtypes and layouts of any training."""
     from endotsr.training.fitting.state import bench_state, training_constants
     from endotsr.training.scene import workload
@@ -91,7 +94,7 @@ def _small(config: Config) -> tuple[Any, Any]:
     return constants, bench_state(workload.gaussians(64, config), config, 0)
 
 
-def rehearse_picture(constants: Any, state: Any) -> None:
+def rehearse_picture(constants: "TrainingConstants", state: "TrainingState") -> None:
     """Deformation, splatting and its reverse pass, density statistics."""
     from endotsr.method.splatting.render import render_forward, render_reverse
     from endotsr.training.fitting.model import raster_settings, scene_at, scene_reverse, without
@@ -106,7 +109,7 @@ def rehearse_picture(constants: Any, state: Any) -> None:
     scene_reverse(grads, saved, coefficients=False)
 
 
-def rehearse_losses(constants: Any, everything: bool) -> None:
+def rehearse_losses(constants: "TrainingConstants", everything: bool) -> None:
     """Targets, losses and optimiser; with `everything` also the terms that the schedule activates later."""
     import numpy as np
 
@@ -129,7 +132,7 @@ def rehearse_losses(constants: Any, everything: bool) -> None:
         moved_priors(constants.sequence.masks[pair], constants.sequence.depth[pair], field, np.zeros(2, np.float32))
 
 
-def rehearse_optimiser(constants: Any, state: Any) -> None:
+def rehearse_optimiser(constants: "TrainingConstants", state: "TrainingState") -> None:
     """Adam, fused with the reverse pass of the deformation."""
     import numpy as np
 
@@ -150,7 +153,7 @@ def rehearse_optimiser(constants: Any, state: Any) -> None:
         deformation_adam_step(d_offsets, fdm, saved, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
 
 
-def rehearse_residuals(constants: Any, state: Any) -> None:
+def rehearse_residuals(constants: "TrainingConstants", state: "TrainingState") -> None:
     """Both Fourier residuals, the penalty, and their reverse passes fused with Adam."""
     import numpy as np
 
@@ -177,7 +180,7 @@ def rehearse_residuals(constants: Any, state: Any) -> None:
         coefficients_adam_step(sums, atoms, shrink, coefficients, state.adam, name, rates, *settings)
 
 
-def rehearse_densification(constants: Any, state: Any) -> None:
+def rehearse_densification(constants: "TrainingConstants", state: "TrainingState") -> None:
     """The gather of every array and of its moments."""
     from endotsr.training.fitting.adam import regather
     from endotsr.training.scene.density_control import densify

@@ -22,6 +22,7 @@ from endotsr.untrusted.toml import by_key
 
 if TYPE_CHECKING:
     from endotsr.training.fitting.checkpoint import Checkpoint
+    from endotsr.training.fitting.state import TrainingState
     from endotsr.training.scene.gaussians import Gaussians
     from endotsr.training.scene.parameters import FrameParameters
 
@@ -55,7 +56,7 @@ def load_model(folder: RunFolder) -> Model:
     return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration, checkpoint.frames)
 
 
-def save_training(folder: RunFolder, state: Any, config: Config) -> None:
+def save_training(folder: RunFolder, state: "TrainingState", config: Config) -> None:
     """Replace the last checkpoint by a training state, with the fingerprint of the sequence in run.json."""
     from endotsr.training.fitting.state import save_state
 
