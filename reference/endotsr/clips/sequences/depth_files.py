@@ -77,7 +77,7 @@ def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32
         depth = raw.astype(np.float64) * scale
     depth[~np.isfinite(depth) | (depth <= 0)] = 0.0
     if depth.size and depth.max() > np.finfo(np.float32).max:
-        raise InputError(f"{where}: depth {depth.max():g} is too large")
+        raise InputError(f"{where}: depth {depth.max():g} is too large; allowed: lengths below 3.4e38, and 0")
     return depth.astype(np.float32)
 
 

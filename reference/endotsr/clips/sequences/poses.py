@@ -43,12 +43,17 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     if rows.ndim != 2 or rows.shape[1] != 17:
         raise InputError(f"{path}: shape {rows.shape}, expected (frames, 17)")
     if len(rows) != count:
-        raise InputError(f"{path}: {counted(len(rows), 'pose')} for {counted(count, 'image')}")
+        raise InputError(
+            f"{path}: {counted(len(rows), 'pose')} for {counted(count, 'image')}; allowed: one row per image"
+        )
     rows = rows.astype(np.float64)
     broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if broken.size:
         column = int(np.flatnonzero(~np.isfinite(rows[broken[0]]))[0])
-        raise InputError(f"{path}: frame {broken[0]}: value {column} of the row is {rows[broken[0], column]}")
+        raise InputError(
+            f"{path}: frame {broken[0]}: value {column} of the row is {rows[broken[0], column]};"
+            " allowed: finite numbers"
+        )
     return rows
 
 

@@ -150,7 +150,9 @@ def _check_split(found: SequenceRecord, where: str) -> None:
     if not found.train_index:
         raise InputError(f"{where}: train_index: holds no frame; allowed: at least one")
     if both := set(found.train_index) & set(found.test_index):
-        raise InputError(f"{where}: test_index: frame {min(both)} is a training frame as well")
+        raise InputError(
+            f"{where}: test_index: frame {min(both)} is a training frame as well; allowed: a frame in one of both lists"
+        )
 
 
 def _check_cameras(found: SequenceRecord, where: str) -> None:
@@ -163,7 +165,12 @@ def _check_cameras(found: SequenceRecord, where: str) -> None:
         for i, row in enumerate(camera.rotation):
             for j, other in enumerate(camera.rotation):
                 if abs(sum(a * b for a, b in zip(row, other)) - (i == j)) > ROTATION_TOLERANCE:
-                    raise InputError(f"{where}: cameras: {k}: rotation: its rows are not perpendicular unit vectors")
+                    raise InputError(
+                        f"{where}: cameras: {k}: rotation: its rows are not perpendicular unit vectors;"
+                        " allowed: those of a rotation matrix"
+                    )
         (a, b, c), (d, e, f), (g, h, i) = camera.rotation
         if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0:
-            raise InputError(f"{where}: cameras: {k}: rotation: its rows are a mirror image, not a rotation")
+            raise InputError(
+                f"{where}: cameras: {k}: rotation: its rows are a mirror image; allowed: those of a rotation matrix"
+            )

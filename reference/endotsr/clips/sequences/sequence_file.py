@@ -245,7 +245,9 @@ def read_poses(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None]
         return None, {}
     rows = found.poses.matrices
     if len(rows) != found.frames:
-        raise InputError(f"{path}: poses.matrices: {len(rows)} rows for {counted(found.frames, 'frame')}")
+        raise InputError(
+            f"{path}: poses.matrices: {len(rows)} rows for {counted(found.frames, 'frame')}; allowed: one row per frame"
+        )
     poses: list[CameraPose | None] = []
     faults = {}
     for i, row in enumerate(rows):

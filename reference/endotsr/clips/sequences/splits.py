@@ -123,7 +123,10 @@ def parse_frame_range(text: str, count: int, least: int = LEAST_FRAMES) -> range
         raise InputError(f"frames {text!r}: the step must be 1 or more")
     for bound in (start, stop):
         if bound is not None and not -count <= bound <= count:
-            raise InputError(f"frames {text!r}: {bound} is outside the {counted(count, 'frame')} of the sequence")
+            raise InputError(
+                f"frames {text!r}: {bound} is outside the {counted(count, 'frame')} of the sequence;"
+                f" allowed: {-count} to {count}"
+            )
     chosen = range(count)[slice(start, stop, step)]
     if len(chosen) < least:
         raise InputError(f"frames {text!r}: selects {len(chosen)} of {count} frames; at least {least} are needed")

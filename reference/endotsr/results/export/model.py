@@ -32,6 +32,7 @@ HEADER = "header"
 LARGEST_FILE = 1 << 33  # bytes, sum over all arrays
 KEPT_WHOLE = ("gaussians.position",)  # stored as float32
 HALF = np.finfo(np.float16)
+WHOLE = "allowed: a file as `endotsr export RUN --out FILE.npz` writes it"
 
 
 class SlimModel(NamedTuple):
@@ -90,7 +91,7 @@ def load_slim_model(path: Path) -> SlimModel:
         )
     for key in ("iteration", "config", "sequence", "frame_times"):
         if key not in header:
-            raise InputError(f"{path}: header: {key} is missing")
+            raise InputError(f"{path}: header: {key} is missing; {WHOLE}")
     record = checked_record(header["sequence"], f"{path}: header", "sequence.")
     config = config_from_dict(header["config"], str(path))
     gaussians = _gaussians(entries, path)
@@ -109,13 +110,16 @@ def _gaussians(entries: dict[str, NDArray], path: Path) -> Gaussians:
     needed = Gaussians._fields[: len(Gaussians._fields) - len(Gaussians._field_defaults)]
     for name in needed:
         if found[name] is None:
-            raise InputError(f"{path}: gaussians.{name} is missing")
+            raise InputError(f"{path}: gaussians.{name} is missing; {WHOLE}")
     count = found["position"].shape[-1]
     rows = {"position": (3,), "quaternion": (4,), "log_scale": (3,), "opacity_logit": ()}
     for name, array in found.items():
         shape = array if array is None else array.shape
         if shape is not None and (shape[-1:] != (count,) or shape[:-1] != rows.get(name, shape[:-1])):
-            raise InputError(f"{path}: gaussians.{name} has the shape {shape}; {count} Gaussians expected")
+            raise InputError(
+                f"{path}: gaussians.{name} has the shape {shape};"
+                f" allowed: {count} Gaussians on the last axis, as in position"
+            )
     _refuse_odd_shapes(found, path)
     return Gaussians(**found)
 
@@ -126,13 +130,20 @@ def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
     shapes = {None if array is None else array.shape for array in fdm}
     shape = next(iter(shapes))
     if len(shapes) > 1 or (shape is not None and (len(shape) != 3 or shape[0] != DEFORMATION_CHANNELS)):
-        raise InputError(f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width have inconsistent shapes")
+        shown = ", ".join("none" if array is None else str(array.shape) for array in fdm)
+        raise InputError(
+            f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width have the shapes {shown}; allowed: one shape,"
+            f" ({DEFORMATION_CHANNELS}, bases, Gaussians)"
+        )
     if found["harmonics"].shape[:-1] not in [(k, 3) for k in (1, 4, 9, 16)]:
-        raise InputError(f"{path}: gaussians.harmonics has the shape {found['harmonics'].shape}")
+        shown = found["harmonics"].shape
+        raise InputError(f"{path}: gaussians.harmonics has the shape {shown}; allowed: (1, 4, 9 or 16, 3, Gaussians)")
     for name in ("appearance_coefficients", "motion_coefficients"):
         array = found[name]
         if array is not None and (array.ndim != 3 or array.shape[0] != 3 or array.shape[1] % 2):
-            raise InputError(f"{path}: gaussians.{name} has the shape {array.shape}")
+            raise InputError(
+                f"{path}: gaussians.{name} has the shape {array.shape}; allowed: (3, 2 x frequencies, Gaussians)"
+            )
 
 
 def _refuse_other_settings(found: Gaussians, model: ModelConfig, path: Path) -> None:
@@ -182,5 +193,5 @@ def _entry(entries: dict[str, NDArray], name: str, path: Path) -> Any:
     if array.dtype not in (np.float16, np.float32):
         raise InputError(f"{path}: {name} has type {array.dtype}; allowed: float16, float32")
     if not np.isfinite(array).all():
-        raise InputError(f"{path}: {name} has numbers that are not finite")
+        raise InputError(f"{path}: {name} has numbers that are not finite; allowed: finite ones")
     return np.ascontiguousarray(array, np.float32)

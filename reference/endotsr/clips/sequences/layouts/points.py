@@ -43,10 +43,13 @@ def read_cameras(path: Path, frames: list[Path]) -> dict[str, np.ndarray]:
         if found[key].shape != shape:
             raise InputError(f"{path}: {key} has shape {found[key].shape}; expected {shape} for {n} pictures")
         if found[key].dtype.kind not in "fiub" or not np.isfinite(found[key]).all():
-            raise InputError(f"{path}: {key} holds values that are not finite numbers")
+            raise InputError(f"{path}: {key} holds values that are not finite numbers; allowed: finite ones")
     numbers = frame_numbers(frames)
     if numbers is None or [number[-1] for number in numbers] != found["frame_ids"].tolist():
-        raise InputError(f"{path}: frame_ids are not the numbers in the names of images/")
+        raise InputError(
+            f"{path}: frame_ids are not the numbers in the names of images/;"
+            " allowed: one for each picture, in their order"
+        )
     return found
 
 
