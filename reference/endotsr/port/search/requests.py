@@ -1,6 +1,7 @@
 """Misread requests: a setting fixed by a port, an input in another order, unit or sign."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import permutations
 from typing import Any, NamedTuple
 
@@ -12,6 +13,13 @@ from endotsr.port.stages.stage import Inputs, Outputs, Settings
 
 MOST_ORDERED = 4  # longest axis with every order tried
 MOST_SWAPPED = 16  # longest axis with the exchange of every pair tried
+# How a port may misread a number or a switch.
+NUMBER_RULES: dict[str, Callable[[Any], Any]] = {
+    "twice": lambda v: 2 * v, "half": lambda v: v / 2, "the square of": lambda v: v * v,
+    "10 times": lambda v: 10 * v, "1/10 of": lambda v: v / 10, "255/256 of": lambda v: v * 255 / 256,
+    "1 more than": lambda v: v + 1, "1 less than": lambda v: v - 1, "minus": lambda v: -v,
+}  # fmt: skip
+SWITCH_RULES: dict[str, Callable[[Any], Any]] = {"the opposite of": lambda v: not v}
 
 
 class OtherReading(NamedTuple):
@@ -58,35 +66,37 @@ def with_value(settings: Settings, path: Sequence[str], value: Any) -> Settings:
 
 def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
     """A setting fixed at a value that it has in some case, at 0 or 1, or changed by a rule; no list is fixed."""
-    name = ".".join(path)
     seen = [value_at(case.settings, path) for case in cases]
     seen += [value_at(case.settings, p) for case in all_cases for p in leaves(case.settings) if p[-1] == path[-1]]
-    numbers = [v for v in seen if isinstance(v, int | float) and not isinstance(v, bool)]
-    fixed = [
-        *seen,
-        *([0, 1] if numbers else []),
-        *([True, False] if any(isinstance(v, bool) for v in seen) else []),
-    ]
-
-    def fixed_at(value: Any) -> OtherReading:
-        return OtherReading(
-            f"{name} fixed at {value!r}", (0, 0), lambda i, s: (i, with_value(s, path, value) if _has(s, path) else s)
-        )
-
-    yield from map(fixed_at, dict.fromkeys(v for v in fixed if v is not None and not isinstance(v, list)))
+    numbers = any(isinstance(v, int | float) and not isinstance(v, bool) for v in seen)
+    switches = any(isinstance(v, bool) for v in seen)
+    fixed = [*seen, *([0, 1] if numbers else []), *([True, False] if switches else [])]
+    yield from (_fixed_at(path, value) for value in dict.fromkeys(v for v in fixed if _can_be_fixed(v)))
     if isinstance(seen[0], float):
-        yield fixed_at(seen[0])._replace(at=fixed_at, rest=seen[0])
-    rules: dict[str, Callable[[Any], Any]] = {}
-    if numbers:
-        rules = {"twice": lambda v: 2 * v, "half": lambda v: v / 2, "the square of": lambda v: v * v,
-                 "10 times": lambda v: 10 * v, "1/10 of": lambda v: v / 10,
-                 "255/256 of": lambda v: v * 255 / 256, "1 more than": lambda v: v + 1,
-                 "1 less than": lambda v: v - 1, "minus": lambda v: -v}  # fmt: skip
-    elif any(isinstance(v, bool) for v in seen):
-        rules = {"the opposite of": lambda v: not v}
-    for rule, change in rules.items():
-        text = f"{rule} {name} in place of {name}"
-        yield OtherReading(text, (0, 1), lambda i, s, c=change: (i, with_value(s, path, c(value_at(s, path)))))
+        yield _fixed_at(path, seen[0])._replace(at=partial(_fixed_at, path), rest=seen[0])
+    name = ".".join(path)
+    for rule, change in (NUMBER_RULES if numbers else SWITCH_RULES if switches else {}).items():
+        yield OtherReading(f"{rule} {name} in place of {name}", (0, 1), partial(_changed, path, change))
+
+
+def _can_be_fixed(value: Any) -> bool:
+    return value is not None and not isinstance(value, list)
+
+
+def _fixed_at(path: tuple[str, ...], value: Any) -> OtherReading:
+    """The setting with this value wherever a request has it."""
+
+    def ask(inputs: Inputs, settings: Settings) -> tuple[Inputs, Settings]:
+        return inputs, with_value(settings, path, value) if _has(settings, path) else settings
+
+    return OtherReading(f"{'.'.join(path)} fixed at {value!r}", (0, 0), ask)
+
+
+def _changed(
+    path: tuple[str, ...], change: Callable[[Any], Any], inputs: Inputs, settings: Settings
+) -> tuple[Inputs, Settings]:
+    """The request with its setting changed by a rule."""
+    return inputs, with_value(settings, path, change(value_at(settings, path)))
 
 
 def _has(settings: Settings, path: Sequence[str]) -> bool:

@@ -134,17 +134,20 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
     own, start = window_length(config, len(train)), None
     begun_cold = (folder / "run.json").exists() and "start" not in open_run(folder).record()
     if window.start == "warm" and not cold and not begun_cold:
-        neighbour, shorter = record.windows[k - 1], warm_settings(own)
-        saved = own.training.iterations - shorter.training.iterations
-        shift = window.first - neighbour.first
-        source = window_folder(run, neighbour)
-        start = CarriedStart(str(source), shift, record.shared(k), saved)
-        ended = last_entry(source / "log.jsonl")
-        own = no_larger(shorter, ended["gaussians"] if ended else None)
+        own, start = _carried(run, record, k, own)
     return Job(
         window.name, Path(record.source).name, record.source, "", "window", own.training.seed, own, SimulatorSettings(),
         str(folder), start, measured=False,
     )  # fmt: skip
+
+
+def _carried(run: Path, record: WindowsRecord, k: int, cold: Config) -> tuple[Config, CarriedStart]:
+    """The settings of warm window k, from those of a cold start, and what it takes from its neighbour."""
+    window, neighbour, shorter = record.windows[k], record.windows[k - 1], warm_settings(cold)
+    source, saved = window_folder(run, neighbour), cold.training.iterations - shorter.training.iterations
+    start = CarriedStart(str(source), window.first - neighbour.first, record.shared(k), saved)
+    ended = last_entry(source / "log.jsonl")
+    return no_larger(shorter, ended["gaussians"] if ended else None), start
 
 
 def warm_settings(cold: Config) -> Config:
