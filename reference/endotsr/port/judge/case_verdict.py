@@ -1,4 +1,4 @@
-"""The verdict on one case: every output against the expected one, whatever a port has written."""
+"""The verdict on one case: its outputs against the expected ones, whatever a port has written."""
 
 import difflib
 import os

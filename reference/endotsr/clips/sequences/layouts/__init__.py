@@ -169,8 +169,8 @@ def describe_for_training(path: Path, config: SequenceConfig) -> Clip:
     found = next((layout for layout in layouts() if path.exists() and layout.recognises(path)), None)
     if found is None and path.is_dir() and not any((path / part).exists() for part in PARTS_OF_ENDONERF):
         raise InputError(
-            f"{path}: no sequence{what_it_is(path)}; allowed: a folder that `endotsr prepare SOURCE --out FOLDER` wrote, or"
-            " one with images/, depth/, masks/ and poses_bounds.npy"
+            f"{path}: no sequence{what_it_is(path)}; allowed: a folder that `endotsr prepare SOURCE --out FOLDER`"
+            " wrote, or one with images/, depth/, masks/ and poses_bounds.npy"
         )
     if found is None or (found.name == "pictures" and (path / "depth").is_dir()):
         found = layout_of(path, "endonerf")  # its messages name the missing parts
