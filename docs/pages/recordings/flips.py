@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.clips.sequences.checks.frame_pass import SAMPLED
 from endotsr.clips.sequences.checks.flips import FLIPS, shading_finding, shading_fit
+from endotsr.clips.sequences.checks.frame_pass import SAMPLED
 from endotsr.clips.sequences.read import read_sequence
 from endotsr.config import PAPER
 from endotsr.results.report.tables import markdown
