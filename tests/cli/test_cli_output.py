@@ -88,6 +88,36 @@ def test_a_full_disk_under_the_output_ends_a_command_in_one_line(unbuffered):
             assert code_and_errors(words, full, unbuffered) == expected, words
 
 
+BUSY = """
+import sys, threading, time
+import cv2, numpy as np
+from endotsr.cli import check, main
+
+picture = np.random.default_rng(0).integers(0, 255, (600, 600), np.uint8)
+
+def flows():
+    method = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    while True:
+        method.calc(picture, picture, None)
+
+def interrupted(words):
+    print("said before")
+    threading.Thread(target=flows, daemon=True).start()
+    time.sleep(0.3)
+    raise KeyboardInterrupt
+
+check.run = interrupted
+sys.argv = ["endotsr", "check", "x"]
+sys.exit(main.main())
+"""
+
+
+def test_an_interruption_with_a_thread_in_opencv_ends_the_process_as_any_other():
+    """It aborted: "terminate called without an active exception", exit code 134."""
+    done = subprocess.run([sys.executable, "-c", BUSY], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "said before\n", "\nendotsr: interrupted\n")
+
+
 def test_no_output_replaces_a_recording_a_clip_or_a_run(run_copy, tmp_path, capsys):
     recording, clip = tmp_path / "a.mp4", tmp_path / "sequence.toml"
     recording.write_bytes(b"\0\0\0 ftypisom")

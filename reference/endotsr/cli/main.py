@@ -28,8 +28,26 @@ LESS_MEMORY = {  # advice by command; the other commands get OTHER_PROGRAMS
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command; `argv` without the program name. Returns the exit code."""
-    argv = sys.argv[1:] if argv is None else argv
+    """Run one command; `argv` without the program name, None = that of the process. Returns the exit code."""
+    if argv is not None:
+        return _run(argv)
+    code = _run(sys.argv[1:])
+    if code == INTERRUPTED:
+        _leave(code)
+    return code
+
+
+def _leave(code: int) -> None:
+    """End the process without its finalisation, which ends threads in the middle of C++.
+
+    An interruption leaves threads in OpenCV, for example in a flow. Python ends them when they return to it, and the
+    C++ runtime then aborts the process, with exit code 134 and a line of its own.
+    """
+    _discard_unwritten()
+    os._exit(code)
+
+
+def _run(argv: list[str]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # the terminal's encoding may lack letters of a file name
     try:
