@@ -31,6 +31,7 @@ SHOWN = (
     ("training_psnr_tissue", "training PSNR tissue", "{:.2f}"), ("cross_fade_psnr_tissue", "cross-fade", "{:.2f}"),
     ("gaussians", "Gaussians", "{}"), ("seconds", "seconds", "{:.0f}"),
 )  # fmt: skip
+MEANS = tuple((key, form) for key, _, form in SHOWN if key in ("psnr_full", "psnr_tissue", "ssim_tissue", "lpips"))
 
 
 class RunRow(MetricValues, total=False):
@@ -129,7 +130,7 @@ def results_csv(rows: list[RunRow]) -> str:
 
 
 def results_markdown(rows: list[RunRow]) -> str:
-    """A table of the finished runs, and a list of the failed ones with reasons."""
+    """A table of the finished runs, one of their means over several seeds, and the failed runs with reasons."""
     finished = [row for row in rows if row["status"] == FINISHED]
     failed = [row for row in rows if row["status"] == FAILED]
     columns = [column for column in SHOWN if any(row.get(column[0]) is not None for row in finished)]
@@ -140,9 +141,48 @@ def results_markdown(rows: list[RunRow]) -> str:
     parts = [f"{len(finished)} of {len(rows)} runs finished, {len(failed)} failed."]
     if finished:
         parts.append(markdown([*ABOUT, *(head for _, head, _ in columns)], cells))
+    if any(len(group) > 1 for group in _by_seed(finished).values()):
+        parts.append(_means_markdown(finished))
     if failed:
         parts.append("\n".join(f"- {_text(row['name'])}: {_text(row.get('reason'))}" for row in failed))
     return "\n\n".join(parts)
+
+
+Group = tuple[str, str, str]  # sequence, split, configuration
+
+
+def _by_seed(rows: list[RunRow]) -> dict[Group, dict[int, RunRow]]:
+    """The runs that differ in their seed alone: seed -> row, of each sequence, split and configuration."""
+    groups: dict[Group, dict[int, RunRow]] = {}
+    for row in rows:
+        groups.setdefault((row["sequence"], row["split"], row["configuration"]), {})[row["seed"]] = row
+    return groups
+
+
+def _means_markdown(rows: list[RunRow]) -> str:
+    """Means over the seeds, and the gain in PSNR of tissue over the first configuration, paired by seed."""
+    groups, body = _by_seed(rows), []
+    shown = [(key, form) for key, form in MEANS if any(row.get(key) is not None for row in rows)]
+    for (sequence, split, configuration), group in groups.items():
+        first = next(key for key in groups if key[:2] == (sequence, split))
+        gain = "-" if first[2] == configuration else _gain(group, groups[first])
+        means = [_mean_cell([row.get(key) for row in group.values()], form) for key, form in shown]
+        body.append([*map(_text, (sequence, split, configuration)), str(len(group)), *means, gain])
+    heads = {key: head for key, head, _ in SHOWN}
+    gained = "PSNR tissue minus that of the first configuration, mean (smallest to largest)"
+    return markdown([*ABOUT[:3], "seeds", *(f"mean {heads[key]}" for key, _ in shown), gained], body)
+
+
+def _gain(group: dict[int, RunRow], first: dict[int, RunRow]) -> str:
+    """The differences of the runs of one seed: their mean, and the smallest to the largest."""
+    pairs = [(row.get("psnr_tissue"), first[seed].get("psnr_tissue")) for seed, row in group.items() if seed in first]
+    gains = [ours - theirs for ours, theirs in pairs if ours is not None and theirs is not None]
+    return f"{sum(gains) / len(gains):+.2f} ({min(gains):+.2f} to {max(gains):+.2f})" if gains else "-"
+
+
+def _mean_cell(values: list[Any], form: str) -> str:
+    known = [value for value in values if value is not None]
+    return form.format(sum(known) / len(known)) if known and len(known) == len(values) else "-"
 
 
 def _text(value: Any) -> str:
