@@ -4,6 +4,7 @@ import msgspec
 import pytest
 from tiny import assert_refused
 
+from endotsr.cli.check import CheckOptions
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
@@ -76,6 +77,14 @@ def test_a_switch_reads_as_in_toml_or_as_a_flag(words, expected):
 def test_short_names_are_settings():
     config = settings("--seed", "5", "--scale", "0.5")
     assert (config.training.seed, config.sequence.scale) == (5, 0.5)
+
+
+def test_a_check_takes_the_short_names_of_a_training():
+    """`check SEQUENCE --scale 0.5` is what a user types before `train SEQUENCE --scale 0.5`."""
+    words = ["clip", "--scale", "0.5", "--frames", "0:9", "--masks", "none", "--threads", "1"]
+    found = parse(CheckOptions, words, "check").settings
+    assert (found.sequence.scale, found.sequence.frames, found.sequence.masks) == (0.5, "0:9", "none")
+    assert found.training.threads == 1
 
 
 def test_number_or_word():

@@ -14,6 +14,8 @@ from endotsr.untrusted.names import counted
 if TYPE_CHECKING:
     from endotsr.clips.sequences.forecast.seconds import Speed
 
+SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.threads")
+
 
 @dataclass
 class CheckOptions:
@@ -28,7 +30,7 @@ class CheckOptions:
     """write the findings to this file"""
     html: Annotated[Path | None, Option("FILE.html", written=True)] = None
     """write a page with the findings and pictures to this file"""
-    settings: Annotated[Config, Option(flat=True)] = PAPER
+    settings: Annotated[Config, Option(flat=True, short=SHORT)] = PAPER
 
 
 def run(words: list[str]) -> int:
