@@ -18,6 +18,7 @@ LARGEST_SIDE = 1 << 16  # pixels of a stated picture
 LEAST_VIEW, MOST_VIEW = 1, 170  # degrees, of `--field-of-view`
 SPREAD = 0.003  # of the focal length: 1 px at the border of a picture of 640 px; of the picture; of a coefficient
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
+ROTATIONS = "allowed: the matrix of a rotation, of determinant 1"
 # x right, y down, z forward; x right, y up, z backward; x down, y right, z backward. x_opencv = AXES[name] @ x_name.
 AXES = {
     "opencv": np.eye(3),
@@ -122,11 +123,11 @@ def rows_of_motion(matrix: FloatArray, where: object) -> tuple[FloatArray, Float
 def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
     """The matrix. Raises InputError unless it is a finite rotation."""
     if not np.isfinite(matrix).all():
-        raise InputError(f"{where}: the rotation is not finite")
+        raise InputError(f"{where}: the rotation is not finite; {ROTATIONS}")
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROTATION_TOLERANCE:
-        raise InputError(f"{where}: the first three columns are not perpendicular unit vectors")
+        raise InputError(f"{where}: the first three columns are not perpendicular unit vectors; {ROTATIONS}")
     if np.linalg.det(matrix) < 0:
-        raise InputError(f"{where}: the first three columns are a mirror image, not a rotation")
+        raise InputError(f"{where}: the first three columns are a mirror image, not a rotation; {ROTATIONS}")
     return np.ascontiguousarray(matrix)
 
 

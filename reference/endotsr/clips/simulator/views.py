@@ -15,6 +15,7 @@ from endotsr.errors import InputError
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 from endotsr.method.splatting.camera import Camera
 
+TOO_STRONG = "motion or relief is too strong; allowed: smaller ones"
 Formula = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 # (p, q) -> position, its derivatives with respect to p and q, each (3, ...)
 
@@ -54,7 +55,7 @@ def see(surface: Surface, camera: Camera, t: float) -> SurfaceView:
     view = SurfaceView(material, point, normal, depth, np.concatenate(wounds) if wounds else None)
     a, b = view.material if view.wound is None else np.where(view.wound, np.nan, view.material)
     if np.nanmin(np.diff(a, axis=1)) <= 0 or np.nanmin(np.diff(b, axis=0)) <= 0:
-        raise InputError(f"simulator: at t = {t:g} the sheet folds over itself: motion or relief is too strong")
+        raise InputError(f"simulator: at t = {t:g} the sheet folds over itself: {TOO_STRONG}")
     return view
 
 
@@ -166,13 +167,13 @@ def _meet(
         a = a - (yb * residual_x - xb * residual_y) / determinant
         b = b - (xa * residual_y - ya * residual_x) / determinant
     else:
-        raise InputError(f"simulator: at t = {t:g} a ray misses the sheet: motion or relief is too strong")
+        raise InputError(f"simulator: at t = {t:g} a ray misses the sheet: {TOO_STRONG}")
     normal = np.stack(_cross(along_b, along_a))  # d/db x d/da points to -z, towards the camera
     normal /= np.sqrt((normal**2).sum(axis=0))
     facing = rotate(camera.rotation, normal)
     away = ray_x * facing[0] + ray_y * facing[1] + facing[2]
     if away.max(initial=-1) >= 0 or seen[2].min(initial=1) <= 0:
-        raise InputError(f"simulator: at t = {t:g} a ray meets the back of the sheet: motion or relief is too strong")
+        raise InputError(f"simulator: at t = {t:g} a ray meets the back of the sheet: {TOO_STRONG}")
     return SurfaceView(np.stack([a, b]), point, normal, seen[2])
 
 
