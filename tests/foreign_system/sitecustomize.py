@@ -187,4 +187,4 @@ builtins.open = io.open = open_text
 for method, paths in (("unlink", 1), ("rmdir", 1), ("rename", 2), ("replace", 2)):
     patched(method, paths)
 if any(PACKAGE in word for word in sys.orig_argv[1:4]) and sys.stdout is not None:
-    sys.stdout = ClosedPipe(sys.stdout.detach(), encoding="cp1252", newline="\r\n")
+    sys.stdout = sys.__stdout__ = ClosedPipe(sys.stdout.detach(), encoding="cp1252", newline="\r\n")

@@ -124,6 +124,8 @@ def _discard_unwritten() -> None:
             stream.flush()
         except OSError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        except ValueError:  # the program that called `main` has closed or detached the stream
+            pass
 
 
 def _is_closed_pipe(error: OSError) -> bool:
