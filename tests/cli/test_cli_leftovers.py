@@ -103,6 +103,7 @@ def test_a_signal_during_the_evaluation_of_a_training_says_what_is_done(tmp_path
     command = f"endotsr evaluate {tmp_path / 'run'}"
     told = f"endotsr: interrupted: the training is finished, its evaluation is not: `{command}` makes it"
     assert code == 130 and said.strip().splitlines()[-1] == told
+    assert (tmp_path / "run" / "view.html").is_file(), "the viewer needs no metrics"
     monkeypatch.undo()
     assert main(command.split()[1:]) == 0
 

@@ -91,6 +91,27 @@ def test_evaluate_again_gives_the_same_numbers(finished_run, run_copy, capsys):
     assert 'href="view.html"' in (finished_run / "report.html").read_text() and (finished_run / "view.html").exists()
 
 
+def test_an_evaluation_names_what_it_measures_no_longer(run_copy, capsys):
+    assert main(["evaluate", str(run_copy), "--measures", "flicker"]) == 0
+    metrics = json.loads((run_copy / "metrics.json").read_text())
+    metrics["held_out"]["mean"]["lpips"] = 0.1  # as with weights, which are no part of the project
+    write_json(run_copy / "metrics.json", metrics)
+    capsys.readouterr()
+    assert main(["evaluate", str(run_copy), "--measures", "flicker"]) == 0
+    assert "any more: LPIPS (--lpips FILE)\n" in capsys.readouterr().out
+    assert main(["evaluate", str(run_copy)]) == 0
+    assert "any more: flicker (--measures flicker)\n" in capsys.readouterr().out
+    assert main(["evaluate", str(run_copy)]) == 0
+    assert "any more" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("content", ["", "{}", '{"held_out": {"mean": 3}, "measures": [1]}'])
+def test_a_damaged_record_of_an_earlier_evaluation_is_replaced(content, run_copy, capsys):
+    (run_copy / "metrics.json").write_text(content)
+    assert main(["evaluate", str(run_copy)]) == 0
+    assert "any more" not in capsys.readouterr().out
+
+
 def test_table_writes_a_dash_for_no_value():
     metrics = {
         "held_out": {
@@ -131,6 +152,13 @@ def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys)
         ["bench", "--json", file],
     ):
         assert_refused(capsys, words, f"error: {file}: cannot be written: ", "allowed: ")
+
+
+@pytest.mark.parametrize("option, name", [("--json", "found.html"), ("--html", "page.pdf"), ("--html", "page.JSON")])
+def test_a_file_with_the_ending_of_another_kind_is_refused(option, name, tmp_path, capsys):
+    words = ["check", "simulated", option, str(tmp_path / name)]
+    assert_refused(capsys, words, option, name, f"allowed: .{option[2:]}")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_working_folder_is_judged(tmp_path, capsys, monkeypatch):

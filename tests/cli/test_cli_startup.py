@@ -1,5 +1,6 @@
 """`endotsr --help` answers at once, and a command imports what it needs and no more."""
 
+import os
 import subprocess
 import sys
 
@@ -20,6 +21,18 @@ def test_overview_imports_nothing_heavy(words):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and done.stderr.strip() == "[]"
+
+
+@pytest.mark.parametrize("given, used", [(None, "1"), ("3", "3")])
+def test_the_process_of_a_command_has_one_thread_of_blas_unless_the_user_says_otherwise(given, used):
+    code = (
+        "import os, sys; sys.argv = ['endotsr', '--version']; from endotsr.cli.main import main; main(); "
+        "print(os.environ['OPENBLAS_NUM_THREADS'], file=sys.stderr)"
+    )
+    environment = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
+    environment |= {} if given is None else {"OPENBLAS_NUM_THREADS": given}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60)
+    assert done.stderr.strip() == used
 
 
 def test_version(capsys):

@@ -50,10 +50,11 @@ def run(words: list[str]) -> int:
         print(f"{finding.level}: {finding.code}: {finding.line}")
     facts = checked.facts
     if cost := facts.get("cost"):
+        whole, iterations = in_words(60 * cost["command_minutes"]), in_words(60 * cost["minutes"])
+        fraction = "" if iterations == whole else f", {iterations} of them for the iterations,"
         print(
             f"{counted(facts.get('frames', 0), 'frame')} of {facts.get('width')}x{facts.get('height')}:"
-            f" training needs about {cost['total_bytes'] / 1e9:.1f} GB and {in_words(60 * cost['command_minutes'])}"
-            f" with the evaluation, {in_words(60 * cost['minutes'])} of them for the iterations,"
+            f" training needs about {cost['total_bytes'] / 1e9:.1f} GB and {whole} with the evaluation{fraction}"
             f" and ends with about {cost['gaussians']} Gaussians"
         )
     print(f"{options.sequence}: {'refused' if checked.refused else 'ready for training'}")

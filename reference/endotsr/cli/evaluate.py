@@ -10,7 +10,7 @@ from endotsr.cli.parts.related_options import EVALUATE
 from endotsr.cli.parts.relations import check_relations
 from endotsr.errors import InputError
 from endotsr.studies.windows.record import is_windowed
-from endotsr.training.runs.files import refuse_read_only, write_json
+from endotsr.training.runs.files import read_json, refuse_read_only, write_json
 from endotsr.training.runs.folder import RunFolder, open_run
 from endotsr.untrusted.names import counted
 from endotsr.untrusted.writing import replace_text
@@ -94,6 +94,8 @@ def evaluate_run(
 ) -> "RunEvaluation":
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
 
+    The viewer page comes first: it needs no metrics, which take most of the time.
+
     view       also write the viewer page linked from the report
     measures   names of `evaluation.measures.MEASURES`
     source     current location of the sequence; default: the recorded one
@@ -107,18 +109,37 @@ def evaluate_run(
     from endotsr.results.report.run_text import held_out_table
     from endotsr.results.views.page import RUN_PAGE, write_run_page
     from endotsr.results.views.preview import preview
+    from endotsr.training.runs.model import load_model
     from endotsr.training.runs.sources import run_source
 
     check_measures(measures, "--measures")
     refuse_read_only(folder.path)
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
     with evaluating(folder, wait=wait):
-        model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
+        before = _optional(folder)
+        model = load_model(folder)
         scene = MovingScene(folder.sequence_record(), model, folder)
         write_run_page(folder.path, scene, sequence if view else None)
+        if view:
+            print(f"viewer: {folder.path / RUN_PAGE}", flush=True)
+        metrics, held_out = measure_folder(folder, model, sequence, source, weights=weights, measures=measures)
         write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):
         print(line)
+    if gone := sorted(before - _optional(folder)):
+        print(f"of the earlier evaluation, metrics.json does not contain any more: {', '.join(gone)}")
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics
+
+
+def _optional(folder: RunFolder) -> set[str]:
+    """What the metrics.json of a run contains by an option: LPIPS and measures. Empty without a readable file."""
+    try:
+        found = read_json(folder.path / "metrics.json", ("held_out.mean",))
+    except InputError:
+        return set()
+    mean, measures = found["held_out"]["mean"], found.get("measures")
+    perceived = isinstance(mean, dict) and mean.get("lpips") is not None
+    names = {f"{name} (--measures {name})" for name in measures} if isinstance(measures, dict) else set()
+    return names | ({"LPIPS (--lpips FILE)"} if perceived else set())

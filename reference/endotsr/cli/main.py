@@ -17,6 +17,9 @@ from endotsr.errors import CalibrationError, InputError
 from endotsr.training.runs.stopping import INTERRUPTED, signals_stop
 from endotsr.untrusted.names import plain_line
 
+# Read when NumPy is loaded. Several threads call BLAS at the same time, whose calls would wait for one another actively
+# if each had threads of its own; `--threads 1` would not hold either.
+BLAS = ("OPENBLAS_NUM_THREADS", "1")
 OTHER_PROGRAMS = "close other programs"
 CLOSED_PIPE = 141
 LESS_MEMORY = {  # advice by command; the other commands get OTHER_PROGRAMS
@@ -31,6 +34,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run one command; `argv` without the program name, None = that of the process. Returns the exit code."""
     if argv is not None:
         return _run(argv)
+    os.environ.setdefault(*BLAS)
     code = _run(sys.argv[1:])
     if code == INTERRUPTED:
         _leave(code)

@@ -59,6 +59,7 @@ def run_spec(spec: "Spec", out: Path, place: "Place", retry: bool, on_rows=lambd
     from endotsr.studies.sweeps.sweep import Inputs, run_sweep
 
     load_lpips_weights(spec.lpips)  # raises for unusable weights before the first run
+    print(f"reading {', '.join(spec.sequences)}", flush=True)
     inputs = Inputs(keep=place.scheduler is not None)
     outcomes = lambda jobs: outcomes_at(place, jobs, out, inputs.size, inputs.sequence)
     with StepBar("iterations") as bar:

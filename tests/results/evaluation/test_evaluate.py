@@ -158,6 +158,14 @@ def test_model_baselines_and_cross_fade_share_the_maps_of_a_frame(monkeypatch):
     assert found["held_out"]["mean"]["lpips"] == 0 < found["cross_fade"]["mean"]["lpips"]
 
 
+@pytest.mark.parametrize(
+    ("threads", "pixels", "count"), [(1, 640 * 512, 2), (4, 640 * 512, 4), (16, 640 * 512, 6), (16, 1920 * 1080, 2)]
+)
+def test_renders_measured_at_once_are_bounded_by_threads_and_memory(threads, pixels, count, monkeypatch):
+    monkeypatch.setattr(numba, "get_num_threads", lambda: threads)
+    assert evaluate.renders_at_a_time(pixels) == count
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_metrics_are_bitwise_equal_for_every_number_of_threads(threads):
     """Renders measured two at a time give what `image_metrics` gives for each alone."""

@@ -248,7 +248,7 @@ def _mask_notes(sequence: Sequence, clip: Clip, config: SequenceConfig) -> list[
     evidence = check_polarity(
         sequence.masks, sequence.depth, sequence.images, str(where), excluded, allow, masks.stated_in
     )
-    return [f"{where.name}: {excluded} = excluded; tissue fraction {fraction:.4f}; {evidence}"]
+    return [f"{where.name}: {excluded} = excluded; tissue is {fraction:.1%} of the pixels; {evidence}"]
 
 
 def _scaled(sequence: Sequence, size: tuple[int, int], clip: Clip, config: SequenceConfig) -> Sequence:
@@ -258,7 +258,7 @@ def _scaled(sequence: Sequence, size: tuple[int, int], clip: Clip, config: Seque
         sequence.notes.append(f"scale {scale:g} changes nothing: pictures of {width}x{height} pixels keep their size")
         return sequence
     sequence = smaller(sequence, width, height, config.memory, where)
-    sequence.notes.append(f"scaled to {width}x{height}; tissue fraction {sequence.masks.mean():.4f}")
+    sequence.notes.append(f"scaled to {width}x{height}; tissue is {sequence.masks.mean():.1%} of the pixels")
     if clip.masks:
         at_scale = f"{clip.masks.files[0].parent} at scale {scale:g}"
         check_tissue_fraction(sequence.masks, at_scale, clip.masks.excluded_value, config.allow_tissue_fraction)

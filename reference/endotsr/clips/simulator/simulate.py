@@ -84,6 +84,6 @@ def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:
         static_camera=not settings.camera_motion.on,
         train_index=train,
         test_index=test,
-        notes=[f"simulated with seed {settings.seed}; tissue fraction {tissue.mean():.4f}"],
+        notes=[f"simulated with seed {settings.seed}; tissue is {tissue.mean():.1%} of the pixels"],
     )
     return SimulatedSequence(sequence, SequenceTruth(depth, material, covered, scene.surface), settings)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import cast
 
+import numba
 import numpy as np
 
 from endotsr.clips.sequences.sequence import Sequence
@@ -39,7 +40,8 @@ LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "mi
 EVERY_BASELINE = {**BASELINES, **TISSUE_BASELINES}
 MODEL = ""  # key of the model among the methods
 CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
-AT_A_TIME = 2  # renders measured at a time; LPIPS of one needs 44 MB at 640x512, 280 MB at 1920x1080
+FEWEST_AT_A_TIME, BYTES_AT_A_TIME = 2, 3e8  # renders measured at a time, one per thread within this memory
+PERCEIVED_BYTES = 140  # of LPIPS per pixel of a render: 44 MB at 640x512, 280 MB at 1920x1080
 EVERY_TRAINING_FRAME = 6  # every sixth training frame is evaluated too
 
 
@@ -70,7 +72,7 @@ def evaluate_methods(
 
     seen   from `times_seen`; adds `psnr_seen` and `psnr_seen_twice`
 
-    Methods are rendered one after the other, and two renders are measured at a time.
+    Methods are rendered one after the other, and `renders_at_a_time` of them are measured at once.
     """
     rows: dict[str, list[FrameMetrics]] = {name: [] for name in methods}
     bad = dict.fromkeys(methods, 0)
@@ -190,6 +192,11 @@ def evaluation_record(
     }
 
 
+def renders_at_a_time(pixels: int) -> int:
+    """Number of renders of this many pixels that are measured at once: one per thread, at least two, within 0.3 GB."""
+    return max(FEWEST_AT_A_TIME, min(numba.get_num_threads(), int(BYTES_AT_A_TIME / (PERCEIVED_BYTES * pixels))))
+
+
 class _Truth:
     """One true frame, against which several renders are measured; its feature maps (LPIPS) are computed once."""
 
@@ -201,10 +208,10 @@ class _Truth:
         self._maps = {key: self._features(self._image, how) for key, how in LPIPS_KEYS.items()} if usable else {}
 
     def of_methods(self, methods: Mapping[str, RenderFrame]) -> Iterator[tuple[str, Means]]:
-        """Name and metrics of each method; AT_A_TIME renders are measured at once."""
-        names = list(methods)
-        for k in range(0, len(names), AT_A_TIME):
-            some = names[k : k + AT_A_TIME]
+        """Name and metrics of each method; `renders_at_a_time` of them are measured at once."""
+        names, count = list(methods), renders_at_a_time(self.mask.size)
+        for k in range(0, len(names), count):
+            some = names[k : k + count]
             renders = [self._checked(methods[name](self.index)) for name in some]
             yield from zip(some, parallel_calls(*(partial(self._metrics, render) for render in renders)), strict=True)
 

@@ -31,7 +31,7 @@ from endotsr.results.evaluation.records import (
 from endotsr.results.evaluation.trajectories import TruePositions, trajectory_error
 from endotsr.training.fitting.model import render_at, with_corrected_cameras, without
 from endotsr.training.runs.folder import RunFolder
-from endotsr.training.runs.model import Model, load_model
+from endotsr.training.runs.model import Model
 from endotsr.training.runs.records import REPORTED, RunRecord
 from endotsr.training.runs.sources import run_source, true_positions_of
 
@@ -46,24 +46,26 @@ RenderFrame = Callable[[int], RenderOut]  # frame number -> render
 
 def measure_folder(
     folder: RunFolder,
+    model: Model,
     sequence: Sequence,
     source: str,
     *,
     weights: LpipsWeights | None = None,
     measures: tuple[str, ...] = (),
-) -> tuple[Model, RunEvaluation, RenderFrame]:
-    """The model of the latest checkpoint of a run, its metrics.json, and the renders of `measure_model`.
+) -> tuple[RunEvaluation, RenderFrame]:
+    """The metrics.json of a run, and the renders of `measure_model`.
 
+    model     of the latest checkpoint of the run
     source    current location of the sequence; for a simulated one, the motion is measured too
     measures  names of `evaluation.measures.MEASURES`; results under `measures` in metrics.json
     """
-    model, (_, simulator), record = load_model(folder), run_source(folder), folder.record(*REPORTED)
+    (_, simulator), record = run_source(folder), folder.record(*REPORTED)
     truth = true_positions_of(source, simulator, folder.config(), sequence)
     found, held_out = measure_model(model, sequence, weights, truth)
     metrics: RunEvaluation = {**found, "run": about_run(record, model)}
     if measures:
         metrics["measures"] = measured(measures, model, sequence, source)
-    return model, metrics, held_out
+    return metrics, held_out
 
 
 def measure_model(

@@ -111,8 +111,7 @@ def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> 
     if times.chosen and len(wanted) > 1:
         raise InputError(f"{out}: a .ply file stores one time, not {len(wanted)}; allowed: a folder, one time")
     count = _write(scene, out, wanted[0][0], content)
-    name = "triangles" if content.kind == "mesh" else content.kind
-    return f"{out}: {count} {name} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
+    return f"{out}: {count} {_parts(content)} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
 
 
 def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
@@ -124,7 +123,12 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
         for k, (time, _, _, _) in enumerate(wanted):
             _write(scene, target / f"{k:05d}.ply", time, content)
     names = "00000.ply" + (f" to {len(wanted) - 1:05d}.ply" if len(wanted) > 1 else "")
-    return f"{out}: {counted(len(wanted), 'file')} of {content.kind}, {names}"
+    return f"{out}: {counted(len(wanted), 'file')} of {_parts(content)}, {names}"
+
+
+def _parts(content: Content) -> str:
+    """The name of what a ply file contains."""
+    return "triangles" if content.kind == "mesh" else content.kind
 
 
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:

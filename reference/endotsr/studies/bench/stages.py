@@ -10,6 +10,7 @@ from endotsr.studies.bench.case import BenchCase, apart, measure
 from endotsr.studies.bench.limits import limits
 from endotsr.studies.bench.peaks import higher, measure_peaks
 from endotsr.studies.bench.records import BenchResult, CaseResult, CaseTimes, Spread
+from endotsr.untrusted.names import counted
 
 Say = Callable[[str], None]
 
@@ -48,7 +49,7 @@ def ns_per_pair(result: CaseTimes) -> dict[str, float | None]:
 def name_of(case: dict[str, Any]) -> str:
     """A case as text."""
     what = case["scene"] or f"{case['gaussians']} Gaussians"
-    return f"{what}, {case['width']}x{case['height']}, {case['precision']}, {case['threads']} threads"
+    return f"{what}, {case['width']}x{case['height']}, {case['precision']}, {counted(case['threads'], 'thread')}"
 
 
 def line(result: CaseTimes) -> str:

@@ -144,7 +144,17 @@ def increment_table(record: AblationRecord, split: str) -> str:
             fixed(found["median"], digits, "+"), interval_text(found, "median", digits),
             fixed(found["published"], digits, "+"), f"{found['pairs']} on {found['sequences']}",
         ])  # fmt: skip
-    heads = ("difference", "metric", "mean", "95 % interval", "bootstrap", "median", "bootstrap", "published", "pairs")
+    heads = (
+        "difference",
+        "metric",
+        "mean",
+        "95 % interval",
+        "bootstrap",
+        "median",
+        "bootstrap",
+        "published",
+        "pairs on clips",
+    )
     return markdown(heads, rows)
 
 

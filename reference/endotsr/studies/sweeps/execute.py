@@ -173,6 +173,7 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     from endotsr.results.evaluation.lpips import load_lpips_weights
     from endotsr.results.evaluation.run import measure_folder
     from endotsr.results.report.run_files import write_evaluation
+    from endotsr.training.runs.model import load_model
 
     if folder.record().get("status") != FINISHED:  # killed between the last checkpoint and this record
         folder.update({"status": FINISHED, "finished": now()})
@@ -180,7 +181,8 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
         return
     weights = load_lpips_weights(job.lpips)
     with folder.evaluating(wait=True):
-        _, metrics, held_out = measure_folder(folder, sequence, job.source, weights=weights, measures=job.measures)
+        model = load_model(folder)
+        metrics, held_out = measure_folder(folder, model, sequence, job.source, weights=weights, measures=job.measures)
         write_evaluation(folder, sequence, metrics, held_out)
     folder.previous.unlink(missing_ok=True)
     if not job.keep_checkpoints:

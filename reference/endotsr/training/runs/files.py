@@ -32,6 +32,10 @@ PAGES = {  # a file that makes its folder one of results, and the names of its p
     "windows.json": ("report.html", "view.html"),
     "tradeoff.json": ("tradeoff.html",),
 }
+PAGE = (".html", ".htm")
+ENDINGS = {"--json": (".json",), "--html": PAGE, "--csv": (".csv",), "--draw": PAGE, "--badge": (".svg",)}  # by option
+OF_OTHERS = (".pdf", ".png", ".jpg", ".jpeg", ".webp", ".gif", ".mp4", ".npz", ".npy", ".ply", ".toml")
+KNOWN_ENDINGS = frozenset((*OF_OTHERS, *(ending for own in ENDINGS.values() for ending in own)))
 HEAD = 4096  # bytes; a zero byte there is the sign of a picture, a video or an array: text in UTF-8 has none
 
 
@@ -118,10 +122,18 @@ def refuse_texts(files: dict[str, Path | None]) -> None:
         if file is not None:
             refuse_unwritable(file)
             refuse_no_text(file)
+            _refuse_other_kind(option, file)
             if options.setdefault(file.resolve(), option) != option:
                 raise InputError(
                     f"{option} {file}: is also the file of {options[file.resolve()]}; allowed: another name"
                 )
+
+
+def _refuse_other_kind(option: str, file: Path) -> None:
+    """Raises InputError for the ending of another kind of file; one that names no kind, such as `.txt`, is allowed."""
+    own, ending = ENDINGS.get(option, ()), file.suffix.lower()
+    if own and ending in KNOWN_ENDINGS and ending not in own:
+        raise InputError(f"{option} {file}: {ending} is the ending of another kind of file; allowed: {', '.join(own)}")
 
 
 def _refuse_input(file: Path) -> None:

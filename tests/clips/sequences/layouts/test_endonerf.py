@@ -44,7 +44,7 @@ def test_reads_exactly_what_was_written(tmp_path, excluded, mask_folder, white, 
     assert sequence.unit == "mm" and sequence.static_camera
     assert all(camera is sequence.cameras[0] for camera in sequence.cameras)
     assert sequence.cameras[0][2:] == (FOCAL, FOCAL, 16.0, 12.0, 32, 24)
-    assert any(f"{excluded} = excluded" in note and "tissue fraction" in note for note in sequence.notes)
+    assert any(f"{excluded} = excluded" in note and "of the pixels" in note for note in sequence.notes)
 
 
 def test_frame_converts_to_the_precision_asked_for(tmp_path):

@@ -257,7 +257,7 @@ def depth_note(depth: NDArray[np.float32], near: float, where: Path, unit: str) 
     behind = before / known
     return (
         f"depth in {unit}, {nearest:g} to {farthest:g} after clipping;"
-        f" missing on {1 - known / depth.size:.4f} of the pixels"
+        f" missing on {1 - known / depth.size:.1%} of the pixels"
         + (f"; frames without any: {', '.join(map(str, empty))}" if empty else "")
         + (f"; {behind:.1%} of it is in front of the near plane at {near:g}" if behind else "")
     )
