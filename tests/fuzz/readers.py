@@ -35,7 +35,7 @@ from endotsr.results.evaluation.run import about_run
 from endotsr.results.export.times import Times, chosen_times
 from endotsr.results.report.curves import series
 from endotsr.results.report.run_text import facts
-from endotsr.results.views.plan import ViewRequest, check_request, views_of
+from endotsr.results.views.plan import ViewRequest, check_request, planned_views
 from endotsr.studies.sweeps.spec import read_spec
 from endotsr.studies.tradeoff.scenes import read_splats
 from endotsr.training.fitting.checkpoint import load_latest
@@ -183,7 +183,7 @@ def read_sequence(path: Path) -> object:
     for request in requests:
         wanted = chosen_times("render", request.times, record)
         check_request(request, record.count)
-        for view in views_of(request, wanted, record.frame_cameras, pivot_depth=50.0):
+        for view in planned_views(request, wanted, record.frame_cameras, pivot_depth=50.0):
             inside = (path.parent / f"{view.label}.png").resolve()
             assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
             assert view.camera.width > 0

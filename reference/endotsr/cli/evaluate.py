@@ -67,13 +67,13 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
 def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of a folder of pictures."""
     from endotsr.results.evaluation.lpips import load_lpips_weights
-    from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
+    from endotsr.results.evaluation.pictures import find_renders, measure_pictures
     from endotsr.results.report.run_text import held_out_table
 
     assert options.pictures is not None
     weights = load_lpips_weights(options.lpips)
     sequence = shown_sequence(options.run, options.sequence, options.settings)
-    found = find_pictures(options.pictures, sequence)
+    found = find_renders(options.pictures, sequence)
     print(f"{options.pictures}: {counted(len(found.files), 'picture')}, paired {found.pairing}")
     metrics = measure_pictures(found, sequence, options.label, weights)
     if said := metrics["pictures"]["doubt"]:

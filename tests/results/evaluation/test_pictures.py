@@ -13,7 +13,7 @@ from endotsr.errors import InputError
 from endotsr.results.evaluation import pictures
 from endotsr.results.evaluation.baselines import BASELINES, flow_interpolation
 from endotsr.results.evaluation.metrics import round_8bit
-from endotsr.results.evaluation.pictures import find_pictures, measure_pictures, read_picture
+from endotsr.results.evaluation.pictures import find_renders, measure_pictures, read_render
 from endotsr.results.evaluation.turned import turned_remark
 
 HELD_OUT = [1, 9]
@@ -46,7 +46,7 @@ def test_float_pictures_of_a_baseline_equal_its_row_to_the_last_digit(baseline, 
     make = BASELINES[baseline][1](sequence)
     for i in HELD_OUT:
         np.save(tmp_path / f"{sequence.names[i]}.npy", make(i))
-    found = measure_pictures(find_pictures(tmp_path, sequence), sequence)
+    found = measure_pictures(find_renders(tmp_path, sequence), sequence)
     row = found["baselines"][baseline]
     assert found["held_out"] == {key: row[key] for key in found["held_out"]}
 
@@ -54,7 +54,7 @@ def test_float_pictures_of_a_baseline_equal_its_row_to_the_last_digit(baseline, 
 def test_8bit_pictures_of_the_flow_equal_the_8bit_columns_of_its_row(sequence, tmp_path):
     for i in HELD_OUT:
         write_png(tmp_path / f"{sequence.names[i]}.png", bytes_of(flow_interpolation(sequence, i)))
-    found = measure_pictures(find_pictures(tmp_path, sequence), sequence)
+    found = measure_pictures(find_renders(tmp_path, sequence), sequence)
     rows = zip(found["held_out"]["per_frame"], found["baselines"]["flow_interpolation"]["per_frame"])
     for ours, row in rows:
         for key in ("psnr_full_8bit", "psnr_tissue_8bit", "ssim_full_8bit", "ssim_tissue_8bit"):
@@ -70,7 +70,7 @@ def test_a_video_of_renders_is_measured(frames, sequence, tmp_path):
     (tmp_path / "png").mkdir()
     for i, picture in shown.items():
         write_png(tmp_path / "png" / f"{sequence.names[i]}.png", picture)
-    video, folder = (measure_pictures(find_pictures(tmp_path / name, sequence), sequence) for name in ("a.mp4", "png"))
+    video, folder = (measure_pictures(find_renders(tmp_path / name, sequence), sequence) for name in ("a.mp4", "png"))
     assert video["held_out"] == folder["held_out"] and video["training"] == folder["training"]
     assert "as many pictures as " + ("frames" if len(frames) == 12 else "held-out") in video["pictures"]["pairing"]
 
@@ -80,10 +80,10 @@ def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
     with pytest.raises(
         InputError, match=r"a video of 3 pictures; allowed: one for each of the 12 frames or of the 2 held"
     ):
-        find_pictures(tmp_path / "a.mp4", sequence)
+        find_renders(tmp_path / "a.mp4", sequence)
     write_video(tmp_path / "b.mp4", [np.zeros((16, 48, 3), np.uint8)] * 2, 25.0, lossless=True)
     with pytest.raises(InputError, match=r"a picture of 48x16; allowed: a picture of 48x32"):
-        measure_pictures(find_pictures(tmp_path / "b.mp4", sequence), sequence)
+        measure_pictures(find_renders(tmp_path / "b.mp4", sequence), sequence)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
     ],
 )  # fmt: skip
 def test_files_are_paired_with_frames(names, first, second, words, sequence, tmp_path):
-    found = find_pictures(write_folder(tmp_path, names), sequence)
+    found = find_renders(write_folder(tmp_path, names), sequence)
     assert [found.files[i].name for i in HELD_OUT] == [first, second] and words in found.pairing
 
 
@@ -118,7 +118,7 @@ def test_files_are_paired_with_frames(names, first, second, words, sequence, tmp
 def test_folders_that_cannot_be_paired_are_refused(names, said, sequence, tmp_path):
     folder = tmp_path / "none" if names is None else write_folder(tmp_path, names)
     with pytest.raises(InputError) as refused:
-        find_pictures(folder, sequence)
+        find_renders(folder, sequence)
     assert said in str(refused.value) and str(folder) in str(refused.value)
 
 
@@ -137,7 +137,7 @@ def test_arrays_that_are_no_pictures_are_refused(array, said, tmp_path):
     file = tmp_path / "0.npy"
     file.write_bytes(array) if isinstance(array, bytes) else np.save(file, array)
     with pytest.raises(InputError) as refused:
-        read_picture(file, (3, 32, 48))
+        read_render(file, (3, 32, 48))
     assert said in str(refused.value) and "0.npy" in str(refused.value)
 
 
@@ -146,16 +146,16 @@ def test_planes_last_and_16_bits_are_the_same_picture(tmp_path):
     write_png(tmp_path / "a.png", levels.astype(np.uint8))
     write_png(tmp_path / "b.png", (levels * 257).astype(np.uint16))
     np.save(tmp_path / "c.npy", levels / 255)
-    a, b, c = (read_picture(tmp_path / name, (3, 32, 48)) for name in ("a.png", "b.png", "c.npy"))
+    a, b, c = (read_render(tmp_path / name, (3, 32, 48)) for name in ("a.png", "b.png", "c.npy"))
     assert np.array_equal(a, b) and np.abs(a - c).max() < 1e-7 and c.dtype == np.float64
 
 
 def test_levels_of_8_bits_stored_in_16_are_refused(tmp_path):
     write_png(tmp_path / "a.png", np.full((32, 48, 3), 200, np.uint16))
     with pytest.raises(InputError, match=r"a\.png: 16 bits whose largest value is 200: levels of 8 bits"):
-        read_picture(tmp_path / "a.png", (3, 32, 48))
+        read_render(tmp_path / "a.png", (3, 32, 48))
     write_png(tmp_path / "b.png", np.zeros((32, 48, 3), np.uint16))
-    assert not read_picture(tmp_path / "b.png", (3, 32, 48)).any()
+    assert not read_render(tmp_path / "b.png", (3, 32, 48)).any()
 
 
 @pytest.mark.parametrize(
@@ -178,26 +178,26 @@ def test_pictures_in_another_order_are_named(change, said, sequence):
 def test_training_frames_are_measured_where_the_folder_holds_them(sequence, tmp_path):
     for i in range(sequence.count):
         write_png(tmp_path / f"{sequence.names[i]}.png", np.full((32, 48, 3), 90, np.uint8))
-    found = measure_pictures(find_pictures(tmp_path, sequence), sequence, "grey")
+    found = measure_pictures(find_renders(tmp_path, sequence), sequence, "grey")
     assert [row["frame"] for row in found["training"]["per_frame"]] == list(sequence.train_index)
     assert found["label"] == "grey" and found["pictures"]["files"]["simulated-000003"] == "simulated-000003.png"
     fewer = dataclasses.replace(sequence, test_index=np.array([9]), train_index=np.arange(9))
-    assert find_pictures(tmp_path, fewer).files.keys() == set(range(12))
+    assert find_renders(tmp_path, fewer).files.keys() == set(range(12))
 
 
 def test_a_part_of_a_name_that_two_frames_share_pairs_no_file(sequence, tmp_path):
     """Names of seconds: a file of the held-out frame is not that of a training frame of the same second."""
     names = [f"{1305031102 + i // 4}.{25 * (i % 4):02d}" for i in range(12)]
     timed = dataclasses.replace(sequence, names=names)
-    found = find_pictures(write_folder(tmp_path, [f"{names[i]}.png" for i in HELD_OUT]), timed)
+    found = find_renders(write_folder(tmp_path, [f"{names[i]}.png" for i in HELD_OUT]), timed)
     assert {i: file.stem for i, file in found.files.items()} == {i: names[i] for i in HELD_OUT}
 
 
 def test_a_doubt_on_pictures_is_in_the_record_and_each_picture_is_read_once(sequence, tmp_path, monkeypatch):
     for i in HELD_OUT:
         write_png(tmp_path / f"{sequence.names[i]}.png", bytes_of(flow_interpolation(sequence, i)[::-1]))
-    read, seen = pictures.read_picture, []
-    monkeypatch.setattr(pictures, "read_picture", lambda file, shape: seen.append(file.name) or read(file, shape))
-    found = measure_pictures(find_pictures(tmp_path, sequence), sequence)
+    read, seen = pictures.read_render, []
+    monkeypatch.setattr(pictures, "read_render", lambda file, shape: seen.append(file.name) or read(file, shape))
+    found = measure_pictures(find_renders(tmp_path, sequence), sequence)
     assert "with red and blue exchanged" in found["pictures"]["doubt"]
     assert sorted(seen) == sorted(f"{sequence.names[i]}.png" for i in HELD_OUT)

@@ -155,7 +155,7 @@ def _metrics(
         return cast("EvaluationRecord", metrics), sequence
     from endotsr.clips.formats.video_file import is_video
     from endotsr.results.evaluation.lpips import load_lpips_weights
-    from endotsr.results.evaluation.pictures import find_pictures, measure_pictures
+    from endotsr.results.evaluation.pictures import find_renders, measure_pictures
 
     if not path.is_dir() and not is_video(path):
         return cast("EvaluationRecord", read_json(path)), sequence
@@ -164,7 +164,7 @@ def _metrics(
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
         sequence = shown_sequence(run, asked.sequence, asked.settings)
     weights = load_lpips_weights(asked.lpips)
-    metrics = measure_pictures(find_pictures(path, sequence), sequence, label, weights)
+    metrics = measure_pictures(find_renders(path, sequence), sequence, label, weights)
     if said := metrics["pictures"]["doubt"]:
         print(f"{path}: {said}")
     return metrics, sequence

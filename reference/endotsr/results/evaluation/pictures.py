@@ -44,14 +44,14 @@ class Pictures(NamedTuple):
     decoded: dict[int, NDArray[np.uint8]] | None = None  # of a video: frame number -> (H, W, 3)
 
     def read(self, index: int, shape: tuple[int, ...]) -> FloatArray:
-        """The picture of a frame in display units, (3, H, W). Raises InputError as `read_picture`."""
+        """The picture of a frame in display units, (3, H, W). Raises InputError as `read_render`."""
         if self.decoded is None:
-            return read_picture(self.files[index], shape)
+            return read_render(self.files[index], shape)
         levels = self.decoded[index]
         return _of_shape(levels.astype(np.float32) / np.float32(255), shape, self.files[index])
 
 
-def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
+def find_renders(folder: Path, sequence: Sequence) -> Pictures:
     """Pair the held-out frames with the pictures of a folder or a video.
 
     The first of these rules with one file for every held-out frame applies: the name of the frame (the stem, or the
@@ -146,7 +146,7 @@ def _by_order(files: list[Path], numbers: list[tuple[int, ...]] | None, frames: 
     return dict(zip(frames, ordered))
 
 
-def read_picture(file: Path, shape: tuple[int, ...]) -> FloatArray:
+def read_render(file: Path, shape: tuple[int, ...]) -> FloatArray:
     """One picture in display units.
 
     file      PNG, TIFF or BMP: 8 or 16 bits, divided by 255 or 65535; NPY: floats in display units, (3, H, W) or
@@ -206,7 +206,7 @@ def measure_pictures(
     returns   the keys of `evaluate_model`, `label`, and `pictures` (folder, pairing, `doubt`, digests, file of every
               frame). The training part covers the training frames with a picture, possibly none
 
-    Raises: InputError as `read_picture`.
+    Raises: InputError as `read_render`.
     """
     shape = sequence.images.shape[1:]
     training = [int(i) for i in sequence.train_index if int(i) in pictures.files]

@@ -27,7 +27,7 @@ from endotsr.results.report.figures import ByteImage, bytes_image
 from endotsr.results.views.cameras import TURNING, pivot_depth_of
 from endotsr.results.views.film import check_film
 from endotsr.results.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
-from endotsr.results.views.plan import PlannedView, ViewRequest, check_request, views_of
+from endotsr.results.views.plan import PlannedView, ViewRequest, check_request, planned_views
 from endotsr.training.runs.files import refuse_replacing, write_json
 from endotsr.training.runs.folder import refuse_existing
 from endotsr.training.runs.sources import load_run_sequence
@@ -90,7 +90,7 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
     """The views of a request. Paths rotate about the point at the median depth of the first view.
 
     default   frames to show if no times are chosen
-    Raises: InputError as `check_request`, before the model is read, as `views_of`, and as `MovingScene.model`.
+    Raises: InputError as `check_request`, before the model is read, as `planned_views`, and as `MovingScene.model`.
     """
     wanted = chosen_times("render", request.times, scene.record, default)
     check_request(request, scene.record.count)
@@ -99,7 +99,7 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
         time, frame, _, _ = wanted[0]
         out = scene.render(time, scene.cameras[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
-    return views_of(request, wanted, scene.cameras, pivot_depth, scene.placement)
+    return planned_views(request, wanted, scene.cameras, pivot_depth, scene.placement)
 
 
 def check_outputs(
@@ -125,7 +125,7 @@ def check_outputs(
         refuse_replacing(film, replace, option)
 
 
-def frames_of(
+def frames_shown(
     scene: MovingScene, panels: tuple[Panel, ...], views: list[PlannedView], source: str | None
 ) -> Sequence | None:
     """The sequence for the panels truth and error; None if they are not shown.

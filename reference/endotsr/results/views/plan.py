@@ -52,7 +52,7 @@ def check_request(request: ViewRequest, count: int) -> None:
         raise InputError(f"render: --camera {camera!r} is not allowed; allowed: {allowed}")
 
 
-def views_of(
+def planned_views(
     request: ViewRequest,
     wanted: list[tuple[float, int, str, bool]],
     observed: list[Camera],

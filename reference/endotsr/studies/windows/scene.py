@@ -27,7 +27,7 @@ from endotsr.method.splatting.render import RenderOut
 from endotsr.method.splatting.render import Scene as DeformedScene
 from endotsr.results.export.scene import MovingScene, open_scene
 from endotsr.results.views.panels import NEEDS_TRUTH, Panel
-from endotsr.results.views.pictures import check_panels, frames_of
+from endotsr.results.views.pictures import check_panels, frames_shown
 from endotsr.results.views.plan import PlannedView
 from endotsr.studies.windows.make import window_folder
 from endotsr.studies.windows.record import FOLDER, WindowsRecord, is_windowed, read_record
@@ -212,9 +212,9 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
 def shown_frames(
     scene: MovingScene, panels: tuple[Panel, ...], views: list[PlannedView], source: str | None
 ) -> "Sequence | WindowFrames | None":
-    """The recorded frames for the panels truth and error of a film, as `views.pictures.frames_of`."""
+    """The recorded frames for the panels truth and error of a film, as `views.pictures.frames_shown`."""
     if not isinstance(scene, WindowedScene):
-        return frames_of(scene, panels, views, source)
+        return frames_shown(scene, panels, views, source)
     check_panels(panels, views)
     return WindowFrames(scene, source) if set(panels) & set(NEEDS_TRUTH) else None
 
