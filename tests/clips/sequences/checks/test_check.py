@@ -202,8 +202,8 @@ def combed_across(image):
 
 
 def holed(mask):
-    """Another 5 % of the pixels excluded, as where stereo matching fails."""
-    mask[4:16, 30:43] = 255
+    """Another 13 % of the pixels excluded, as where stereo matching fails. Masks two apart differ in 7 %."""
+    mask[4:24, 25:45] = 255
     return mask
 
 

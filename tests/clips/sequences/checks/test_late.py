@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from data_folder import data_folder
+from endotsr.clips.opencv.png import read_png
+from endotsr.clips.sequences.checks import late
 from endotsr.clips.sequences.checks.check import check_sequence
 from endotsr.clips.sequences.checks.late import FARTHEST, FEWEST, LateParts, loaded_late_findings
 from endotsr.clips.sequences.checks.stereo import late_steps_finding
@@ -37,16 +39,16 @@ def test_what_is_of_one_moment_has_no_finding():
     assert found() == found(holes=False) == []
 
 
-@pytest.mark.parametrize(("late", "words"), [(3, "3 frames late"), (-3, "3 frames early"), (6, "6 frames late")])
-def test_late_and_early_masks_are_named(late, words):
-    ((code, where, what),) = found(masks=late, holes=False)
+@pytest.mark.parametrize(("lag", "words"), [(3, "3 frames late"), (-3, "3 frames early"), (6, "6 frames late")])
+def test_late_and_early_masks_are_named(lag, words):
+    ((code, where, what),) = found(masks=lag, holes=False)
     assert (code, where) == ("late-masks", "masks") and f"about {words}" in what
-    assert found(masks=late, frames=2 * FARTHEST + FEWEST - 1) == []
+    assert found(masks=lag, frames=2 * FARTHEST + FEWEST - 1) == []
 
 
-@pytest.mark.parametrize(("late", "words"), [(1, "1 frame late"), (-4, "4 frames early")])
-def test_holes_of_another_frame_are_named(late, words):
-    ((code, where, what),) = found(depth=late)
+@pytest.mark.parametrize(("lag", "words"), [(1, "1 frame late"), (-4, "4 frames early")])
+def test_holes_of_another_frame_are_named(lag, words):
+    ((code, where, what),) = found(depth=lag)
     assert (code, where) == ("late-depth", "depth") and f"be {words}: its holes" in what and "0.0% if" in what
 
 
@@ -66,10 +68,10 @@ def test_a_simulated_clip_has_no_finding_and_its_late_masks_have_one(name):
     clip = simulate(settings).sequence
     assert loaded_late_findings(clip, "masks", "depth") == []
     if name == "everything":  # the instrument of the other scene stays
-        late = LateParts()
+        parts = LateParts()
         for picture, tissue, depth in zip(clip.images[5:], clip.masks[:-5], clip.depth[5:]):
-            late.add(picture.transpose(1, 2, 0), tissue, depth)
-        assert [f.code for f in late.findings("masks", "depth")] == ["late-masks"]
+            parts.add(picture.transpose(1, 2, 0), tissue, depth)
+        assert [f.code for f in parts.findings("masks", "depth")] == ["late-masks"]
 
 
 @pytest.mark.parametrize("lag", [0, 1, 3, -5])
@@ -100,3 +102,38 @@ def test_the_recorded_clips_have_no_finding_and_have_one_with_late_files(name, t
         np.save(folder / "poses_bounds.npy", np.load(given / "poses_bounds.npy")[:40])
         codes = {f.code for f in check_sequence(folder, PAPER).findings}
         assert codes & {"late-masks", "late-depth"} == ({code} if code else set()), moved
+
+
+def recorded(name, frames, rows=slice(None), late=0):
+    """Findings on masks of a part of a clip; those of frames `late` before its frames."""
+    folder, parts = data_folder(name), LateParts()
+    files = [sorted((folder / part).iterdir()) for part in ("images", "gt_masks")]
+    for i in frames:
+        tissue = read_png(files[1][i - late])
+        parts.add(read_png(files[0][i])[rows], (tissue if tissue.ndim == 2 else tissue[..., 0])[rows] < 128, None)
+    return [f.code for f in parts.findings("masks", "depth")]
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(("name", "frames", "rows"), [
+    ("endonerf_pulling", range(24), slice(None)),
+    ("endonerf_pulling", range(63), slice(256, None)),
+    ("endonerf_cutting", range(124, 156), slice(None)),
+])  # fmt: skip
+def test_parts_of_the_recorded_clips_have_no_late_masks(name, frames, rows):
+    """Other shifts than 0 fit them a little better: an instrument enters or grows."""
+    assert recorded(name, frames, rows) == []
+
+
+@pytest.mark.data
+def test_late_masks_of_a_short_part_are_named():
+    assert recorded("endonerf_cutting", range(5, 40), late=5) == ["late-masks"]
+    assert recorded("endonerf_pulling", range(5, 40), late=5) == ["late-masks"]
+
+
+@pytest.mark.parametrize(("limit", "value"), [("INFORMED", 10.0), ("TIMES", 1000.0)])
+def test_late_masks_have_to_tell_more_of_the_colours_by_both_limits(limit, value, monkeypatch):
+    """Masks that are late by 3 frames exceed both limits, and none that is higher than what they gain."""
+    assert [code for code, *_ in found(masks=3, holes=False)] == ["late-masks"]
+    monkeypatch.setattr(late, limit, value)
+    assert found(masks=3, holes=False) == []

@@ -11,9 +11,9 @@ from endotsr.clips.sequences.checks.copies import steps_between
 from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
+from endotsr.clips.sequences.checks.halves import halves_finding
 from endotsr.clips.sequences.checks.masks import mask_findings
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
-from endotsr.clips.sequences.checks.scenes import halves_finding
 from endotsr.clips.sequences.layouts import layout_of
 from endotsr.clips.sequences.sampling import small_picture
 from endotsr.clips.simulator.scenes import named_scene

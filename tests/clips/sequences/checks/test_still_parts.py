@@ -94,6 +94,33 @@ def test_text_on_a_recorded_clip():
     assert [code for code, _ in said([burnt(picture.copy()) for picture in pictures])] == ["burnt-in"]
 
 
+def sharpened(picture, weight, radius=2.0):
+    """An unsharp mask."""
+    smooth = cv2.GaussianBlur(picture, (0, 0), radius).astype(np.float32)
+    return np.clip(picture + weight * (picture - smooth), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.data
+def test_a_sharpened_clip_has_no_text_and_text_on_it_is_named():
+    video = cv2.VideoCapture(str(data_folder("surgt_davinci") / "video.mp4"))
+    pictures = [np.ascontiguousarray(np.asarray(video.read()[1], np.uint8)[:, :1280, ::-1]) for _ in range(8)]
+    for weight in (1, 2):
+        assert said([sharpened(picture, weight) for picture in pictures]) == []
+    texts = [cv2.putText(picture.copy(), "MEIER, A. 28.11.2026", (160, 160), cv2.FONT_HERSHEY_SIMPLEX, 2,
+                         (255, 255, 255), 2) for picture in pictures]  # fmt: skip
+    for weight in (0, 1):
+        assert [code for code, _ in said([sharpened(picture, weight) for picture in texts])] == ["burnt-in"]
+
+
+def test_a_still_scene_under_amplified_noise_says_nothing():
+    """The noise moves the faint edges, and the clear ones stand still."""
+    rng = np.random.default_rng(1)
+    noisy = [
+        np.clip(tissue(0) + rng.normal(0, 1.5, (HEIGHT, WIDTH, 1)), 0, 255).astype(np.uint8) for _ in range(FRAMES)
+    ]
+    assert said([sharpened(with_text(picture), 2) for picture in noisy]) == []
+
+
 def test_prepare_and_check_name_it(tmp_path, capsys):
     (tmp_path / "raw").mkdir()
     for i in range(FRAMES):

@@ -5,8 +5,8 @@
     guard                       the checks on frames that a training holds in memory
     written                     the checks on frames that `endotsr prepare` writes
 
-    frames                      pictures of a clip, one after another; it calls the next five
-    clock_names, copies, exchanged, colours, scenes
+    frames                      pictures of a clip, one after another; it calls the next six
+    clock_names, copies, exchanged, colours, scenes, halves
                                 names of pictures, repeated and exchanged frames, other light, other scenes and views
     still_parts, dark_border    what stands still in pictures that move, and dark borders
     masks, polarity, specks     masks against their neighbours, against the pictures, and masks of noise

@@ -16,8 +16,9 @@ from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.colours import colour_findings
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, return_finding, steps_between
 from endotsr.clips.sequences.checks.exchanged import exchanged_findings
+from endotsr.clips.sequences.checks.halves import halves_finding
 from endotsr.clips.sequences.checks.kinds import Finding, finding
-from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
+from endotsr.clips.sequences.checks.scenes import alternating_finding, cut_findings
 from endotsr.clips.sequences.sampling import small_picture
 from endotsr.clips.sequences.times import evenly_spaced, usual_rate
 

@@ -29,6 +29,10 @@ LEVELS, MOST = 8, 3.0  # of a colour channel; largest |l|
 # with gains of 0.22 to 0.79 in 0.74 to 0.91 of the frames.
 SHORTEST, GAIN, AGREEING = 2, 0.1, 0.6
 LEAST_CHANGED = 1e-3  # part of the pixels that the shifted masks change
+# Mutual information that the shift gains: nats, and times that of the masks as they are. Parts of two recorded and of
+# three simulated clips, in time and in the picture, gain up to 0.008, or 1.034 times, at a wrong shift. With masks that
+# are moved by five frames, four of five of these parts exceed both limits.
+INFORMED, TIMES, NOTHING = 0.009, 1.04, 1e-6
 APART, BETTER = 0.005, 3.0  # part of the pixels where holes and masks differ; times that of the best shift
 
 
@@ -79,15 +83,19 @@ def late_masks(colours: NDArray[np.intp], tissue: BoolArray, where: str) -> list
     """
     middle = slice(FARTHEST, len(tissue) - FARTHEST)
     moved = {k: tissue[FARTHEST + k : len(tissue) - FARTHEST + k] for k in SHIFTS}
-    best = max(SHIFTS, key=lambda k: mutual_information(colours[middle], moved[k]))
-    if abs(best) < SHORTEST:
+    known = {k: mutual_information(colours[middle], moved[k]) for k in SHIFTS}
+    best = max(SHIFTS, key=lambda k: known[k])
+    if abs(best) < SHORTEST or known[best] < max(known[0] + INFORMED, TIMES * known[0]):
         return []
     gains, changed = _gain(colours[middle], moved[0], moved[best])
     if changed.sum() < LEAST_CHANGED * moved[0].size or gains.sum() < GAIN * changed.sum():
         return []
     if np.mean(gains[changed > 0] > 0) < AGREEING:
         return []
-    what = f"the masks seem to be about {lag_in_words(best)}: moved so, they fit the colours of the pictures better"
+    what = (
+        f"the masks seem to be about {lag_in_words(best)}: moved so, they tell"
+        f" {known[best] / max(known[0], NOTHING):.2f} times as much of the colours of the pictures (limit {TIMES})"
+    )
     return [finding("late-masks", where, what)]
 
 

@@ -1,7 +1,7 @@
 """Checks that the pictures show one view of one scene.
 
-In: small grey pictures of the frames. Out: findings. Two joined takes, or a stereo pair read as one picture, train
-without an error and give a meaningless scene.
+In: small grey pictures of the frames. Out: findings. Two joined takes, or two cameras in turn, train without an error
+and give a meaningless scene.
 """
 
 import numpy as np
@@ -9,11 +9,8 @@ import numpy as np
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
 
-ALIKE = 0.6  # correlation of picture halves that indicates two views; published clips of one view have at most 0.3
 OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # correlation of neighbouring frames: at a cut, and usually elsewhere
 ALTERNATING = 0.2  # correlation of pictures two apart minus that of neighbours; motion makes it negative
-DARK, LEAST_LIT = 20.0, 0.2  # grey levels of a black bar; part of a half that is compared
-FARTHEST = 6  # the largest shift between two views is 1 / FARTHEST of the width of a half
 # Correlation below the usual one at which a zoom is tried; its factors; gain of the best one, and what it may be below
 # the usual correlation. On the two EndoNeRF clips no factor gains anything at any step. Where a digital zoom of 1.1 to
 # 2 begins between two frames, the best one gains 0.07 to 0.74 and is at most 0.02 below the usual correlation.
@@ -27,7 +24,7 @@ def cut_findings(grey: list[FloatArray], names: list[str], readable: BoolArray, 
     readable   frames that are neither black nor white
     """
     pairs = [i for i in range(1, len(grey)) if readable[i - 1] and readable[i] and grey[i].shape == grey[i - 1].shape]
-    alike = {i: _correlation(grey[i - 1], grey[i]) for i in pairs}
+    alike = {i: correlation(grey[i - 1], grey[i]) for i in pairs}
     usual = float(np.median(list(alike.values()) or [0.0]))
     if usual < SAME_SCENE:
         return []
@@ -51,10 +48,10 @@ def _zoom(one: FloatArray, other: FloatArray, least: float) -> float | None:
     from scipy.ndimage import uniform_filter
 
     one, other = (uniform_filter(picture, 3, mode="nearest") for picture in (one, other))
-    fits = [(_correlation(_zoomed(one, zoom), other), zoom) for zoom in ZOOMS]
-    fits += [(_correlation(one, _zoomed(other, zoom)), 1 / zoom) for zoom in ZOOMS]
+    fits = [(correlation(_zoomed(one, zoom), other), zoom) for zoom in ZOOMS]
+    fits += [(correlation(one, _zoomed(other, zoom)), 1 / zoom) for zoom in ZOOMS]
     fit, zoom = max(fits)
-    return float(zoom) if fit >= least and fit - _correlation(one, other) >= GAINED else None
+    return float(zoom) if fit >= least and fit - correlation(one, other) >= GAINED else None
 
 
 def _zoomed(picture: FloatArray, zoom: float) -> FloatArray:
@@ -70,61 +67,14 @@ def alternating_finding(grey: list[FloatArray], where: str) -> list[Finding]:
     """
     if len(grey) < 6 or len({picture.shape for picture in grey}) != 1:
         return []
-    one, two = (float(np.median([_correlation(a, b) for a, b in zip(grey, grey[k:])])) for k in (1, 2))
+    one, two = (float(np.median([correlation(a, b) for a, b in zip(grey, grey[k:])])) for k in (1, 2))
     if two < SAME_SCENE or two - one < ALTERNATING:
         return []
     what = f"every picture resembles the next but one (correlation {two:.2f}) more than the next ({one:.2f})"
     return [finding("alternating-views", where, what)]
 
 
-def halves_finding(grey: list[FloatArray], where: str) -> list[Finding]:
-    """Pictures that seem to contain two simultaneous views.
-
-    grey   (h, w) of every frame, reduced
-    """
-    large = [picture for picture in grey if min(picture.shape) >= 2 * FARTHEST]
-    lit = _lit(large)  # black bars beside a picture make its halves alike
-    for layout, halves in (("side by side", _beside), ("stacked", _stacked)):
-        alike = float(np.median([_shifted_correlation(*halves(picture), *halves(lit)) for picture in large] or [0.0]))
-        if alike > ALIKE:
-            what = f"the halves of the pictures, {layout}, resemble each other (correlation {alike:.2f})"
-            return [finding("two-views", where, what)]
-    return []
-
-
-def _lit(pictures: list[FloatArray]) -> FloatArray:
-    """(h, w) 1 where some picture is not dark; 1 everywhere for pictures of several sizes."""
-    if len({picture.shape for picture in pictures}) != 1:
-        return np.ones(pictures[0].shape if pictures else (1, 1))
-    return (np.max(pictures, axis=0) > DARK).astype(np.float64)
-
-
-def _beside(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
-    width = picture.shape[1] // 2
-    return picture[:, :width], picture[:, -width:]
-
-
-def _stacked(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
-    height = picture.shape[0] // 2
-    return picture[:height], picture[-height:]
-
-
-def _shifted_correlation(one: FloatArray, other: FloatArray, lit: FloatArray, other_lit: FloatArray) -> float:
-    """The largest correlation of two pictures over shifts of up to a sixth of the width, where both are lit."""
-    if one.shape != lit.shape:
-        lit, other_lit = np.ones(one.shape), np.ones(other.shape)
-    width = one.shape[1]
-    most = width // FARTHEST
-    best = 0.0
-    for k in range(-most, most + 1):
-        here, there = slice(max(0, k), width + min(0, k)), slice(max(0, -k), width + min(0, -k))
-        both = (lit[:, here] > 0) & (other_lit[:, there] > 0)
-        if both.mean() >= LEAST_LIT:
-            best = max(best, _correlation(one[:, here][both], other[:, there][both]))
-    return best
-
-
-def _correlation(one: FloatArray, other: FloatArray) -> float:
+def correlation(one: FloatArray, other: FloatArray) -> float:
     """The correlation of two pictures of one size; 0 if one is constant."""
     one, other = one - one.mean(), other - other.mean()
     size = float(np.sqrt((one * one).sum() * (other * other).sum()))
