@@ -331,7 +331,7 @@ def begun(monkeypatch, plan, seconds, iteration=0):
 
 def test_the_time_of_the_initial_motion_tells_the_speed_of_the_libraries(monkeypatch):
     """They took half of the time that follows from the iterations, on a processor whose two cores share their parts."""
-    plan = plan_of("quick", 63, 2)._replace(perceived=True)
+    plan = plan_of("quick", 126, 2)._replace(perceived=True)
     said = estimated_seconds(plan, UNIT)
     shown, _, kept = begun(monkeypatch, plan, said.start / 2)
     found = estimated_seconds(shown._plan, UNIT)

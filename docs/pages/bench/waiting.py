@@ -4,12 +4,14 @@
 
 `endotsr train` runs on each clip in this process, with its evaluation. The first clip is forecast at the assumed speed
 of a machine, the next ones at the speed of the training before. Without --wall every time is processor time of one
-thread, which other work on the machine changes less than the time on the wall; set OPENBLAS_NUM_THREADS=1 for it. The
-renders for the curve are no part of any time. With an empty folder as NUMBA_CACHE_DIR the first training is a cold one.
+thread, which other work on the machine changes less than the time on the wall. The environment has to contain
+OPENBLAS_NUM_THREADS=1, as in the process of a command. The renders for the curve are no part of any time. With an empty
+folder as NUMBA_CACHE_DIR the first training is a cold one.
 """
 
 import argparse
 import contextlib
+import os
 import tempfile
 import time
 from collections.abc import Iterator
@@ -18,9 +20,11 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from endotsr.cli.main import BLAS
 from endotsr.cli.parts import progress, waiting
 from endotsr.clips.sequences.forecast.seconds import COMPILATION, TimedCommand, assumed_unit, estimated_seconds
 from endotsr.clips.sequences.forecast.work import Standing
+from endotsr.errors import InputError
 from endotsr.method.kernels.vectors import REGISTER
 from endotsr.results.evaluation.metrics import psnr
 from endotsr.results.report import live_page
@@ -143,7 +147,7 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
         "cold": not spoken.said["start"]["compiled"], "register_bytes": REGISTER,
         "iterations": about["iteration"], "gaussians": about["gaussians"], "said": spoken.said,
         "trained": spoken.trained, "whole": whole, "largest_rise": spoken.largest_rise,
-        "forecast_after": progress.FORECAST_AFTER, "passes": 1, "curve": spoken.curve,
+        "forecast_after": progress.FORECAST_AFTER, "passes": 1, "blas_threads": 1, "curve": spoken.curve,
         "held_out": {key: metrics["held_out"]["mean"][key] for key in KEYS},
         "blend": {key: metrics["baselines"]["two_neighbours"]["mean"][key] for key in KEYS},
         "processor": here.get("processor"), "machine": here, "date": now()[:10],
@@ -152,6 +156,8 @@ def heard(clip: Path, words: list[str], wall: bool, kept_speed: Path) -> dict[st
 
 def measured(options: argparse.Namespace) -> dict[str, Any]:
     """Train on every clip; what was said is stored in place of an earlier command of the same kind."""
+    if os.environ.get(BLAS[0]) != BLAS[1]:
+        raise InputError(f"bench.waiting: set {'='.join(BLAS)}, with which a command runs")
     words = ["--preset", options.preset, "--seed", str(options.seed)]
     words += ["--lpips", str(options.lpips)] if options.lpips else []
     words += ["--iterations", str(options.iterations)] if options.iterations else []

@@ -31,7 +31,8 @@ def told(row: dict[str, Any], when: str) -> str:
 def today(row: dict[str, Any]) -> str:
     """What the first line would say with the constants of today, where it assumed the speed of a known processor.
 
-    "-" also for a row whose evaluation made several passes over the held-out frames, which took longer.
+    "-" also for a row whose evaluation made several passes over the held-out frames, which took longer. A row without
+    `blas_threads` is of a slower evaluation, which counts as it was timed, and of an initial motion on one thread.
     """
     start, register = row["said"]["start"], row["register_bytes"]
     if start["speed"] != "assumed" or not register or row.get("passes", PASSES) > 1:
@@ -44,6 +45,9 @@ def today(row: dict[str, Any]) -> str:
     factor = forecasts.vector_factor(register)
     plan = forecasts.TimedCommand(config, frames, width * height, row["threads"], "lpips" in row["held_out"], factor)
     found = forecasts.estimated_seconds(plan, forecasts.assumed_unit(row["threads"], register))
+    if "blas_threads" not in row:
+        one_way = found.start / (forecasts.BOTH_WAYS if row["threads"] > 1 else 1.0)
+        found = found._replace(start=one_way, evaluation=row["whole"] - row["trained"])
     seconds = sum(found) - found.reading + forecasts.COMPILATION * row["cold"]
     return f"{duration(seconds)} ({seconds / (row['whole'] - start['at']) - 1:+.0%})"
 
@@ -85,11 +89,16 @@ def about(rows: list[dict[str, Any]]) -> str:
     after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
     several = any(row.get("passes", PASSES) > 1 for row in rows)
     note = " It is of rows whose evaluation made one pass over the held-out frames; the others made three." * several
+    dates = [row["date"] for row in rows if "blas_threads" not in row]
+    former = (
+        f" Rows until {max(dates)} are of commands whose evaluation and initial motion took longer than today; there "
+        "*today* counts both as they were."
+    ) * bool(dates)
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "
         "that of the time left over its smallest value before. *Today* is the first line with the present constants."
-        f"{note}"
+        f"{note}{former}"
     )
 
 

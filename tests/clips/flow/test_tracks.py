@@ -1,7 +1,10 @@
 """Tests of `sequences.tracks`: points followed along optical flow, on simulated tissue whose motion is known."""
 
 import dataclasses
+import threading
+import time
 
+import numba
 import numpy as np
 import pytest
 
@@ -138,9 +141,44 @@ def test_one_training_frame_needs_no_flow(monkeypatch, breathing):
     np.testing.assert_array_equal(found.position, position[None].astype(np.float32))
 
 
-def test_flows_that_are_not_kept_are_made_again(breathing, monkeypatch):
+@pytest.mark.parametrize("threads, kept_bytes", [(1, 1e9), (2, 1e9), (1, 1.0), (2, 1.0)])
+def test_tracks_are_bitwise_equal_for_every_number_of_threads_and_for_flows_made_again(
+    threads, kept_bytes, breathing, monkeypatch
+):
+    sequence = breathing.sequence
+    places = range(len(sequence.train_index))
+    position, start = [], []
+    for place in places:
+        position.append(lifted(sequence, place, 16)[0])
+        start += [place] * position[-1].shape[1]
+    position, start, before = np.concatenate(position, axis=1), np.array(start), numba.get_num_threads()
+    expected = follow(sequence, start, position)
+    monkeypatch.setattr(tracks, "KEPT_BYTES", kept_bytes)
+    numba.set_num_threads(min(threads, before))
+    try:
+        found = follow(sequence, start, position)
+    finally:
+        numba.set_num_threads(before)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_an_error_in_one_direction_stops_the_other(breathing, monkeypatch):
+    """Both directions need flows until the last frame; with the stop, the other one asks for one more at most."""
+    asked, failed = [], threading.Event()
+    real = tracks.flows_between
+
+    def failing(sequence, earlier, later):
+        if earlier == int(sequence.train_index[0]):
+            failed.set()
+            raise RuntimeError("no flow")
+        assert failed.wait(30)
+        time.sleep(0.2)  # for the other thread to leave
+        asked.append(earlier)
+        return real(sequence, earlier, later)
+
+    monkeypatch.setattr(tracks, "flows_between", failing)
     position, *_ = lifted(breathing.sequence, 4)
-    start = np.full(position.shape[1], 4)
-    kept = follow(breathing.sequence, start, position)
-    monkeypatch.setattr(tracks, "KEPT_PAIRS", 1)
-    np.testing.assert_array_equal(follow(breathing.sequence, start, position).position, kept.position)
+    with pytest.raises(RuntimeError, match="no flow"):
+        follow(breathing.sequence, np.full(position.shape[1], 4), position)
+    assert len(asked) <= 1

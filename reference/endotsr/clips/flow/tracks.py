@@ -9,7 +9,8 @@ is followed again where it reaches a tissue pixel at its expected depth.
 In: a sequence and the points' start positions. Out: a position at every training frame. No held-out picture is read.
 """
 
-from functools import lru_cache
+import threading
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 from endotsr.clips.flow.between import WHOLE, Flows, flows_between
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import BoolArray, FloatArray
+from endotsr.method.kernels.memory import Kept
+from endotsr.method.kernels.threads import parallel_calls
 from endotsr.method.splatting.camera import Camera, backproject, project
 
 OUTSIDE = -1e6  # column and row of a point behind the camera
@@ -27,7 +30,8 @@ TOLERANCE = 0.5  # px^2
 # again, is another surface.
 DEPTH_JUMP = 0.1
 NEIGHBOURS = 8  # followed points that move a lost point
-KEPT_PAIRS = 64  # frame pairs whose flows are cached for the way back; further ones are recomputed
+# Flows between frames that one direction keeps for the other, 143 pairs of 640x512. More are computed twice.
+KEPT_BYTES = 750_000_000
 FEWEST = 16  # followed points; with fewer, lost points stay in place
 
 
@@ -51,6 +55,8 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) ->
     start     (P,) index of each point's training frame in `train_index`
     position  (3, P) scene units, at that frame, in which the point is visible
 
+    The two directions run at the same time. No result depends on the number of threads.
+
     Edges:   with one training frame, the given positions. In a static sequence likewise, up to rounding and the noise
              of the prior depth.
     """
@@ -60,16 +66,48 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) ->
     for place in range(last + 1):
         begins = start == place
         out.position[place][:, begins], out.followed[place, begins] = position[:, begins], True
-    flows = lru_cache(KEPT_PAIRS)(lambda place: flows_between(sequence, train[place], train[place + 1]))
-    for way in (1, -1):
-        for place in range(last) if way > 0 else range(last, 0, -1):
-            there_and_back = flows(min(place, place + way))
-            flow = there_and_back if way > 0 else Flows(there_and_back.backward, there_and_back.forward)
-            known = start <= place if way > 0 else start >= place
-            here = _Points(out.position[place][:, known], out.followed[place, known])
-            there = _step(sequence, (train[place], train[place + way]), here, flow)
-            out.position[place + way][:, known], out.followed[place + way, known] = there
+    flows, stopped = _PairFlows(sequence, train), threading.Event()
+
+    def along(way: int) -> None:
+        """Take the points to the later frames (way 1) or to the earlier ones (-1). No point has a frame in both."""
+        try:
+            for place in range(last) if way > 0 else range(last, 0, -1):
+                if stopped.is_set():
+                    return
+                there_and_back = flows.at(min(place, place + way))
+                flow = there_and_back if way > 0 else Flows(there_and_back.backward, there_and_back.forward)
+                known = start <= place if way > 0 else start >= place
+                here = _Points(out.position[place][:, known], out.followed[place, known])
+                there = _step(sequence, (train[place], train[place + way]), here, flow)
+                out.position[place + way][:, known], out.followed[place + way, known] = there
+        except BaseException:
+            stopped.set()  # `parallel_calls` waits for the other direction
+            raise
+
+    try:
+        parallel_calls(partial(along, 1), partial(along, -1))
+    finally:
+        stopped.set()  # an interruption may come while this thread waits
     return out
+
+
+class _PairFlows:
+    """The flows between neighbouring training frames, computed at first use, from any thread."""
+
+    def __init__(self, sequence: Sequence, train: list[int]) -> None:
+        self._sequence, self._train = sequence, train
+        self._kept: Kept[int, Flows] = Kept(KEPT_BYTES)
+        self._lock = threading.Lock()
+
+    def at(self, place: int) -> Flows:
+        """The flows between the training frames `place` and `place` + 1. Two threads may compute them, with equal
+        bits."""
+        with self._lock:
+            if place in self._kept:
+                return self._kept[place]
+        found = flows_between(self._sequence, self._train[place], self._train[place + 1])
+        with self._lock:
+            return self._kept.get(place, lambda: found)
 
 
 def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flows) -> _Points:

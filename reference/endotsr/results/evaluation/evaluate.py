@@ -18,6 +18,7 @@ import numpy as np
 
 from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
+from endotsr.method.kernels.memory import keep_freed_memory
 from endotsr.method.kernels.threads import parallel_calls
 from endotsr.results.evaluation.baselines import BASELINES, unit_image
 from endotsr.results.evaluation.coverage import TimesSeen, coverage, extrapolated, seen_metrics, times_seen
@@ -74,6 +75,7 @@ def evaluate_methods(
 
     Methods are rendered one after the other, and `renders_at_a_time` of them are measured at once.
     """
+    keep_freed_memory()
     rows: dict[str, list[FrameMetrics]] = {name: [] for name in methods}
     bad = dict.fromkeys(methods, 0)
     for index in (int(i) for i in indices):

@@ -32,9 +32,10 @@ WITHOUT_AVX512 = 1.5
 SERIAL = 1.7  # time of an iteration on one thread over that on several; the other parts use one thread
 READ = 0.25  # units per frame: decoding, checks
 TRACKED, TRACKED_POINTS = 0.8, 7.5e-6  # units per training frame for the initial motion, and for each of its points
+BOTH_WAYS = 0.55  # factor of the initial motion with several threads, which take its two directions at the same time
 FLOWS, TARGET = 0.5, 0.8  # units per gap for its two flows, and per time for its target
 MEASURED, PERCEIVED = 1.15, 2.2  # units per picture for its metrics, and for LPIPS
-TOGETHER = 0.8  # factor of both with several threads, which measure two pictures at a time
+TOGETHER = 0.55  # factor of both with several threads, which measure two pictures at a time
 METHODS = 8  # pictures per held-out frame: the render, the cross-fade and six baselines
 # Units per Gaussian for the viewer, the report and the renders. From `quick` to `sharp` on two threads, the evaluation
 # grew by 0.0011 on pulling and by 0.0026 on cutting, which has more held-out frames to render.
@@ -82,7 +83,7 @@ class Frames(NamedTuple):
 class Beside(NamedTuple):
     """Seconds per unit of the parts beside the iterations, as they were timed on this machine; None = not yet."""
 
-    start: float | None = None  # the initial motion, on one thread
+    start: float | None = None  # the initial motion, as if on one thread
     evaluation: float | None = None  # with the threads of the command
 
 
@@ -190,7 +191,8 @@ def start_units(plan: TimedCommand) -> float:
     config = plan.config
     tracks = config.initialisation.motion != "none" and config.model.spectral_motion
     points = TRACKED_POINTS * at_start(config, plan.pixels).gaussians
-    return plan.pixels / PIXELS * (TRACKED + points) * tracks * plan.frames.training
+    both = BOTH_WAYS if plan.threads > 1 else 1.0
+    return plan.pixels / PIXELS * (TRACKED + points) * tracks * both * plan.frames.training
 
 
 def evaluation_units(plan: TimedCommand) -> float:
