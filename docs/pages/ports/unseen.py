@@ -5,6 +5,7 @@ Two kinds of sets, which are not mixed: *blind* ones, written by somebody who ha
 whose counts are those of `python tests/port/unseen/by_hand/measure.py --record now`.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from endotsr.results.report.tables import markdown
@@ -38,7 +39,10 @@ def changed_table(found: dict[str, Any]) -> str:
 
 
 def blind_table(found: dict[str, Any]) -> str:
-    """One row for each blind set: the share of its observable mistakes with each outcome, with Wilson's interval."""
+    """One row for each blind set: the share of its observable mistakes with each outcome, with Wilson's interval.
+
+    A set on which the search was developed afterwards has a second row, of the judge after that: it is not blind.
+    """
     from scipy import stats
 
     def share(count: int, of: int) -> str:
@@ -48,11 +52,19 @@ def blind_table(found: dict[str, Any]) -> str:
     heads = ("Blind set", "refused", "named rightly", "named rightly or placed", "wrongly named", "nothing useful")
     rows = []
     for one in found["sets"]:
-        seen = one["observable"]
-        counts = (one["named"], one["named"] + one["near"] + one["placed"], one["wrongly_named"], one["nothing"])
         about = f"{one['date']}, version {one['golden']}, a port {one['port']}"
-        rows.append((about, share(one["refused"], one["mistakes"]), *(share(count, seen) for count in counts)))
+        rows.append((about, *_shares(one, one, share)))
+        if "afterwards" in one:
+            rows.append(("the same set, after the search was developed on it (not blind)",
+                         *_shares(one, one["afterwards"], share)))  # fmt: skip
     return markdown(heads, rows)
+
+
+def _shares(one: dict[str, Any], counted: dict[str, Any], share: Callable[[int, int], str]) -> list[str]:
+    """The cells of a set: the share refused, then those of the outcomes among its observable mistakes."""
+    named = counted["named"]
+    counts = (named, named + counted["near"] + counted["placed"], counted["wrongly_named"], counted["nothing"])
+    return [share(counted["refused"], one["mistakes"]), *(share(count, one["observable"]) for count in counts)]
 
 
 def _share(rate: list[float]) -> str:

@@ -10,7 +10,7 @@ from made_up_ports import cases_of
 
 from endotsr.port.judge.npy import write_npy
 from endotsr.port.search import changes
-from endotsr.port.search.find import apart, explained, sentences
+from endotsr.port.search.find import apart, explained, sentences, together
 
 MISTAKES = {
     "two numbers of a line": (
@@ -44,7 +44,39 @@ MISTAKES = {
         "initialisation", "np.linspace(0, 1, bases)[:, None]", "((np.arange(bases) + 0.5) / bases)[:, None]",
         "(np.arange(model.bases) + 0.5) / (model.bases)` where `np.linspace(0, 1, model.bases)` is right",
     ),
+    "two settings exchanged": (
+        "projection", 'camera["cx"], fy * y / z + camera["cy"]', 'camera["cy"], fy * y / z + camera["cx"]',
+        "camera.cx and camera.cy exchanged",
+    ),
+    "one setting read for another": (
+        "projection", 'kappa * camera["height"] / (2 * fy)', 'kappa * camera["width"] / (2 * fy)',
+        "camera.width in place of camera.height",
+    ),
+    "two constants exchanged": (
+        "masked_ssim", "C1, C2 = 0.01**2, 0.03**2", "C1, C2 = 0.03**2, 0.01**2",
+        "`C1` and `C2` exchanged: equation (B7)",
+    ),
+    "axes in another order of memory": (
+        "appearance", 'coefficients, phi_bar = i["appearance_coefficients"], i["phi_bar"]',
+        'phi_bar, stored = i["phi_bar"], i["appearance_coefficients"]\n'
+        "    coefficients = stored.reshape(stored.shape[1], 3, -1).transpose(1, 0, 2)",
+        "the input appearance_coefficients read with its axes 0 and 1 in the other order of memory",
+    ),
+    "a clamp before the loss": (
+        "masked_l1", 'np.where(mask, i["rendered"] - i["observed"], 0)\n    if n',
+        'np.where(mask, np.clip(i["rendered"], 0, 1) - i["observed"], 0)\n    if n',
+        "np.clip(np.where(mask, rendered, 0), 0, 1)",
+    ),
+    "a small number inside a power": (
+        "deformation", "sigma**2 + 1e-4", "(sigma + 1e-4) ** 2",
+        "`(width + 0.0001) ** 2` where `width ** 2 + 0.0001` is right",
+    ),
 }  # fmt: skip
+GUARD = [
+    ("divisor = np.where(dead, 1, rms)\n", "divisor = rms + 1e-6\n"),
+    ('phi_bar = np.where(dead, 0, (i["phi"] - mean) / divisor)', 'phi_bar = (i["phi"] - mean) / divisor'),
+    ('d_phi = np.where(dead, 0, i["d_phi_bar"] / divisor)', 'd_phi = i["d_phi_bar"] / divisor'),
+]
 MINUS = ('"corrected_translation": e @ d + i["offset"]', '"corrected_translation": e @ d - i["offset"]')
 TURNED = ('"corrected_rotation": e @ w', '"corrected_rotation": w @ e')
 REVERSE = ('"d_rotation": e.T @ g_w', '"d_rotation": e @ g_w')
@@ -104,6 +136,22 @@ def test_independent_mistakes_are_explained_one_output_at_a_time(golden, tmp_pat
     assert bool(sentences(found)) == whole, found.hits
     assert all(" alone: as in the definition with `" in line for line in lines)
     assert {line.partition(" alone: ")[0] for line in lines} == alone
+
+
+def test_a_small_number_in_place_of_a_case_is_found(golden, tmp_path):
+    text = "\n".join(sentences(search_on(golden, tmp_path, "atoms", *GUARD)))
+    assert "+ 1e-6` where `np.where(statistics.dead, np.inf, statistics.rms)` is right: equation (1b)" in text
+
+
+@pytest.mark.parametrize(("edits", "said"), [([MINUS, REVERSE], True), ([MINUS], False), ([MINUS, TURNED], False)])
+def test_a_mistake_of_each_pass_is_said_with_the_other(golden, tmp_path, edits, said):
+    found = search_on(golden, tmp_path, "pose", *edits)
+    lines = together(found, SECONDS)
+    assert bool(lines) == said
+    if said:
+        first, second, *_, whole = lines
+        assert "with two changes: `" in first and "- (offset)" in first and "definition/pose.py" in second
+        assert whole == f"  (together every output of its {len(found.cases)} cases)"
 
 
 def test_none_of_them_is_in_the_independent_set():

@@ -11,7 +11,7 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.port.judge.store import read_golden
-from endotsr.port.search.find import apart, explained, sentences
+from endotsr.port.search.find import apart, explained, sentences, together
 from endotsr.port.search.inside import looked
 
 MOST_MEMORY = 4 << 30  # bytes, if the system supports a limit
@@ -32,7 +32,7 @@ def main(words: list[str]) -> int:
         return 1
     inside, asked = looked(found.stage, found.cases)
     whole = sentences(found)
-    causes = [*whole, *apart(found, whole, float(seconds) / 2)]
+    causes = together(found, float(seconds) / 2) or [*whole, *apart(found, whole, float(seconds) / 2)]
     print(json.dumps({"causes": causes, "inside": inside, "asked": asked}))
     return 0
 

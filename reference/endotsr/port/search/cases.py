@@ -89,6 +89,13 @@ class Answered:
         one.refused = self.refused & {name}
         return one
 
+    def beside(self, stage: Stage) -> "Answered":
+        """The same case against the definition as it stands now, with a first change: what that explains is right."""
+        one = copy(self)
+        one.begin(stage)
+        one.refused = {name for name in one.got if not one.same(one.right, [name])}
+        return one
+
     def forward(self, stage: Stage, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
         """Outputs without gradients, and the saved tuple of the reverse pass."""
         found, saved = stage.forward(inputs, settings)

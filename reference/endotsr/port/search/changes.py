@@ -8,8 +8,10 @@ two numbers of a line, and an expression beside another. A trajectory has no con
 
 import ast
 import contextlib
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +21,15 @@ from endotsr.port.search.cases import Answered, of_the_parts
 from endotsr.port.search.decisions import try_conventions, try_thresholds
 from endotsr.port.search.numbers import START, said_number
 from endotsr.port.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
-from endotsr.port.search.requests import OtherReading, other_requests
+from endotsr.port.search.requests import OtherReading, exchanges, other_requests
 from endotsr.port.search.rewrites import rewrites, rounded, with_number
-from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts
+from endotsr.port.search.second import SecondChange, at, beside, expressions, orders, pairs, parts, turned
 from endotsr.port.search.trial import LATEST, TELLING, Live, Trial
 from endotsr.port.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # computing time of a search; `find` gives a trajectory more
 UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
+SHARE = 0.1  # of the time that is left, for the exchanges in tuples
 MOST_VALUES = 64  # examined values of an expression
 
 
@@ -61,6 +64,7 @@ def _all_places(trial: Trial, places: Sequence[Statement], glue: Sequence[Statem
     functions = [place for place in places if not place.is_constant]
     _places(trial, glue)
     _requests(trial)
+    _exchanges(trial, places)
     try_thresholds(trial, functions)
     _places(trial, [place for place in functions if place not in glue])
     _places(trial, [place for place in places if place.is_constant])
@@ -93,6 +97,24 @@ def _requests(trial: Trial) -> None:
         with contextlib.suppress(Exception):
             for one in [request] if request.at is None else _best_fixed(trial, request.at, request.rest):
                 trial.note(trial.fits(None, "both", one), one.text, None, *one.rank)
+
+
+def _exchanges(trial: Trial, places: Sequence[Statement]) -> None:
+    """Two settings, two inputs, or two entries of a tuple in the definition exchanged; none in a trajectory.
+
+    Tuples are exchanged if nothing else explains both passes.
+    """
+    if trial.length:
+        return
+    for request in exchanges([one.case for one in trial.cases]):
+        if trial.over:
+            return
+        with contextlib.suppress(Exception):
+            trial.note(trial.fits(None, "both", request), request.text, None, *request.rank)
+    end, trial.end = trial.end, min(trial.end, time.process_time() + SHARE * (trial.end - time.process_time()))
+    for place in [] if trial.explains else places:
+        _changes(trial, turned(place), 2)
+    trial.end = end
 
 
 def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) -> list[OtherReading]:
@@ -184,7 +206,9 @@ def _number_at(trial: Trial, spot: Spot, mode: str, text: str, rest: float, rank
                 when = words or (counter.words() if rank > 3 else "")
                 said = _replaced(spot, phases, said_number(spot.node, rest, value), when)
                 by_name = rest == 0 and isinstance(spot.node, ast.Name | ast.Attribute)  # rather another name
-                trial.note(whole, said, spot, 1 + (trial.discrete or by_name) if plain else 3, rank)
+                stands = partial(_standing, spot, text.replace("_knob", f"({value!r})"))
+                kept = stands if rank < 4 and (phases == mode) else None
+                trial.note(whole, said, spot, 1 + (trial.discrete or by_name) if plain else 3, rank, standing=kept)
                 break
     except Exception:  # a changed text may raise anything
         return LATEST
@@ -212,7 +236,19 @@ def _try(trial: Trial, one: Live, texts: Iterator[tuple[str, int]], rank: int) -
             with written(one.spot, text):
                 install = one.spot.place.compiled()
             whole, mode = trial.best(install, one.mode)
-            trial.note(whole, _replaced(one.spot, mode, text), one.spot, rank, less + less_likely)
+            kept = partial(_standing, one.spot, text) if mode == one.mode else None
+            trial.note(whole, _replaced(one.spot, mode, text), one.spot, rank, less + less_likely, standing=kept)
+
+
+@contextlib.contextmanager
+def _standing(spot: Spot, text: str) -> Iterator[None]:
+    """The definition with another text at a spot, for a search beside this change."""
+    with written(spot, text):
+        back = spot.place.compiled()()
+        try:
+            yield
+        finally:
+            back()
 
 
 def _replaced(spot: Spot, mode: str, new: str, words: str = "") -> str:
@@ -246,7 +282,7 @@ def _second(trial: Trial, places: Sequence[Statement]) -> None:
         _try(trial, one, beside(one.spot, one.values, expressions(one.spot.place)), 5)
 
 
-def _changes(trial: Trial, changes: Iterator[SecondChange]) -> None:
+def _changes(trial: Trial, changes: Iterator[SecondChange], rank: int = 4) -> None:
     for spot, text, writing in changes:
         if trial.over:
             return
@@ -254,4 +290,4 @@ def _changes(trial: Trial, changes: Iterator[SecondChange]) -> None:
             with writing:
                 install = spot.place.compiled()
             whole, mode = trial.best(install, trial.modes(spot.place)[0])
-            trial.note(whole, f"{text}{_side(spot, mode)}", spot, 4, 0)
+            trial.note(whole, f"{text}{_side(spot, mode)}", spot, rank, 0)

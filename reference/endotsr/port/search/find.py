@@ -43,6 +43,25 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
     return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
 
 
+def together(trial: Trial, seconds: float) -> list[str]:
+    """Two changes that explain every output together, if the likeliest one explains the forward outputs alone.
+
+    The second one is searched for in the definition with the first one.
+    """
+    first = trial.hits[0] if trial.hits else None
+    if first is None or first.whole != "forward" or first.standing is None or trial.length:
+        return []
+    with first.standing():
+        beside = sorted((one.beside(trial.stage) for one in trial.cases), key=_order)
+        second = search(trial.stage, beside, trial.golden, seconds) if beside[0].refused else None
+    said = _equally(second) if second and second.hits and second.hits[0].whole == "all" else []
+    if not said:
+        return []
+    whole = f"  (together every output of its {counted(len(trial.cases), 'case')})"
+    head = f"your outputs are those of the definition with two changes: {_said(first)}"
+    return [head, f"  and {said[0]}", *said[1:], whole]
+
+
 def apart(trial: Trial, whole: Sequence[str], seconds: float) -> list[str]:
     """Explanations of single outputs: independent mistakes may spoil different ones.
 
@@ -109,6 +128,10 @@ def sentences(trial: Trial) -> list[str]:
     return [f"your outputs are those of the definition with {said[0]}", *said[1:], whole]
 
 
+def _said(hit: Hit) -> str:
+    return f"{hit.text}{f': {hit.where}' if hit.where else ''}"
+
+
 def _equally(trial: Trial) -> list[str]:
     """A likeliest change that explains most, and lines with those that are equally likely.
 
@@ -121,7 +144,7 @@ def _equally(trial: Trial) -> list[str]:
     functions = sorted({hit.function for hit in best.values()})
     if not best or len(functions) > MOST_LINES:
         return []
-    said = [f"{hit.text}{f': {hit.where}' if hit.where else ''}" for hit in best.values()]
+    said = [_said(hit) for hit in best.values()]
     first, *others = best.values()
     rest = [
         f"  or equally with {line}"

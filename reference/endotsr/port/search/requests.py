@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,50 @@ def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator
         yield from _settings(path, cases, all_cases)
     for name, array in cases[0].inputs.items():
         yield from _inputs(name, array.shape, array.dtype)
+
+
+def exchanges(cases: Sequence[Case]) -> Iterator[OtherReading]:
+    """Two settings of one section, or two inputs of one shape, each read for the other; or one setting for another."""
+    paths = list(dict.fromkeys(path for case in cases for path in leaves(case.settings)))
+    for one, other in combinations(paths, 2):
+        pairs = [[value_at(case.settings, path) for path in (one, other)] for case in cases]
+        if one[:-1] == other[:-1] and all(map(_are_numbers, pairs)) and any(first != second for first, second in pairs):
+            yield OtherReading(f"{'.'.join(one)} and {'.'.join(other)} exchanged", (0, 1), partial(_turned, one, other))
+            for path, read in ((one, other), (other, one)):
+                yield OtherReading(
+                    f"{'.'.join(read)} in place of {'.'.join(path)}", (0, 0), partial(_copied, path, read)
+                )
+    for (a, first), (b, second) in combinations(cases[0].inputs.items(), 2):
+        if (first.shape, first.dtype) == (second.shape, second.dtype):
+            tell = partial(_turned_outputs, f"d_{a}", f"d_{b}")
+            yield OtherReading(f"the inputs {a} and {b} exchanged", (0, 2), partial(_turned_inputs, a, b), tell)
+
+
+def _are_numbers(pair: Sequence[Any]) -> bool:
+    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in pair)
+
+
+def _turned(
+    one: tuple[str, ...], other: tuple[str, ...], inputs: Inputs, settings: Settings
+) -> tuple[Inputs, Settings]:
+    """The request with two settings exchanged."""
+    first, second = value_at(settings, one), value_at(settings, other)
+    return inputs, with_value(with_value(settings, one, second), other, first)
+
+
+def _copied(path: Sequence[str], read: Sequence[str], inputs: Inputs, settings: Settings) -> tuple[Inputs, Settings]:
+    """The request with the value of one setting in the place of another."""
+    return inputs, with_value(settings, path, value_at(settings, read))
+
+
+def _turned_inputs(one: str, other: str, inputs: Inputs, settings: Settings) -> tuple[Inputs, Settings]:
+    """The request with two inputs exchanged."""
+    return {**inputs, one: inputs[other], other: inputs[one]}, settings
+
+
+def _turned_outputs(one: str, other: str, found: Outputs) -> Outputs:
+    """The outputs with two gradients exchanged, if both exist."""
+    return {**found, one: found[other], other: found[one]} if {one, other} <= found.keys() else found
 
 
 def leaves(settings: Mapping[str, Any], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -120,6 +164,11 @@ def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReadi
                     yield _ordered(name, axis, order, text)
     if len(shape) > 1 and len(set(shape[:2])) == 1:
         yield _mapped(name, "transposed", lambda a: a.swapaxes(0, 1), lambda a: a.swapaxes(0, 1))
+    for axis in range(len(shape) - 1):
+        if 1 < shape[axis] != shape[axis + 1] > 1:
+            text, change = f"read with its axes {axis} and {axis + 1} in the other order of memory", _stored(axis)
+            yield _mapped(name, text, change, change)
+            yield _mapped(name, text, change, lambda a: a)
     if kind == "boolean":
         yield _mapped(name, "negated", lambda a: ~a, lambda a: a)
     if kind == "real":
@@ -127,6 +176,17 @@ def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReadi
                              ("pi/180", np.pi / 180)):  # fmt: skip
             yield _mapped(name, f"times {text}", lambda a, f=factor: a * f, lambda a, f=factor: a * f, (2, 1))
         yield _mapped(name, "taken as 0", lambda a: 0 * a, lambda a: 0 * a, (2, 1))
+
+
+def _stored(axis: int) -> Callable[[NDArray], NDArray]:
+    """An array as a program reads it that expects two neighbouring axes in the other order."""
+
+    def change(array: NDArray) -> NDArray:
+        shape = list(array.shape)
+        shape[axis : axis + 2] = shape[axis + 1], shape[axis]
+        return np.ascontiguousarray(array).reshape(shape).swapaxes(axis, axis + 1)
+
+    return change
 
 
 def _swapped(size: int, a: int, b: int) -> NDArray:

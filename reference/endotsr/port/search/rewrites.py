@@ -31,6 +31,8 @@ OPERATORS: dict[type, str] = {
     ast.BitAnd: "{l}; {r}; ({l}) | ({r})",
     ast.BitOr: "{l}; {r}; ({l}) & ({r})",
 }
+SMALL = ("1e-12", "1e-10", "1e-8", "1e-7", "1e-6", "1e-5", "1e-4", "1e-3", "1")
+COUNTS = ("np.size({})", "np.shape({})[0]", "np.shape({})[-1]", "np.prod(np.shape({})[-2:])", "np.count_nonzero({})")
 COMPARED = {ast.Lt: "<= >=", ast.LtE: "< >", ast.Gt: ">= <=", ast.GtE: "> <", ast.Eq: "!= > <", ast.NotEq: "=="}
 SWAPS = ("[1, 0, 2]", "[2, 1, 0]", "[0, 2, 1]", "[1, 2, 0]", "[2, 0, 1]")
 
@@ -63,6 +65,7 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
         case ast.BinOp():
             sides = {"l": ast.unparse(node.left), "r": ast.unparse(node.right)}
             yield from (pattern.format(**sides) for pattern in OPERATORS.get(type(node.op), "{l}").split("; "))
+            yield from _other_counts(node)
         case ast.UnaryOp() | ast.Subscript() | ast.Attribute(attr="T"):
             yield ast.unparse(node.operand if isinstance(node, ast.UnaryOp) else node.value)
         case ast.BoolOp():
@@ -74,14 +77,23 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
             yield from (f"({left}) {sign} ({right})" for sign in COMPARED.get(type(node.ops[0]), "!=").split())
         case ast.Call():
             yield from _other_calls(node)
+            yield from _other_guards(node)
     yield from map(ast.unparse, _regrouped(node))
     inner = [n for n in ast.walk(node) if isinstance(n, ast.BinOp | ast.Call | ast.Name | ast.Attribute)]
     yield from dict.fromkeys(ast.unparse(n) for n in inner[1:12] if "np" not in ast.unparse(n)[:3])
 
 
 def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
-    """Operands moved into or out of a product or a function of one argument: a (b + c), sqrt(a + b)."""
+    """Operands moved into or out of a product, power, clamp or function of one argument: a (b + c), sqrt(a + b)."""
     match node:
+        case ast.BinOp(left=ast.BinOp(left=a, op=ast.Pow(), right=n), op=ast.Add() | ast.Sub(), right=c):
+            yield ast.BinOp(ast.BinOp(a, node.op, c), ast.Pow(), n)
+        case ast.BinOp(left=ast.BinOp(left=a, op=ast.Add() | ast.Sub() as sign, right=c), op=ast.Pow(), right=n):
+            yield ast.BinOp(ast.BinOp(a, ast.Pow(), n), sign, c)
+        case ast.Call(func=function, args=[ast.Call(func=clamp, args=[inner, *ends])], keywords=[]) if _clamps(clamp):
+            yield ast.Call(clamp, [ast.Call(function, [inner], []), *ends], [])
+        case ast.BinOp(left=ast.Call(func=clamp, args=[inner, *ends])) if _clamps(clamp):
+            yield ast.Call(clamp, [ast.BinOp(inner, node.op, node.right), *ends], [])
         case ast.BinOp(left=ast.BinOp(left=a, op=ast.Mult(), right=b), op=ast.Add() | ast.Sub(), right=c):
             yield ast.BinOp(a, ast.Mult(), ast.BinOp(b, node.op, c))
             yield ast.BinOp(ast.BinOp(a, node.op, c), ast.Mult(), b)
@@ -89,6 +101,10 @@ def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
             yield ast.Call(function, [ast.BinOp(inner, node.op, node.right)], [])
         case ast.Call(func=function, args=[ast.BinOp() as inner], keywords=[]):
             yield ast.BinOp(ast.Call(function, [inner.left], []), inner.op, inner.right)
+
+
+def _clamps(function: ast.expr) -> bool:
+    return ast.unparse(function) in ("np.clip", "np.maximum", "np.minimum", "max", "min")
 
 
 def rounded(node: ast.expr | ast.stmt, values: Sequence[Any], lower: str) -> Iterator[tuple[str, int]]:
@@ -117,10 +133,13 @@ def _wrapped(values: Sequence[Any]) -> Iterator[str]:
         yield from ("0 * ({})", "-({})", "2 * ({})", "({}) / 2", "({}) ** 2", "1 / ({})")
         yield from ["np.abs({})", "np.maximum({}, 0)"] * any((a < 0).any() for a in arrays)
         yield from ["np.minimum({}, 1)", "np.clip({}, -1, 1)"] * any((np.abs(a) > 1).any() for a in arrays)
+        yield from ["np.clip({}, 0, 1)"] * any(((a < 0) | (a > 1)).any() for a in arrays)
         yield from ("1 / (1 + np.exp(-({})))", "np.tanh({})", "np.maximum({}, 1e-8)")
         yield from ["np.sqrt({})"] * all((a >= 0).all() for a in arrays)
     elif any(a.ndim == 0 and a.dtype.kind in "iu" for a in arrays):
         yield from ("({}) + 1", "({}) - 1", "0", "1")
+    if any(a.ndim and a.dtype.kind == "b" for a in arrays):  # the elements that are counted or averaged
+        yield from ("np.ones_like({})", "~({})")
     if any(a.ndim for a in arrays):
         yield from ("({})[::-1]", "np.mean({})")
         yield from ["({}).T", "np.swapaxes({}, 0, 1)"] * any(a.ndim > 1 for a in arrays)
@@ -152,6 +171,31 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
     for k in range(len(arguments) - 1):
         turned = [*arguments[:k], arguments[k + 1], arguments[k], *arguments[k + 2 :]]
         yield f"{function}({', '.join([*turned, *words])})"
+
+
+def _other_guards(node: ast.Call) -> Iterator[str]:
+    """A small number added, in place of a case of `np.where` or a lower bound."""
+    match ast.unparse(node.func), node.args:
+        case "np.where", [condition, _, value]:
+            guarded = ast.unparse(value)
+            yield from (f"np.where({ast.unparse(condition)}, 0, {guarded}) + {small}" for small in SMALL)
+        case "np.maximum" | "max", [value, ast.Constant()]:
+            guarded = ast.unparse(value)
+        case _:
+            return
+    yield from (f"({guarded}) + {small}" for small in SMALL)
+
+
+def _other_counts(node: ast.BinOp) -> Iterator[str]:
+    """A sum divided by the number of all its elements, of those of one axis, or of those that are not 0."""
+    if not isinstance(node.op, ast.Div):
+        return
+    left = ast.unparse(node.left)
+    for one in ast.walk(node.left):
+        if isinstance(one, ast.Call) and isinstance(one.func, ast.Attribute) and one.func.attr == "sum":
+            summed = ast.unparse(one.func.value) if ast.unparse(one.func) != "np.sum" else ast.unparse(one.args[0])
+            for count in COUNTS:
+                yield f"({left}) / {count.format(summed)}"
 
 
 def _fewer(node: ast.Call, function: str, arguments: Sequence[str]) -> Iterator[str]:

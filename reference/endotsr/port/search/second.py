@@ -52,6 +52,27 @@ def _values_near(node: Any) -> list[str]:
     return [repr(k) for k in dict.fromkeys((1, 2, 3, v + 1, v - 1, 2 * v, v / 2, 0)) if k != v]
 
 
+def turned(place: Statement) -> Iterator[SecondChange]:
+    """Two entries of a tuple or list exchanged."""
+    for holder in ast.walk(place.statement):
+        if isinstance(holder, ast.Tuple | ast.List) and len(holder.elts) <= MOST_INDICES:
+            for k, to in combinations(range(len(holder.elts)), 2):
+                one, other = ast.unparse(holder.elts[k]), ast.unparse(holder.elts[to])
+                if one != other:
+                    spot = Spot(place, holder.elts[k], ((holder, "elts", k),))
+                    text = f"`{one}` and `{other}` exchanged"
+                    yield SecondChange(spot, text, _exchanged(holder.elts, k, to))
+
+
+@contextmanager
+def _exchanged(entries: list[ast.expr], k: int, to: int) -> Iterator[None]:
+    entries[k], entries[to] = entries[to], entries[k]
+    try:
+        yield
+    finally:
+        entries[k], entries[to] = entries[to], entries[k]
+
+
 @contextmanager
 def _both(one: Spot, first: str, other: Spot, second: str) -> Iterator[None]:
     with ExitStack() as stack:

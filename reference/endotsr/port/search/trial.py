@@ -7,6 +7,7 @@ selects the changes.
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ WHOLE = {
 }
 """Extents of an explanation."""
 Install = Callable[[], Any]  # applies a change and returns a function that undoes it
+Standing = Callable[[], AbstractContextManager[Any]]  # a context in which a change is in force
 
 
 class Hit(NamedTuple):
@@ -43,6 +45,7 @@ class Hit(NamedTuple):
     whole: str  # a key of WHOLE
     rank: tuple[int, ...]
     unlike: str = ""  # for `most`, the case that stays unexplained
+    standing: Standing | None = None  # for a change of an expression in all its phases
 
     @property
     def extent(self) -> str:
@@ -186,7 +189,7 @@ class Trial:
         one = self.cases[0]
         return not all(np.array_equal(found[name], one.right[name]) for name in one.got)
 
-    def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
+    def note(self, whole: str, text: str, spot: Spot | None, *rank: int, standing: Standing | None = None) -> None:
         """Record a change that fits; one that explains a part alone, if at least TELLING entries are wrong there."""
         several = sum(map(bool, self.refusals)) > 1
         enough = {"forward": self.wrong_forward, "refused": self.wrong if several else 0, "most": self.wrong_forward}
@@ -195,7 +198,7 @@ class Trial:
                 rank = (rank[0] + 1, *rank[1:])  # the refused outputs are computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
             extent = int(whole in enough) + (whole == "most")
-            self.hits.append(Hit(text, where, function, whole, (extent, *rank, len(self.hits)), self.unlike))
+            self.hits.append(Hit(text, where, function, whole, (extent, *rank, len(self.hits)), self.unlike, standing))
 
     def modes(self, place: Statement) -> list[str]:
         """The phases in which a change of a place can affect the refused outputs."""
