@@ -6,7 +6,8 @@ with or without its end, a factor or term whose size is found from the outputs. 
 
 import ast
 from collections.abc import Iterator, Sequence
-from itertools import permutations
+from copy import deepcopy
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,7 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
             yield from _other_counts(node)
         case ast.UnaryOp() | ast.Subscript() | ast.Attribute(attr="T"):
             yield ast.unparse(node.operand if isinstance(node, ast.UnaryOp) else node.value)
+            yield from _shifted(node)
         case ast.BoolOp():
             yield from map(ast.unparse, node.values)
         case ast.IfExp():
@@ -101,6 +103,18 @@ def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
             yield ast.Call(function, [ast.BinOp(inner, node.op, node.right)], [])
         case ast.Call(func=function, args=[ast.BinOp() as inner], keywords=[]):
             yield ast.BinOp(ast.Call(function, [inner.left], []), inner.op, inner.right)
+
+
+def _shifted(node: ast.expr) -> Iterator[str]:
+    """Slices of constant ends, one index earlier and one later, as with indices that start at another number."""
+    places = [k for k, one in enumerate(ast.walk(node)) if isinstance(one, ast.Slice)]
+    for k, step in product(places, (-1, 1)):
+        other = deepcopy(node)
+        part = list(ast.walk(other))[k]
+        match part:
+            case ast.Slice(lower=ast.Constant(value=int() as low), upper=ast.Constant(value=int() as high), step=None):
+                part.lower, part.upper = ast.Constant(low + step), ast.Constant(high + step)
+                yield ast.unparse(other)
 
 
 def _clamps(function: ast.expr) -> bool:
