@@ -1,9 +1,10 @@
 """The changes of the definition that are tried for one operation, likely ones first.
 
 First come the conventions of other programs. For an operation with parts, numbers, other texts and other names of one
-expression in its own code follow. Then come settings and inputs read differently, decisions at another number, and one
-expression in the remaining functions and in the constants. At the end come the order of statements, a part of an array,
-two numbers of a line, and an expression beside another. A trajectory has no conventions and no thresholds.
+expression in its own code follow. Then come settings and inputs read differently or for one another, entries of tuples
+exchanged, decisions at another number, and one expression in the remaining functions and in the constants. At the end
+come the order of statements, a part of an array, two numbers of a line, and an expression beside another. A trajectory
+has no conventions, no exchanges and no thresholds.
 """
 
 import ast

@@ -55,7 +55,7 @@ def exchanges(cases: Sequence[Case]) -> Iterator[OtherReading]:
     for (a, first), (b, second) in combinations(cases[0].inputs.items(), 2):
         if (first.shape, first.dtype) == (second.shape, second.dtype):
             tell = partial(_turned_outputs, f"d_{a}", f"d_{b}")
-            yield OtherReading(f"the inputs {a} and {b} exchanged", (0, 2), partial(_turned_inputs, a, b), tell)
+            yield OtherReading(f"the inputs {a} and {b} exchanged", (2, 1), partial(_turned_inputs, a, b), tell)
 
 
 def _are_numbers(pair: Sequence[Any]) -> bool:

@@ -1,7 +1,7 @@
-"""Changes that are tried if no other explains both passes.
+"""Changes of more than one expression, most of them tried if no other explains both passes.
 
-Two numbers of one line; another order of statements; an expression of the function that replaces another or is combined
-with it; a factor at one index of an array, or at one evaluation of an expression.
+Two entries of a tuple exchanged; two numbers of one line; another order of statements; an expression of the function
+that replaces another or is combined with it; a factor at one index of an array, or at one evaluation of an expression.
 """
 
 import ast
