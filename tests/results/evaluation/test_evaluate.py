@@ -1,5 +1,6 @@
 """The evaluation dictionary: right frames, right means, valid JSON whatever happens."""
 
+import dataclasses
 import json
 
 import numba
@@ -131,6 +132,27 @@ def test_baseline_rows_rank_as_the_data_says(sequence):
     strict(table)
 
 
+def test_renders_with_equal_tissue_are_measured_once(sequence, monkeypatch):
+    """Of three, two differ in excluded pixels alone; the third has equal values in another precision."""
+    frames = [int(i) for i in sequence.test_index[:2]]
+    masks = sequence.masks.copy()
+    masks[:, :4, :4] = False
+    sequence = dataclasses.replace(sequence, masks=masks)
+    seen, real = [], evaluate.image_metrics
+    monkeypatch.setattr(evaluate, "image_metrics", lambda render, *rest: seen.append(render) or real(render, *rest))
+
+    def other(index):
+        return np.where(sequence.masks[index], half(index), np.float32(np.nan))
+
+    def half(index):
+        return np.float32(0.5) * unit_image(sequence, index)
+
+    methods = {"half": half, "other": other, "wide": lambda index: half(index).astype(np.float64)}
+    found = evaluate.evaluate_methods(sequence, frames, methods)
+    assert len(seen) == 2 * len(frames)
+    assert found["half"] == found["other"] == evaluate.evaluate_frames(sequence, frames, other)
+
+
 def test_methods_share_the_maps_of_a_frame_and_not_their_rows(monkeypatch):
     """Three methods on two frames: a map for each frame and range, and for each of the six renders and range."""
     rng, asked = np.random.default_rng(3), []
@@ -145,7 +167,7 @@ def test_methods_share_the_maps_of_a_frame_and_not_their_rows(monkeypatch):
 
 
 def test_model_baselines_and_cross_fade_share_the_maps_of_a_frame(monkeypatch):
-    """One map of the frame for each range, whatever the number of methods; the cross-fade is its own blend."""
+    """One map of the frame and one of each different render for each range; the cross-fade is its own blend."""
     rng, asked = np.random.default_rng(3), []
     sequence = made_up(rng.integers(0, 255, (3, 3, 40, 40)).astype(np.uint8), [1], np.ones((3, 40, 40), bool))
     weights = LpipsWeights((), (), (np.ones(3, np.float32),), np.zeros(3), np.ones(3))
@@ -153,7 +175,9 @@ def test_model_baselines_and_cross_fade_share_the_maps_of_a_frame(monkeypatch):
     found = evaluate.evaluate_model(
         sequence, lambda i: unit_image(sequence, i), weights, cross_fade=lambda i: two_neighbours(sequence, i)
     )
-    assert len(asked) == 2 * (1 + 2 + len(evaluate.EVERY_BASELINE))
+    different = {unit_image(sequence, 1).tobytes()}
+    different |= {np.asarray(make(sequence)(1)).tobytes() for _, make in evaluate.EVERY_BASELINE.values()}
+    assert len(asked) == 2 * (1 + len(different)) and len(different) < len(evaluate.EVERY_BASELINE)
     assert found["cross_fade"]["mean"] == found["baselines"]["two_neighbours"]["mean"]
     assert found["held_out"]["mean"]["lpips"] == 0 < found["cross_fade"]["mean"]["lpips"]
 

@@ -8,6 +8,7 @@ mask, a render that is not finite) is None, never NaN, because the result is JSO
 A frame without tissue has no metrics.
 """
 
+import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -210,12 +211,18 @@ class _Truth:
         self._maps = {key: self._features(self._image, how) for key, how in LPIPS_KEYS.items()} if usable else {}
 
     def of_methods(self, methods: Mapping[str, RenderFrame]) -> Iterator[tuple[str, Means]]:
-        """Name and metrics of each method; `renders_at_a_time` of them are measured at once."""
+        """Name and metrics of each method; `renders_at_a_time` of them are measured at once.
+
+        Renders with equal tissue are measured once, as those of both blends where no pixel is excluded.
+        """
         names, count = list(methods), renders_at_a_time(self.mask.size)
+        known: dict[bytes, Means] = {}
         for k in range(0, len(names), count):
-            some = names[k : k + count]
-            renders = [self._checked(methods[name](self.index)) for name in some]
-            yield from zip(some, parallel_calls(*(partial(self._metrics, render) for render in renders)), strict=True)
+            renders = [self._checked(methods[name](self.index)) for name in names[k : k + count]]
+            digests = [self._digest(render) for render in renders]
+            new = {digest: render for digest, render in zip(digests, renders) if digest not in known}
+            known |= zip(new, parallel_calls(*(partial(self._metrics, render) for render in new.values())), strict=True)
+            yield from ((name, known[digest]) for name, digest in zip(names[k : k + count], digests, strict=True))
 
     def _checked(self, render: FloatArray) -> FloatArray:
         """The render as an array. Raises ValueError unless it has the shape of the frame."""
@@ -223,6 +230,10 @@ class _Truth:
         if render.shape != self._image.shape:
             raise ValueError(f"frame {self.index}: the render is {render.shape}, the frame {self._image.shape}")
         return render
+
+    def _digest(self, render: FloatArray) -> bytes:
+        """A digest of the tissue of a render, on which alone its metrics depend."""
+        return hashlib.blake2b(np.where(self.mask, render, 0).tobytes(), person=render.dtype.str.encode()).digest()
 
     def _metrics(self, render: FloatArray) -> Means:
         """Every metric of a render; inf and nan as `image_metrics`."""
