@@ -1,9 +1,12 @@
 """Frames that repeat another one: found up to coding noise, told from pauses, and never held out beside a twin."""
 
+import io
+
 import numpy as np
 import pytest
 from common_folder import written
 
+from data_folder import data_folder
 from endotsr.clips.opencv.png import read_png, write_png
 from endotsr.clips.sequences.checks.copies import (
     copied_frames,
@@ -13,6 +16,7 @@ from endotsr.clips.sequences.checks.copies import (
     without_twins,
 )
 from endotsr.clips.sequences.read import read_sequence
+from endotsr.clips.sequences.sampling import small_picture
 from endotsr.config import PAPER
 from endotsr.errors import InputError
 
@@ -100,3 +104,44 @@ def test_a_reader_leaves_out_a_twin_that_returns_later(tmp_path):
     assert found.test_index.tolist() == [1] and found.train_index.tolist() == [0, 2, 4]
     assert any("held-out frames repeat them: 000003" in note for note in found.notes)
     assert any("returning-frames: frame 3: 1 frame repeats" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("copied", "found"), [(0.4, True), (0.6, False)])
+def test_copies_after_lossy_coding_have_a_limit(copied, found):
+    """A conversion from 24 to 30 frames a second: a copy differs by the noise of the coding."""
+    rng, copy = np.random.default_rng(4), np.arange(1, 60) % 5 == 0
+    steps = np.where(copy, copied, 1.0) * rng.uniform(0.95, 1.05, 59)
+    pattern = pattern_of(steps)
+    assert (pattern is not None) == found
+    assert pattern is None or pattern.frames == "1::5,2::5,3::5,4::5"
+
+
+@pytest.mark.parametrize(("copied", "found"), [(0.2, True), (0.4, False)])
+def test_most_frames_are_copies_where_they_differ_little(copied, found):
+    """Where the exposure jumps every five frames, the other steps are smaller by the jump."""
+    steps = np.where(np.arange(1, 60) % 5 == 0, 1.0, copied) * np.random.default_rng(4).uniform(0.95, 1.05, 59)
+    assert (pattern_of(steps) is not None) == found
+
+
+def coded(pictures, quality):
+    """The pictures after H.264 at a constant rate factor."""
+    av, file = pytest.importorskip("av"), io.BytesIO()
+    with av.open(file, "w", "mp4") as video:
+        stream = video.add_stream("libx264", rate=30)
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt, stream.options = "yuv420p", {"crf": str(quality), "preset": "veryfast"}
+        for picture in pictures:
+            video.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        video.mux(stream.encode())
+    file.seek(0)
+    return [frame.to_ndarray(format="rgb24") for frame in av.open(file).decode(video=0)]
+
+
+@pytest.mark.data
+def test_copies_of_a_recorded_clip_are_found_after_lossy_coding():
+    files = sorted((data_folder("endonerf_cutting") / "images").iterdir())[:40]
+    pictures = [read_png(file) for file in files]
+    shown = [pictures[i - i // 5] for i in range(49)]
+    pattern = pattern_of(steps_between([small_picture(picture) for picture in coded(shown, 28)]))
+    assert pattern is not None and pattern.period == 5
+    assert pattern_of(steps_between([small_picture(picture) for picture in coded(pictures, 28)])) is None

@@ -5,9 +5,11 @@
     guard                       the checks on frames that a training holds in memory
     written                     the checks on frames that `endotsr prepare` writes
 
-    frames                      pictures of a clip, one after another; it calls the next six
-    clock_names, copies, exchanged, colours, scenes, halves
-                                names of pictures, repeated and exchanged frames, other light, other scenes and views
+    frames                      pictures of a clip, one after another; it calls the next nine
+    clock_names, copies, exchanged, frame_order
+                                names of pictures; repeated and exchanged frames, and those in another order
+    colours, light, blurred, scenes, halves
+                                other light and flicker, blurred frames, other scenes and views
     still_parts, dark_border    what stands still in pictures that move, and dark borders
     masks, polarity, specks     masks against their neighbours, against the pictures, and masks of noise
     depth, depth_rims           values of the depth, and depth interpolated across holes

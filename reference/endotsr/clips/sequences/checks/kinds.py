@@ -76,6 +76,14 @@ KINDS: dict[str, Kind] = {
     "exchanged-frames": Kind("warning", "the motion goes back and forth there, and a held-out frame stands between"
                              " frames of other times",
                              "give the pictures the numbers of their times, with masks and depth of the same frames"),
+    "frame-order": Kind("warning", "frames count as evenly spaced in time in the order of their names, and motion goes"
+                        " back and forth where they are not",
+                        "give the pictures the numbers of their times, with leading zeros in the program that wrote"
+                        " them, and masks and depth those of their pictures"),
+    "blurred-frame": Kind("warning", "out of focus or blurred by motion, it teaches the model a blurred scene at its"
+                          " time", LEAVE_OUT),
+    "flicker": Kind("warning", "the colour of the tissue follows the light or the exposure of the camera",
+                    "fit exposures (model.exposure = true); record with the shutter in step with the light"),
     "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
                           "fit exposures (model.exposure = true), or cut the clip with --frames"),
     "colour-jump": Kind("warning", "another light, white balance or kind of picture begins or ends there, or something"
