@@ -137,3 +137,21 @@ def test_rewrites_of_values_that_are_not_all_numbers_do_not_end_the_search():
     node = ast.parse("a + b", mode="eval").body
     texts = [text for text, _ in rewrites(node, [np.array([1.0, 2.0]), None], False)]
     assert "np.sqrt(a + b)" in texts
+
+
+@pytest.mark.parametrize(
+    ("text", "other"),
+    [
+        ("a ** 2 + 0.0001", "(a + 0.0001) ** 2"),
+        ("(a + 0.0001) ** 2", "a ** 2 + 0.0001"),
+        ("np.exp(np.clip(a, -1, 1))", "np.clip(np.exp(a), -1, 1)"),
+        ("np.maximum(a, 0) * b", "np.maximum(a * b, 0)"),
+        ("np.maximum(a, 1)", "(a) + 1e-8"),
+        ("a[:, 1:4]", "a[:, 0:3]"),
+        ("a.sum() / n", "(a.sum()) / np.size(a)"),
+    ],
+)
+def test_a_number_a_clamp_a_slice_or_a_count_in_another_place_is_tried(text, other):
+    node = ast.parse(text, mode="eval").body
+    assert other in [new for new, _ in rewrites(node, [np.ones(3)], False)]
+    assert ast.unparse(node) == text  # the syntax tree stays as it is

@@ -45,12 +45,13 @@ MISTAKES = {
         "(np.arange(model.bases) + 0.5) / (model.bases)` where `np.linspace(0, 1, model.bases)` is right",
     ),
     "two settings exchanged": (
-        "projection", 'camera["cx"], fy * y / z + camera["cy"]', 'camera["cy"], fy * y / z + camera["cx"]',
-        "camera.cx and camera.cy exchanged",
+        "adam", 's["rate"] * m_hat / (np.sqrt(v_hat) + s["epsilon"])',
+        's["epsilon"] * m_hat / (np.sqrt(v_hat) + s["rate"])',
+        ("rate and epsilon exchanged", "epsilon and rate exchanged"),
     ),
     "one setting read for another": (
-        "projection", 'kappa * camera["height"] / (2 * fy)', 'kappa * camera["width"] / (2 * fy)',
-        "camera.width in place of camera.height",
+        "projection", 'kappa * camera["width"] / (2 * fx)', 'kappa * camera["height"] / (2 * fx)',
+        "camera.height in place of camera.width",
     ),
     "two constants exchanged": (
         "masked_ssim", "C1, C2 = 0.01**2, 0.03**2", "C1, C2 = 0.03**2, 0.01**2",
@@ -66,10 +67,6 @@ MISTAKES = {
         "masked_l1", 'np.where(mask, i["rendered"] - i["observed"], 0)\n    if n',
         'np.where(mask, np.clip(i["rendered"], 0, 1) - i["observed"], 0)\n    if n',
         "np.clip(np.where(mask, rendered, 0), 0, 1)",
-    ),
-    "a small number inside a power": (
-        "deformation", "sigma**2 + 1e-4", "(sigma + 1e-4) ** 2",
-        "`(width + 0.0001) ** 2` where `width ** 2 + 0.0001` is right",
     ),
 }  # fmt: skip
 GUARD = [
