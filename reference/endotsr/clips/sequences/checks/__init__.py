@@ -11,6 +11,7 @@
     colours, light, blurred, scenes, halves
                                 other light and flicker, blurred frames, other scenes and views
     still_parts, dark_border    what stands still in pictures that move, and dark borders
+    colour_planes               colour planes that are displaced against each other
     masks, polarity, specks     masks against their neighbours, against the pictures, and masks of noise
     depth, depth_rims           values of the depth, and depth interpolated across holes
     depth_steps, flips          depth against the motion and the light of the pictures

@@ -97,7 +97,8 @@ def _of_pictures(run: FramePass) -> list[Finding]:
     where = str(run.clip.images[0].parent)
     if not run.frames:
         return []
-    return [*frame_findings(run.frames, where), *border_findings(run.view, where), *run.still.findings(where)]
+    still = run.still.findings(where)
+    return [*frame_findings(run.frames, where), *border_findings(run.view, where), *still, *run.planes.findings(where)]
 
 
 def _of_masks(run: FramePass) -> list[Finding]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.opencv.pictures import read_picture
+from endotsr.clips.sequences.checks.colour_planes import ColourPlanes
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_facts, light_correlation
 from endotsr.clips.sequences.checks.depth_pair import DepthPairs
 from endotsr.clips.sequences.checks.depth_steps import DepthSteps
@@ -65,6 +66,7 @@ class FramePass:
         self.frames: list[FrameFacts] = []
         self.masks, self.specks = MaskSteps(), Specks()
         self.view, self.late, self.still = FieldOfView(), LateParts(), StillParts(count)
+        self.planes = ColourPlanes(count)
         self.depth: list[DepthFacts] = []
         self.steps, self.turns, self.of_split = DepthSteps(count), DepthTurns(), SplitTissue(count)
         self.views, self.against = PairViews(count), DepthPairs(clip)
@@ -102,6 +104,7 @@ class FramePass:
         self.specks.add(i, tissue)
         self.view.add(picture, tissue)
         self.still.add(i, picture, tissue)
+        self.planes.add(i, picture)
         self.steps.add(i, picture, depth, tissue)
         self.late.add(picture, tissue, depth)
         self.turns.add(i, depth)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.agreement import agreement_findings, agreement_of
 from endotsr.clips.sequences.checks.cameras import camera_findings
+from endotsr.clips.sequences.checks.colour_planes import loaded_plane_findings
 from endotsr.clips.sequences.checks.dark_border import loaded_border_findings
 from endotsr.clips.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
 from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_finding
@@ -44,6 +45,7 @@ def guarded(
     found += frame_findings([picture for picture, _ in facts], str(images[0].parent))
     found += loaded_border_findings(sequence, str(images[0].parent))
     found += loaded_still_findings(sequence, str(images[0].parent))
+    found += loaded_plane_findings(sequence, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
         found += loaded_late_findings(sequence, str(clip.masks.files[0].parent), str(clip.depth.files[0].parent))

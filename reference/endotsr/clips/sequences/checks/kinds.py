@@ -101,6 +101,10 @@ KINDS: dict[str, Kind] = {
                       "state it: endotsr prepare --stereo side_by_side or stacked"),
     "alternating-views": Kind("warning", "two alternating cameras or kinds of light are not one scene",
                               "prepare each separately: --frames ::2, and --frames 1::2"),
+    "shifted-colours": Kind("warning", "the colour planes show two views, as in an anaglyph, or two moments, as of a"
+                            " camera that takes the colours one after another, and training fits one view to all",
+                            "export each view in its colours; for planes of other moments, move them into one place"
+                            " before the pictures are written"),
     "straight-border": Kind("warning", "two pictures in one, bars that are not black and the display of a console are"
                             " not one view of one scene",
                             "cut the picture out: endotsr prepare --crop; or exclude the rest: --unite-masks"),

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.formats.choices import Border
+from endotsr.clips.sequences.checks.colour_planes import ColourPlanes
 from endotsr.clips.sequences.checks.dark_border import border_findings
 from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
@@ -26,7 +27,7 @@ class WrittenFrames:
 
     def __init__(self, count: int) -> None:
         self.masks, self.view, self.medians = MaskEvidence(), FieldOfView(), []
-        self.still, self.frames = StillParts(count), 0
+        self.still, self.planes, self.frames = StillParts(count), ColourPlanes(count), 0
         self.blended: list[float] = []
         self.order, self.turns, self.late = MaskOrder(), MaskTurns(), LateParts()
 
@@ -34,6 +35,7 @@ class WrittenFrames:
         """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
         self.view.add(picture, tissue)
         self.still.add(self.frames, picture, tissue)
+        self.planes.add(self.frames, picture)
         self.frames += 1
         self.order.add(tissue)
         self.turns.add(tissue)
@@ -57,7 +59,7 @@ class WrittenFrames:
             notes += notes_of(self.turns.findings(where) + self.order.findings(where))
             notes += notes_of(self.late.findings(where, where))
             notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
-        notes += notes_of(self.still.findings(where) + rim_finding(self.blended, where))
+        notes += notes_of(self.still.findings(where) + self.planes.findings(where) + rim_finding(self.blended, where))
         return notes + self._depth_notes(clip)
 
     def _depth_notes(self, clip: Clip) -> list[str]:
