@@ -56,6 +56,14 @@ def test_a_cut_a_still_scene_fast_motion_exposure_and_few_frames_say_nothing():
     assert said([pictures[i] for i in AS_TEXT], dark) == []
 
 
+def test_motion_that_repeats_itself_is_in_order():
+    """As breathing does: the same moment of another breath is nearer than the neighbours, and the steps are even."""
+    breath, rng = tissue(40, period=40)[::4], np.random.default_rng(7)
+    pictures = [breath[i % 10] + rng.normal(0, 2, breath[0].shape) for i in range(COUNT)]
+    assert said(pictures) == []
+    assert len(said([pictures[i] for i in rng.permutation(COUNT)])) == 1
+
+
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["endonerf_pulling", "endonerf_cutting", "sinus_endoscopy"])
 def test_recorded_clips_in_their_order_say_nothing_and_in_another_one_are_named(name):
