@@ -18,7 +18,7 @@ from endotsr.clips.simulator.settings import SimulatorSettings
 from endotsr.clips.simulator.simulate import simulate
 from endotsr.config import PAPER, SequenceConfig
 from endotsr.errors import InputError
-from endotsr.results.evaluation.pictures import read_picture as read_render
+from endotsr.results.evaluation.pictures import read_render
 
 RNG = np.random.default_rng(3)
 COLOUR = RNG.integers(0, 256, (33, 47, 3), np.uint8)

@@ -2,7 +2,7 @@
 
     kinds                       every kind of finding, with level, reason and remedy
     check, frame_pass           `endotsr check`: what follows from all frames, and the pass that reads them
-    guard                       the checks on frames that a training holds in memory
+    guard, loaded               the checks on frames that a training holds in memory
     written                     the checks on frames that `endotsr prepare` writes
 
     frames                      pictures of a clip, one after another; it calls the next nine

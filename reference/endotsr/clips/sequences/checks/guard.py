@@ -18,6 +18,7 @@ from endotsr.clips.sequences.checks.depth_steps import loaded_steps, scale_findi
 from endotsr.clips.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.clips.sequences.checks.kinds import Finding, worst_first
 from endotsr.clips.sequences.checks.late import loaded_late_findings
+from endotsr.clips.sequences.checks.loaded import first_pair_findings, loaded_depth_findings, loaded_mask_findings
 from endotsr.clips.sequences.checks.masks import mask_findings
 from endotsr.clips.sequences.checks.split_tissue import loaded_split_findings
 from endotsr.clips.sequences.checks.still_parts import loaded_still_findings
@@ -48,11 +49,13 @@ def guarded(
     found += loaded_plane_findings(sequence, str(images[0].parent))
     if clip.masks and clip.masks.files:
         found += mask_findings(sequence.masks, str(clip.masks.files[0].parent))
+        found += loaded_mask_findings(sequence, str(clip.masks.files[0].parent))
         found += loaded_late_findings(sequence, str(clip.masks.files[0].parent), str(clip.depth.files[0].parent))
     found += loaded_split_findings(sequence, folder)
     priors = str(clip.depth.files[0].parent)
     found += depth_findings(depth, priors, clip.arbitrary, near, clip.depth.assumed)
     found += scale_finding(loaded_steps(sequence), priors)
+    found += loaded_depth_findings(sequence, priors) + first_pair_findings(sequence, clip, frames)
     found += camera_findings(sequence.cameras, usual_depth(depth), folder, clip.crop)
     if (
         clip.layout != COMMON and not sequence.static_camera and not clip.pose_faults
