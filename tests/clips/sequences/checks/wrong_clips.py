@@ -141,6 +141,7 @@ WRONG = {
     "two views in turn": (lambda p: each(p, "images", lambda x: np.roll(x, 20, 1), range(1, FRAMES, 2)),
                           "alternating-views", "warning", None),
     "65535 without depth": (lambda p: each(p, "depth", without), "marked-depth", "warning", None),
+    "tenths of millimetres in 8 bits": (lambda p: each(p, "depth", tenths), "wrapped-depth", "warning", None),
     "far away": (lambda p: poses(p, entry(0, 3, 1e9)), "far-from-origin", "note", None),
     "focal length in mm": (lambda p: poses(p, entry(2, 4, 4.0)), "field-of-view", "warning", None),
     "grey image": (lambda p: each(p, "images", lambda x: x[:, :, 0], [3]), "picture", "refusal", 3),
@@ -185,6 +186,12 @@ def sloped(depth):
 
 def lit_from_afar(image):
     return (image * np.linspace(0.3, 1, len(image))[:, None, None]).astype(np.uint8)
+
+
+def tenths(depth):
+    """Fine depth of a slope, in tenths of millimetres, of which a byte keeps the remainder of 256."""
+    y, x = np.indices(depth.shape[:2])
+    return np.where(depth > 0, (400 + 3 * x + 4 * y) % 256, 0).astype(np.uint8)
 
 
 def without(depth):

@@ -13,7 +13,8 @@
     still_parts, dark_border    what stands still in pictures that move, and dark borders
     colour_planes               colour planes that are displaced against each other
     masks, polarity, specks     masks against their neighbours, against the pictures, and masks of noise
-    depth, depth_rims           values of the depth, and depth interpolated across holes
+    depth, depth_rims, depth_wraps
+                                values of the depth, depth interpolated across holes, and numbers that did not fit
     depth_steps, flips          depth against the motion and the light of the pictures
     depth_pair, stereo          depth against stereo pairs, and the two views of a pair
     late                        masks and depth of other moments than their pictures

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
+from endotsr.clips.sequences.checks.depth_wraps import WRAPPED, wrapped_part
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.clips.sequences.depth_files import CLIPPED
 from endotsr.clips.sequences.depth_outliers import outlying_frames, said
@@ -45,6 +46,7 @@ class DepthFacts(NamedTuple):
     digest: bytes = b""  # of the depth, equal for equal planes
     at_lowest: float = 0.0  # as at_highest
     blended: float = 0.0  # see `depth_rims.blended_rim`
+    wrapped: float = 0.0  # see `depth_wraps.wrapped_part`
     others: tuple[float, float] = (0.0, 0.0)  # between which all depths but the lowest and highest lie, outliers aside
 
 
@@ -67,6 +69,7 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
         blake2b(depth.tobytes(), digest_size=16).digest(),
         float((values == values.min()).mean()) if values.size else 0.0,
         blended_rim(depth),
+        wrapped_part(stored),
         _between(values),
     )
 
@@ -158,6 +161,9 @@ def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
         return [finding("constant-depth", where, "every frame has one and the same depth everywhere")]
     if marked := mark_finding(facts, where):
         return marked
+    if (wrapped := float(np.median([fact.wrapped for fact in facts]))) > WRAPPED:
+        what = f"{wrapped:.2%} of the pixels lie beside a step between the ends of the type (limit {WRAPPED:.2%})"
+        return [finding("wrapped-depth", where, what)]
     if len(facts) > 2 and len(highest) == 1 and highest & set(FULL_SCALE) and integers:
         return [finding("normalised-depth", where, f"the largest number of every frame is {max(highest):g}")]
     levels = int(np.median([fact.levels for fact in facts]))

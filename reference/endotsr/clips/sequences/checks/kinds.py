@@ -187,6 +187,9 @@ KINDS: dict[str, Kind] = {
                        "store millimetres, or a smaller step with its scale"),
     "marked-depth": Kind("warning", "the value seems to mark pixels without depth but is read as a distance",
                          "store 0 where there is no depth"),
+    "wrapped-depth": Kind("warning", "the numbers did not fit the type of the files and begin again at 0: the depth has"
+                          " steps that the tissue does not have",
+                          "store the depth in 16 bits, or in larger units such as whole millimetres"),
     "blended-depth": Kind("warning", "depth was resized with interpolation, which makes depths of 0 and of tissue into"
                           " depths in front of it",
                           "resize depth without interpolation, or give endotsr depth --given the files in their own"
