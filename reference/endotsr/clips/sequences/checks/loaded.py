@@ -1,7 +1,7 @@
 """Checks that `frame_pass` makes for `endotsr check`, on a sequence in memory: what a training says of its frames.
 
-In: the sequence as it was read, before it is scaled. Out: findings. Right views are no part of a sequence; the first
-one is read, because its pair shows inverted depth, which a training refuses.
+In: the sequence as it was read, before it is scaled. Out: findings. Right views are no part of a sequence. The first
+one is read here: its pair shows inverted depth, which a training refuses.
 """
 
 import numpy as np
