@@ -30,7 +30,7 @@ from endotsr.port.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # computing time of a search; `find` gives a trajectory more
 UNKNOWN = 1  # assumed number of outputs spoiled by a change of an expression, if unknown
-SHARE = 0.1  # of the time that is left, for the exchanges in tuples
+PART = 0.1  # of the time that is left, for the exchanges in tuples
 MOST_VALUES = 64  # examined values of an expression
 
 
@@ -112,7 +112,7 @@ def _exchanges(trial: Trial, places: Sequence[Statement]) -> None:
             return
         with contextlib.suppress(Exception):
             trial.note(trial.fits(None, "both", request), request.text, None, *request.rank)
-    end, trial.end = trial.end, min(trial.end, time.process_time() + SHARE * (trial.end - time.process_time()))
+    end, trial.end = trial.end, min(trial.end, time.process_time() + PART * (trial.end - time.process_time()))
     for place in [] if trial.explains else places:
         _changes(trial, turned(place), 2)
     trial.end = end

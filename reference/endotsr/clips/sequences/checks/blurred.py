@@ -18,27 +18,27 @@ BESIDE = 2  # frames on either side
 ALIKE = 0.7  # least correlation with both neighbours, reduced: what covers the view has no detail either
 
 
-def fine_detail(near: float, brightness: float) -> float:
+def sharpness(near: float, brightness: float) -> float:
     """The difference of neighbouring rows or columns, relative to the brightness; grey levels at least 1."""
     return near / max(brightness, 1.0)
 
 
 def blurred_findings(
-    detail: FloatArray, grey: list[FloatArray], names: list[str], readable: BoolArray, where: str
+    sharp: FloatArray, grey: list[FloatArray], names: list[str], readable: BoolArray, where: str
 ) -> list[Finding]:
     """A warning for each frame that is less sharp than those on both sides.
 
-    detail     (n, 2) fine detail along columns and along rows
+    sharp      (n, 2) fine detail along columns and along rows
     grey       (h, w) of every frame, reduced
     readable   frames that are neither black nor white
     """
     found = []
-    for i in range(1, len(detail) - 1):
+    for i in range(1, len(sharp) - 1):
         part = slice(max(0, i - BESIDE), i + BESIDE + 1)
         if not readable[part].all():
             continue
-        sides = np.minimum(detail[part.start : i].max(axis=0), detail[i + 1 : part.stop].max(axis=0))
-        left = float((detail[i] / np.maximum(sides, 1e-9)).min())
+        sides = np.minimum(sharp[part.start : i].max(axis=0), sharp[i + 1 : part.stop].max(axis=0))
+        left = float((sharp[i] / np.maximum(sides, 1e-9)).min())
         if left < BLURRED and (sides > 0).all() and _alike(grey[i - 1 : i + 2]):
             what = f"{names[i]} has {left:.0%} of the fine detail of the frames on both sides (limit {BLURRED:.0%})"
             found.append(finding("blurred-frame", where, what, i))

@@ -15,7 +15,7 @@ from endotsr.clips.sequences.sequence import Sequence
 from endotsr.method.kernels.arrays import FloatArray
 
 SAMPLED, FEWEST, WORKING = 12, 3, 320  # frames of a clip, and of a finding; columns of the pictures that are looked at
-DETAIL, SMALLEST = 3.0, 32  # px, standard deviation of what counts as detail; px, rows and columns of a picture
+COARSE, SMALLEST = 3.0, 32  # px, standard deviation of the blur that is taken away; px, rows and columns of a picture
 # Displacement in px of the working size, and correlation of the detail there: that, and more than without displacement.
 # On 12 clips and on parts of their pictures the detail of all planes fits best without any, with a correlation of 0.69
 # or more. Two recorded pairs as anaglyphs have 0.22 and 0.40 at 18 and 9 px, and 0.00 without displacement; a plane
@@ -63,7 +63,7 @@ def displacement(plane: FloatArray, other: FloatArray) -> tuple[float, float, fl
     """Columns and rows by which a plane (h, w) lies beside the other, the correlation of the detail there and at 0."""
     height, width = plane.shape
     window = np.outer(np.hanning(height), np.hanning(width))
-    one, two = (window * (values - gaussian_filter(values, DETAIL)) for values in (plane, other))
+    one, two = (window * (values - gaussian_filter(values, COARSE)) for values in (plane, other))
     size = float(np.sqrt((one**2).sum() * (two**2).sum()))
     if size == 0:
         return 0.0, 0.0, 0.0, 0.0

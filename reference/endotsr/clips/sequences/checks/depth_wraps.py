@@ -9,7 +9,7 @@ has it in an instrument that is near. The median over the frames:
     the same in twentieths                                                               0.002 to 0.005
     the same in micrometres in 16 bits, where it exceeds 65 mm                           0.002 to 0.004
 
-Gentle slopes across few multiples of 256 have fewer such steps, because 0 marks missing depth.
+Gentle slopes across few multiples of 256 have fewer such steps: 0, which marks missing depth, lies between its ends.
 """
 
 import numpy as np

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.clips.formats.files import frame_numbers, shortened
 from endotsr.clips.formats.picture_fields import colours_differ
-from endotsr.clips.sequences.checks.blurred import blurred_findings, fine_detail
+from endotsr.clips.sequences.checks.blurred import blurred_findings, sharpness
 from endotsr.clips.sequences.checks.clock_names import clock_findings
 from endotsr.clips.sequences.checks.colours import colour_findings
 from endotsr.clips.sequences.checks.copies import SAME, copy_findings, return_finding, steps_between
@@ -71,7 +71,7 @@ def _comb(picture: NDArray[np.uint8]) -> tuple[float, float]:
     rows = picture[:, ::2].sum(axis=2, dtype=np.float32)
     near = np.abs(rows[2:-2] - (rows[1:-3] + rows[3:-1]) / 2).mean()
     far = np.abs(rows[2:-2] - (rows[:-4] + rows[4:]) / 2).mean()
-    return (float(near / far) if far > 0 else 0.0), fine_detail(float(near), float(rows.mean()))
+    return (float(near / far) if far > 0 else 0.0), sharpness(float(near), float(rows.mean()))
 
 
 def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
@@ -92,8 +92,8 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     found += colour_findings([fact.small for fact in facts], readable, where)
     found += _of_clip(facts, means, where)
     grey = [fact.small.mean(axis=2) for fact in facts]
-    detail = np.array([fact.fine for fact in facts]).reshape(-1, 2)
-    found += blurred_findings(detail, grey, names, readable, where)
+    sharp = np.array([fact.fine for fact in facts]).reshape(-1, 2)
+    found += blurred_findings(sharp, grey, names, readable, where)
     found += cut_findings(grey, names, readable, where) + halves_finding(grey, where)
     found += alternating_finding(grey, where) or light_findings([fact.small for fact in facts], readable, where)
     found += _blue_finding(facts, where)

@@ -55,12 +55,12 @@ def _flicker(means: FloatArray, where: str) -> list[Finding]:
     """A warning on brightness that goes up and down with a period of 2 to 6 frames."""
     if len(means) < LONG:
         return []
-    share, amplitude, period = flicker_of(means)
-    if share < REGULAR or amplitude < STRONG:
+    part, amplitude, period = flicker_of(means)
+    if part < REGULAR or amplitude < STRONG:
         return []
     what = (
         f"the brightness changes by {amplitude:.1%} up and down with a period of {period:.1f} frames, which is"
-        f" {share:.0%} of its fast change (limits {STRONG:.0%} and {REGULAR:.0%})"
+        f" {part:.0%} of its fast change (limits {STRONG:.0%} and {REGULAR:.0%})"
     )
     return [finding("flicker", where, what)]
 
@@ -78,6 +78,6 @@ def flicker_of(means: FloatArray) -> tuple[float, float, float]:
     frequency = np.fft.rfftfreq(len(log))
     fast = np.where(frequency >= 1 / SLOWEST, power, 0.0)
     k = int(fast.argmax())
-    share = power[max(0, k - 1) : k + 2].sum() / max(power.sum(), 1e-12)
+    part = power[max(0, k - 1) : k + 2].sum() / max(power.sum(), 1e-12)
     sides = 1 if 2 * k == len(log) else 2  # the shortest period has one term of the two of others
-    return float(share), float(sides * np.sqrt(fast[k]) / window.sum()), float(1 / max(frequency[k], 1e-9))
+    return float(part), float(sides * np.sqrt(fast[k]) / window.sum()), float(1 / max(frequency[k], 1e-9))
