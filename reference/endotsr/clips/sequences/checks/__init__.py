@@ -12,7 +12,8 @@
                                 other light and flicker, blurred frames, other scenes and views
     still_parts, dark_border    what stands still in pictures that move, and dark borders
     colour_planes               colour planes that are displaced against each other
-    masks, polarity, specks     masks against their neighbours, against the pictures, and masks of noise
+    masks, held, polarity, specks
+                                masks against their neighbours and the pictures, masks that stay, masks of noise
     depth, depth_rims, depth_wraps
                                 values of the depth, depth interpolated across holes, and numbers that did not fit
     depth_steps, flips          depth against the motion and the light of the pictures

@@ -161,6 +161,9 @@ KINDS: dict[str, Kind] = {
     "unlike-mask": Kind("warning", "it excludes tissue that its neighbours show, or shows what they exclude, and a"
                         " held-out frame there is measured on pixels that training hardly sees",
                         f"inspect its mask; if it is wrong, correct it or {LEAVE_OUT}"),
+    "held-masks": Kind("warning", "an instrument moves while its mask stays, and the training reads it as tissue",
+                       "supply a mask for each frame, or give the drawn ones to endotsr masks --keys FOLDER, which"
+                       " carries them to the others"),
     "speckled-masks": Kind("warning", "noise hides tissue all over the picture and leaves parts of the instrument in"
                            " the training",
                            "remove it by a median or an opening of the masks, as cv2.medianBlur(mask, 5), or smooth"

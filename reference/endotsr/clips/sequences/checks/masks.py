@@ -8,6 +8,7 @@ two polarities.
 import numpy as np
 
 from endotsr.clips.sequences.checks.exchanged import MaskOrder
+from endotsr.clips.sequences.checks.held import HeldMasks
 from endotsr.clips.sequences.checks.kinds import Finding, finding
 from endotsr.method.kernels.arrays import BoolArray
 
@@ -74,13 +75,14 @@ class MaskSteps:
     def __init__(self) -> None:
         self.fractions: dict[int, float] = {}  # by frame
         self._across: dict[int, float] = {}  # part of the pixels in which the masks before and after it differ
-        self._order, self._turns = MaskOrder(), MaskTurns()
+        self._order, self._turns, self._held = MaskOrder(), MaskTurns(), HeldMasks()
         self._last: tuple[BoolArray | None, BoolArray | None] = (None, None)
 
     def add(self, frame: int, mask: BoolArray | None) -> None:
         """The mask of a frame, (H, W), True = tissue; stored until the second next one."""
         self._order.add(mask)
         self._turns.add(mask)
+        self._held.add(mask)
         before, middle = self._last
         if before is not None and middle is not None and mask is not None:
             if before.shape == middle.shape == mask.shape and all(0 < m.mean() < 1 for m in (before, middle, mask)):
@@ -97,7 +99,7 @@ class MaskSteps:
             if part > limit and i not in beside:
                 what = f"its mask differs from both neighbours in {part:.1%} of the pixels"
                 found.append(finding("unlike-mask", where, f"{what} (limit in this clip {limit:.1%})", i))
-        return self._turns.findings(where) + found + self._order.findings(where)
+        return self._turns.findings(where) + found + self._order.findings(where) + self._held.findings(where)
 
     def _motion(self, frame: int) -> float:
         """Part of the pixels in which masks two apart differ, the median around a frame."""

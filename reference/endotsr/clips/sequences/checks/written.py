@@ -10,6 +10,7 @@ from endotsr.clips.sequences.checks.depth import rim_finding
 from endotsr.clips.sequences.checks.depth_rims import blended_rim
 from endotsr.clips.sequences.checks.exchanged import MaskOrder
 from endotsr.clips.sequences.checks.guard import notes_of
+from endotsr.clips.sequences.checks.held import HeldMasks
 from endotsr.clips.sequences.checks.late import LateParts
 from endotsr.clips.sequences.checks.masks import MaskTurns
 from endotsr.clips.sequences.checks.polarity import MaskEvidence
@@ -29,7 +30,7 @@ class WrittenFrames:
         self.masks, self.view, self.medians = MaskEvidence(), FieldOfView(), []
         self.still, self.planes, self.frames = StillParts(count), ColourPlanes(count), 0
         self.blended: list[float] = []
-        self.order, self.turns, self.late = MaskOrder(), MaskTurns(), LateParts()
+        self.order, self.turns, self.held, self.late = MaskOrder(), MaskTurns(), HeldMasks(), LateParts()
 
     def add(self, picture: NDArray[np.uint8], tissue: BoolArray | None, depth: NDArray[np.float32] | None) -> None:
         """One frame: picture (H, W, 3), tissue (H, W) or None without masks, depth (H, W) or None, 0 = missing."""
@@ -39,6 +40,7 @@ class WrittenFrames:
         self.frames += 1
         self.order.add(tissue)
         self.turns.add(tissue)
+        self.held.add(tissue)
         self.late.add(picture, tissue, depth)
         if tissue is not None:
             self.masks.add(picture, tissue, depth)
@@ -56,7 +58,7 @@ class WrittenFrames:
             excluded = clip.masks.excluded_value
             against = self.masks.flip_findings(where) or self.masks.findings(where, excluded)
             notes += notes_of(against) or [self.masks.note(excluded)]
-            notes += notes_of(self.turns.findings(where) + self.order.findings(where))
+            notes += notes_of([*self.turns.findings(where), *self.order.findings(where), *self.held.findings(where)])
             notes += notes_of(self.late.findings(where, where))
             notes += notes_of(border_findings(self.view, where)) if border == "auto" else []
         notes += notes_of(self.still.findings(where) + self.planes.findings(where) + rim_finding(self.blended, where))
