@@ -140,20 +140,19 @@ def with_other_weights(rows: list[Record]) -> str:
     found: dict[tuple[str, str], list[float]] = {}
     for row in rows:
         found.setdefault((row["configuration"].removeprefix("w "), row["sequence"]), []).append(row["psnr_full"])
-    texts = []
+    stands: dict[str, list[str]] = {}  # weights with their levels, by clip and verdict
     for (weight, sequence), values in sorted(found.items()):
         mean, limits = student(values)
         if limits is None or len(values) < LEAST_PAIRS or float(weight) == PAPER.loss.ssim_weight:
             continue
         clip = sequence.removeprefix("endonerf_")
         published = PUBLISHED[clip]["psnr_full"] or 0.0
-        texts.append(
-            f"{weight} it {_stands(limits, published)} on {clip} ({mean:.2f} dB, {limits[0]:.2f} to {limits[1]:.2f} dB)"
-        )
-    if not texts:
+        level = f"{weight} ({mean:.2f} dB, {limits[0]:.2f} to {limits[1]:.2f} dB)"
+        stands.setdefault(f"{_stands(limits, published)} on {clip}", []).append(level)
+    if not stands:
         return ""
-    used = f"{PAPER.loss.ssim_weight:g}"
-    return f" The paper does not print the weight of D-SSIM, here {used}: with {'; with '.join(texts)}."
+    used, texts = f"{PAPER.loss.ssim_weight:g}", [f"it {told} with {' and '.join(of)}" for told, of in stands.items()]
+    return f" The paper does not print the weight of D-SSIM, here {used}: {'; '.join(texts)}."
 
 
 def levels(folder: Path, found: Mapping[str, Record | None]) -> str:
