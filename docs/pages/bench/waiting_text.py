@@ -74,10 +74,10 @@ def said(result: dict[str, Any]) -> str:
     cells = []
     for row in rows:
         first = told(row, "start") + (", speed assumed" if row["said"]["start"]["speed"] == "assumed" else "")
-        after = row["whole"] - row["trained"]
+        evaluation = duration(row["whole"] - row["trained"]) + " (former)" * ("blas_threads" not in row)
         cells.append(
             [named(row), str(row["frames"]), first, today(row), told(row, "forecast"), told(row, "minute"),
-             f"{row['largest_rise']:.0%}", duration(after), duration(row["whole"])]
+             f"{row['largest_rise']:.0%}", evaluation, duration(row["whole"])]
         )  # fmt: skip
     return noted(heads, cells, about(rows))
 
@@ -89,11 +89,10 @@ def about(rows: list[dict[str, Any]]) -> str:
     after = " or ".join(map(str, sorted({row.get("forecast_after", FORMERLY) for row in rows})))
     several = any(row.get("passes", PASSES) > 1 for row in rows)
     note = " It is of rows whose evaluation made one pass over the held-out frames; the others made three." * several
-    dates = [row["date"] for row in rows if "blas_threads" not in row]
     former = (
-        f" Rows until {max(dates)} are of commands whose evaluation and initial motion took longer than today; there "
-        "*today* counts both as they were."
-    ) * bool(dates)
+        " A *former* evaluation took longer than today's, and so did the initial motion before it; in these rows"
+        " *today* counts both as they were."
+    ) * any("blas_threads" not in row for row in rows)
     return (
         f"Frames of {' and '.join(sizes)}, every eighth held out; {' and '.join(clocks)}; {', '.join(machines)}; "
         f"{max(row['date'] for row in rows)}. The forecast was printed after {after} iterations. The largest rise is "
